@@ -67,7 +67,9 @@ def scaled(value, factor):
     if isinstance(value, tuple):
         return tuple(scaled(part, factor) for part in value)
     if isinstance(value, int):
-        return max(1, int(value * factor)) if value > 0 else int(value * factor)
+        if value > 0:
+            return max(1, int(value * factor))
+        return int(value * factor)
     return value * factor
 
 
@@ -167,7 +169,10 @@ def _numbers(figures):
 
 def main(words):
     """Report on the rooms or fields named, or on all; a number at the end is the tolerance."""
-    tolerance = float(words.pop()) if words and words[-1][0].isdigit() else TOLERANCE
+    if words and words[-1][0].isdigit():
+        tolerance = float(words.pop())
+    else:
+        tolerance = TOLERANCE
     unknown = {word.split(".")[0] for word in words} - {room for room, *_ in ROOMS}
     if unknown:
         rooms = ", ".join(room for room, *_ in ROOMS)

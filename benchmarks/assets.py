@@ -35,7 +35,9 @@ SCRIPTS = {  # picture: (script, whether it is drawn without being named)
     "real_pos_gap": ("examples/real/pos_gap.py", False),
     "two_pass_gap": ("examples/real/two_pass_gap.py", False),
 }
-CHANNEL, SHARE = 16, 0.01  # of 255, of the pixels: see above
+# of 255, of the pixels: see above
+CHANNEL = 16
+SHARE = 0.01
 
 
 def share_changed(old: Path, new: Path) -> float:
@@ -61,7 +63,8 @@ def main():
 
 def draw(name, folder, write):
     """Draw a picture and compare it: whether it has changed."""
-    new, old = folder / f"{name}.png", ASSETS / f"{name}.png"
+    new = folder / f"{name}.png"
+    old = ASSETS / f"{name}.png"
     command = [sys.executable, ROOT / SCRIPTS[name][0], "--picture", new]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL, cwd=ROOT)
     share = share_changed(old, new)

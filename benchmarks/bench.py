@@ -49,7 +49,8 @@ def street_chunks(points, rng):
     for first in range(0, points, CHUNK):
         time = START + np.arange(first, min(first + CHUNK, points)) / PULSES
         angle = 2 * np.pi * 150.0 * time
-        across, up = np.sin(angle), np.cos(angle)
+        across = np.sin(angle)
+        up = np.cos(angle)
         ground = 2.0 / np.maximum(-up, 0.03)
         distance = np.minimum(ground, 12.0 / np.maximum(np.abs(across), 0.2))
         intensity = 20_000 * np.exp(-distance / 30) + 500 * rng.standard_normal(len(time))
@@ -61,12 +62,14 @@ def street_chunks(points, rng):
 def write_street(path, points):
     """A LAZ file in format 6 of some 3 bytes a point."""
     header = laspy.LasHeader(point_format=6)
-    header.scales, header.offsets = SCALE, CORNER
+    header.scales = SCALE
+    header.offsets = CORNER
     with laspy.open(path, "w", header=header) as writer:
         for xyz, time, intensity in street_chunks(points, np.random.default_rng(1)):
             chunk = laspy.ScaleAwarePointRecord.zeros(len(time), header=header)
             chunk["X"], chunk["Y"], chunk["Z"] = xyz
-            chunk["gps_time"], chunk["intensity"] = time, intensity
+            chunk["gps_time"] = time
+            chunk["intensity"] = intensity
             writer.write_points(chunk)
     return path
 

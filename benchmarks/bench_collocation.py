@@ -31,7 +31,10 @@ except ImportError:
 
 START = 413_200.0  # s of week
 INTERVAL = 10.0  # s between observations, as targets along a street
-SIGMA, NOISE, TIME = 0.2, 0.01, 40.0  # m, m, s
+# m, m, s
+SIGMA = 0.2
+NOISE = 0.01
+TIME = 40.0
 CONSOLE = Console()
 
 
@@ -85,7 +88,8 @@ class Pose:
         self.misclosure = SIGMA * rng.normal(size=(n, 3))
         self.noise = Noise(np.broadcast_to(NOISE**2 * np.eye(3), (n, 3, 3)))
         turned = rng.normal(scale=5e-4, size=(n, 3, 3))
-        drift, jitter = Covariance("matern32", TIME), Covariance("exponential", TIME / 4)
+        drift = Covariance("matern32", TIME)
+        jitter = Covariance("exponential", TIME / 4)
         self.covariances = drift, jitter, drift
         eye = np.eye(3)
         parts = rng.uniform(0.1, SIGMA, (n, 1, 1)) * eye, np.tile(0.02 * eye, (n, 1, 1)), turned
@@ -97,7 +101,8 @@ class Pose:
         self.design = designs[0]
         self.asked_design = np.concatenate([designs[1], np.zeros_like(designs[1])], axis=1)
         self.mixings = [np.zeros((q, 6, 3)) for _ in range(3)]
-        self.mixings[0][:, :3], self.mixings[1][:, :3] = SIGMA * eye, 0.02 * eye
+        self.mixings[0][:, :3] = SIGMA * eye
+        self.mixings[1][:, :3] = 0.02 * eye
         self.mixings[2][:, 3:] = rng.normal(scale=1e-4, size=(q, 3, 3))
 
     def solve(self, collocate=collocate):
@@ -151,7 +156,8 @@ def beside_others():
     for n, q in ((300, 3_000), (1_000, 10_000), (3_000, 10_000)):
         component = Component(n, q, "exponential")
         ours, (mean, variance) = best(component.both)
-        row, worst = [], 0.0
+        row = []
+        worst = 0.0
         for way in (_dense, _sklearn, _celerite):
             if way is _celerite and celerite2 is None:
                 row.append("absent")

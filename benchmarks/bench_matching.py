@@ -61,11 +61,13 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("observations", nargs="?", type=int, default=100_000)
     count = parser.parse_args().observations
-    small, drive = long_drive(SMALL), long_drive(count)
+    small = long_drive(SMALL)
+    drive = long_drive(count)
     table = Table(f"{count} observations and points", "s", "observations/s", "right", "wrong", "MB")
     for title, name in METHODS.items():
         name(*small)
-        before, begin = peak_memory(), thread_time()
+        before = peak_memory()
+        begin = thread_time()
         names = name(*drive)
         seconds = thread_time() - begin
         right = np.sum(names == np.array(drive[1].name))

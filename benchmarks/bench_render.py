@@ -43,7 +43,8 @@ def street(points, seed=1):
     rng = np.random.default_rng(seed)
     for first in range(0, points, SETTINGS.chunk_points):
         n = min(SETTINGS.chunk_points, points - first)
-        across, along = rng.uniform(-14, 14, n), rng.uniform(0, LENGTH, n)
+        across = rng.uniform(-14, 14, n)
+        along = rng.uniform(0, LENGTH, n)
         up = np.maximum(np.abs(across) - 8, 0) * 2
         xyz = CORNER + np.column_stack([np.clip(across, -8, 8), along, up])
         time = START + (first + np.arange(n)) / points * 20.0

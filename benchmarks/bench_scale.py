@@ -110,7 +110,8 @@ def stage_costs(project, out, points):
     from mlscorr.pipeline.project import correct_project
     from mlscorr.pipeline.project.progress import Progress
 
-    costs, begun = {}, {"stage": "headers", "at": process_time()}
+    costs = {}
+    begun = {"stage": "headers", "at": process_time()}
 
     def count(stage):
         now = process_time()
@@ -137,7 +138,8 @@ def stage_costs(project, out, points):
 
 def main(drives, kills, million_points, workers_alone):
     """Print the table and the stages; whether all bytes are the same."""
-    rng, table = np.random.default_rng(0), Table("run", "s", "processor s", "MB", "against")
+    rng = np.random.default_rng(0)
+    table = Table("run", "s", "processor s", "MB", "against")
     costs = {}
 
     def row(name, cost, other=None, words=""):
@@ -167,7 +169,8 @@ def main(drives, kills, million_points, workers_alone):
         expected = outputs(folder / "first")
         same = outputs(folder / "second") == expected
         for number in range(kills):
-            out, moment = folder / f"kill-{number}", rng.uniform(2.0, second[0])
+            out = folder / f"kill-{number}"
+            moment = rng.uniform(2.0, second[0])
             row(f"killed after {moment:.1f} s, resumed", killed(whole, out, moment, 2))
             same &= outputs(out) == expected
         if not workers_alone:
@@ -179,7 +182,9 @@ def main(drives, kills, million_points, workers_alone):
     for stage, seconds in costs.items():
         console.print(f"  {stage}: {seconds / 60:.0f} min")
     console.print(f"{points} points in {drives * TILES} tiles; bytes the same: {same}")
-    return 0 if same else 1
+    if same:
+        return 0
+    return 1
 
 
 if __name__ == "__main__":

@@ -84,7 +84,8 @@ def speed_rows(repeats=5):
         made.__dict__["surfaces"] = recorder  # the survey's cached property
         points = sum(len(block.cloud) for block in made.blocks())
         made.__dict__["surfaces"] = Surfaces(made.scene.mesh)
-        rays, times = sum(map(len, recorder.rays)), []
+        rays = sum(map(len, recorder.rays))
+        times = []
         for _ in range(repeats + 1):
             start = perf_counter()
             for block in recorder.rays:

@@ -74,8 +74,12 @@ def measure(task, folder):
     imported = memory("VmRSS")
     if task != "decode":
         extract(WARM_UP, task == "extract")  # compiled kernels are loaded once
-    start, used = perf_counter(), process_time()
-    result = decode(folder) if task == "decode" else extract(folder, task == "extract")
+    start = perf_counter()
+    used = process_time()
+    if task == "decode":
+        result = decode(folder)
+    else:
+        result = extract(folder, task == "extract")
     seconds = perf_counter() - start, process_time() - used
     return *seconds, memory("VmHWM") - imported, result
 
@@ -94,9 +98,17 @@ def in_own_process(task, folder, warm_up):
 
 def speed_table(millions, folder):
     """Rates and peak memory for several sizes."""
-    table = Table("points", "task", "s", "processor s", "of decoding: wall", "processor",
-                  "MB over imports", "surveyed found, others",
-                  title="Extraction, beside laspy's decoding in the same run")  # fmt: skip
+    table = Table(
+        "points",
+        "task",
+        "s",
+        "processor s",
+        "of decoding: wall",
+        "processor",
+        "MB over imports",
+        "surveyed found, others",
+        title="Extraction, beside laspy's decoding in the same run",
+    )
     warm_up = folder / "warm up"
     make_street(warm_up, 1_500_000)
     for million in millions:
@@ -106,13 +118,24 @@ def speed_table(millions, folder):
             repeat(survey, round(million / 20))
         points = decode(survey)
         results = [in_own_process(task, survey, warm_up) for task in RUNS]
-        decoding = np.median([r[:2] for r, task in zip(results, RUNS, strict=True)
-                              if task == "decode"], axis=0)  # fmt: skip
+        decoding = np.median(
+            [r[:2] for r, task in zip(results, RUNS, strict=True) if task == "decode"], axis=0
+        )
         for task, (wall, used, peak, *rest) in zip(RUNS, results, strict=True):
-            found = f"{rest[0]:.0f} of {rest[1]:.0f}, {rest[2]:.0f}" if rest[1:] else ""
-            table.add_row(f"{points:,}", task, f"{wall:.1f}", f"{used:.1f}",
-                          f"{decoding[0] / wall:.2f}", f"{decoding[1] / used:.2f}",
-                          f"{peak:.0f}", found)  # fmt: skip
+            if rest[1:]:
+                found = f"{rest[0]:.0f} of {rest[1]:.0f}, {rest[2]:.0f}"
+            else:
+                found = ""
+            table.add_row(
+                f"{points:,}",
+                task,
+                f"{wall:.1f}",
+                f"{used:.1f}",
+                f"{decoding[0] / wall:.2f}",
+                f"{decoding[1] / used:.2f}",
+                f"{peak:.0f}",
+                found,
+            )
     return table
 
 
@@ -143,9 +166,16 @@ def cluster_table(folder):
         "scikit-learn DBSCAN": lambda: DBSCAN(eps=LINK, min_samples=1).fit_predict(bright),
         "Open3D DBSCAN": lambda: np.asarray(cloud.cluster_dbscan(LINK, 1)),
     }
-    table = Table("tool", "ms", "times mlscorr", "clusters", "adjusted Rand index",
-                  title=f"Clusters of {len(bright):,} bright points, link {LINK} m")  # fmt: skip
-    taken, labels = {}, {}
+    table = Table(
+        "tool",
+        "ms",
+        "times mlscorr",
+        "clusters",
+        "adjusted Rand index",
+        title=f"Clusters of {len(bright):,} bright points, link {LINK} m",
+    )
+    taken = {}
+    labels = {}
     for name, run in tools.items():
         times = []
         for _ in range(4):
@@ -155,8 +185,13 @@ def cluster_table(folder):
         taken[name] = np.median(times[1:])
     for name in tools:
         agreement = adjusted_rand_score(labels["scikit-learn DBSCAN"], labels[name])
-        table.add_row(name, f"{1e3 * taken[name]:.0f}", f"{taken[name] / taken['mlscorr']:.1f}",
-                      f"{len(np.unique(labels[name]))}", f"{agreement:.4f}")  # fmt: skip
+        table.add_row(
+            name,
+            f"{1e3 * taken[name]:.0f}",
+            f"{taken[name] / taken['mlscorr']:.1f}",
+            f"{len(np.unique(labels[name]))}",
+            f"{agreement:.4f}",
+        )
     return table
 
 

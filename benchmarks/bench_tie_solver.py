@@ -34,7 +34,10 @@ from mlscorr.collocation._knots import knot_step
 START = 413_200.0  # s of week
 DRIFT = Covariance("matern32", 60.0)
 SIGMA = np.repeat([0.3, 5e-4], 3)  # m, rad
-TIE, CONTROL, SURVEY = 0.01, 0.005, 0.005  # m
+# m
+TIE = 0.01
+CONTROL = 0.005
+SURVEY = 0.005
 CONTROL_INTERVAL = 100.0  # s
 CONSOLE = Console(width=110)
 
@@ -115,10 +118,17 @@ def run(knots):
 def growth(sizes):
     "Sizes each in a process of its own"
     table = Table(
-        "knots", "ties", "solve, s", "leave each out", "sigmas of the pose", "all, s",
-        "times the row before", "memory, MB", "of it before",
+        "knots",
+        "ties",
+        "solve, s",
+        "leave each out",
+        "sigmas of the pose",
+        "all, s",
+        "times the row before",
+        "memory, MB",
+        "of it before",
         title="Control and ties of two passes, 12 states, Matern 3/2",
-    )  # fmt: skip
+    )
     last = None
     for size in sizes:
         command = [sys.executable, __file__, "run", str(size)]
@@ -136,8 +146,11 @@ def growth(sizes):
 
 def sparse_matrix(solver):
     "L of a solver, as SuperLU takes it"
-    pattern, values = solver.pattern, solver.information()
-    rows, columns, elements = [], [], []
+    pattern = solver.pattern
+    values = solver.information()
+    rows = []
+    columns = []
+    elements = []
     for j in range(len(pattern.start) - 1):
         begin, end = pattern.node[j : j + 2]
         nodes = [*range(begin, end), *pattern.row[pattern.column[j] : pattern.column[j + 1]]]
@@ -159,12 +172,20 @@ def sparse_matrix(solver):
 def beside_superlu(sizes):
     "The factor of the same matrix, and four columns solved; SuperLU has no inverse"
     table = Table(
-        "knots", "states", "factor, s", "solve", "inverse", "SuperLU factor", "solve",
-        "difference", title="Beside scipy's splu on the same matrix: seconds (times ours)",
-    )  # fmt: skip
+        "knots",
+        "states",
+        "factor, s",
+        "solve",
+        "inverse",
+        "SuperLU factor",
+        "solve",
+        "difference",
+        title="Beside scipy's splu on the same matrix: seconds (times ours)",
+    )
     for size in sizes:
         solver = Street(size).solve().solver
-        matrix, values = sparse_matrix(solver), solver.information()
+        matrix = sparse_matrix(solver)
+        values = solver.information()
         factoring, _ = timed(lambda p=solver.pattern, v=values: factorise(p, v))
         columns = np.random.default_rng(1).normal(size=(solver.pattern.states, 4))
         x = columns.copy()
@@ -178,27 +199,37 @@ def beside_superlu(sizes):
         answering, there = timed(lambda f=factor, c=columns: f.solve(c))
         error = np.abs(there - x).max() / np.abs(x).max()
         table.add_row(
-            f"{size}", f"{solver.pattern.states}", f"{factoring:.3f}", f"{solving:.3f}",
-            f"{inverting:.3f}", f"{theirs:.3f} ({theirs / factoring:.1f} x)",
-            f"{answering:.3f} ({answering / solving:.1f} x)", f"{error:.0e}",
-        )  # fmt: skip
+            f"{size}",
+            f"{solver.pattern.states}",
+            f"{factoring:.3f}",
+            f"{solving:.3f}",
+            f"{inverting:.3f}",
+            f"{theirs:.3f} ({theirs / factoring:.1f} x)",
+            f"{answering:.3f} ({answering / solving:.1f} x)",
+            f"{error:.0e}",
+        )
     CONSOLE.print(table)
 
 
 def beside_the_dense_formula(sizes):
     "V of all rows written out, factored and inverted for its diagonal, at what it can do"
     table = Table(
-        "ties", "sparse, s", "dense", "difference of the log-likelihood",
+        "ties",
+        "sparse, s",
+        "dense",
+        "difference of the log-likelihood",
         title="Solve and leave each out, beside the dense formula: seconds (times ours)",
-    )  # fmt: skip
+    )
     for size in sizes:
         street = Street(size)
         seconds, solved = timed(lambda s=street: _both(s))
         theirs, likelihood = timed(lambda s=street: _dense(s))
         table.add_row(
-            f"{10 * size}", f"{seconds:.3f}", f"{theirs:.2f} ({theirs / seconds:.0f} x)",
+            f"{10 * size}",
+            f"{seconds:.3f}",
+            f"{theirs:.2f} ({theirs / seconds:.0f} x)",
             f"{abs(solved.log_likelihood - likelihood):.0e}",
-        )  # fmt: skip
+        )
     CONSOLE.print(table)
 
 
@@ -209,7 +240,8 @@ def _both(street):
 
 
 def _dense(street):
-    control, ties = street.control, street.ties
+    control = street.control
+    ties = street.ties
     seen = np.concatenate([p.signals[0].mixing.reshape(-1, 6) for p in (control, ties)])
     times = np.concatenate([np.repeat(control.gps_time[:, 0], 3), ties.gps_time.ravel()])
     c = control.misclosure.size

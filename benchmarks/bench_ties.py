@@ -27,7 +27,9 @@ from mlscorr.simulate import Scenario, simulate
 from mlscorr.ties import TieCollector, search_ties
 
 CHUNK = 1_000_000  # points
-VOXEL, RADIUS = 0.2, 1.0  # m, of the ICP
+# m, of the ICP
+VOXEL = 0.2
+RADIUS = 1.0
 RUNS = "decode", "ties", "decode", "icp"
 RATE = 333_000  # points a second
 
@@ -57,7 +59,8 @@ def ties(folder):
     """Processor seconds of features and pairs, without decoding; number of both."""
     survey = mlscorr.read_survey(folder)
     for _ in range(2):  # compiled kernels are loaded by the first
-        collector, used = TieCollector(survey), 0.0
+        collector = TieCollector(survey)
+        used = 0.0
         for file in survey.clouds:
             for chunk in read_chunks(file, CHUNK):
                 start = process_time()
@@ -81,7 +84,9 @@ def icp(folder):
     for file in mlscorr.read_survey(folder).clouds:
         xyz = np.concatenate([chunk.xyz for chunk in read_chunks(file, CHUNK)])
         passes.append(xyz)
-    start, origin, clouds = process_time(), passes[0][0], []
+    start = process_time()
+    origin = passes[0][0]
+    clouds = []
     for xyz in passes:
         cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(xyz - origin))
         cloud = cloud.voxel_down_sample(VOXEL)
@@ -89,9 +94,12 @@ def icp(folder):
         clouds.append(cloud)
     registration = open3d.pipelines.registration
     result = registration.registration_icp(
-        clouds[1], clouds[0], RADIUS, np.eye(4),
+        clouds[1],
+        clouds[0],
+        RADIUS,
+        np.eye(4),
         registration.TransformationEstimationPointToPlane(),
-    )  # fmt: skip
+    )
     return process_time() - start, len(clouds[0].points), len(result.correspondence_set)
 
 

@@ -56,8 +56,14 @@ def main():
     parser.add_argument("--whole", action="store_true", help="simulate and read the whole cloud")
     parser.add_argument("--site", action="store_true", help="24 control points, with ties")
     arguments = parser.parse_args()
-    scenario = SITE if arguments.site else read_scenario(arguments.scenario)
-    study = whole_survey if arguments.whole or arguments.site else features
+    if arguments.site:
+        scenario = SITE
+    else:
+        scenario = read_scenario(arguments.scenario)
+    if arguments.whole or arguments.site:
+        study = whole_survey
+    else:
+        study = features
     results = []
     for seed in range(arguments.first, arguments.first + arguments.seeds):
         results.append(study(scenario, seed))
@@ -119,7 +125,8 @@ def whole_survey(scenario, seed):
 
 def score(calibration, simulated, check, alone=None):
     """Errors and sigmas (2, 6) of both methods and of targets alone, and the check points' RMSE."""
-    true, recorded = simulated.true_mountings[0], simulated.mounting
+    true = simulated.true_mountings[0]
+    recorded = simulated.mounting
     turn = (true.boresight * recorded.boresight.inv()).as_rotvec()
     lacks = np.append(true.lever_arm - recorded.lever_arm, turn)
     corrections = {
@@ -146,7 +153,8 @@ def score(calibration, simulated, check, alone=None):
 
 def observe(simulated, rng):
     """TargetObservations of all targets that face the scanner, and which are check points."""
-    mounting, centres = simulated.true_mountings[0], simulated.true_centre
+    mounting = simulated.true_mountings[0]
+    centres = simulated.true_centre
     found = []
     for number, true in enumerate(simulated.true_passes):
         eye = true.position + true.attitude.apply(mounting.lever_arm)
@@ -172,7 +180,8 @@ def observe(simulated, rng):
         seen = to_scanner(true, mounting, centres[target[rows]], time[rows])
         seen += EXTRACTION * rng.standard_normal(seen.shape)
         position[rows] = georeference(recorded, simulated.mounting, seen, time[rows])
-    surveyed, n = simulated.targets, len(time)
+    surveyed = simulated.targets
+    n = len(time)
     observations = TargetObservations(
         name=tuple(surveyed.name[i] for i in target),
         pass_number=number + 1,

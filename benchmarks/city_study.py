@@ -71,12 +71,16 @@ class City:
     def __init__(self, drives, tiles, places, seed):
         self.rng = np.random.default_rng(seed)
         self.edge = max(int(np.sqrt(drives * DURATION * SPEED / BLOCK / 6)), 3)  # seen 3 times
-        self.tiles, self.places, self.blocks, self.errors = tiles, places, {}, {}
+        self.tiles = tiles
+        self.places = places
+        self.blocks = {}
+        self.errors = {}
         self.drives = [self.drive(number) for number in range(drives)]
 
     def crossings(self):
         "A way (k, 2) over the grid that never turns round at once"
-        place, ahead = self.rng.integers(0, self.edge, 2), None
+        place = self.rng.integers(0, self.edge, 2)
+        ahead = None
         way = [place]
         while len(way) <= DURATION * SPEED / BLOCK:
             steps = [np.array(step) for step in ((1, 0), (-1, 0), (0, 1), (0, -1))]
@@ -94,8 +98,10 @@ class City:
             low, high = np.array(key, float) * BLOCK
             along = (high - low) / BLOCK
             across = np.array([-along[1], along[0]])
-            rng, n = np.random.default_rng([*key[0], *key[1]]), self.places
-            at, part = rng.uniform(0, BLOCK, n), rng.choice(4, n, p=[0.35, 0.3, 0.3, 0.05])
+            rng = np.random.default_rng([*key[0], *key[1]])
+            n = self.places
+            at = rng.uniform(0, BLOCK, n)
+            part = rng.choice(4, n, p=[0.35, 0.3, 0.3, 0.05])
             side = np.select([part == 1, part == 2], [10.0, -10.0], rng.uniform(-6, 6, n))
             plan = low + at[:, None] * along + side[:, None] * across
             height = np.where(part == 0, 0.0, rng.uniform(1, 8, n))
@@ -112,7 +118,8 @@ class City:
 
     def drive(self, number):
         "FoundDrive of a way"
-        rng, way = self.rng, self.crossings()
+        rng = self.rng
+        way = self.crossings()
         start = START + 86_400.0 * (number // 50) + 400.0 * (number % 50)
         times = start + np.arange(0.0, DURATION + 1e-9, 1 / RATE)
         passed = start + np.arange(len(way)) * BLOCK / SPEED
@@ -127,10 +134,17 @@ class City:
         sigmas = np.full((len(times), 3), SIGMA), np.full((len(times), 3), 1e-4)
         trajectory = Trajectory(times, recorded, level, *sigmas)
         survey = Survey(
-            name=f"drive-{number}", path=Path("project.toml"), crs=None, clouds=(),
-            trajectory=trajectory, mounting=Mounting(np.zeros(3), Rotation.identity()),
-            control=NO_POINTS, check=NO_POINTS, scanner=Scanner(), pos=Pos(),
-        )  # fmt: skip
+            name=f"drive-{number}",
+            path=Path("project.toml"),
+            crs=None,
+            clouds=(),
+            trajectory=trajectory,
+            mounting=Mounting(np.zeros(3), Rotation.identity()),
+            control=NO_POINTS,
+            check=NO_POINTS,
+            scanner=Scanner(),
+            pos=Pos(),
+        )
         self.errors[survey.name] = error
         features = self.seen(way, passed, error)
         passes = {(tile, 0): tile + 1 for tile in range(self.tiles)}
@@ -142,7 +156,8 @@ class City:
 
     def left(self, name, correction):
         "What a correction leaves (n, 3) of a drive's error. Units: m"
-        recorded, corrected = correction.recorded, correction.corrected
+        recorded = correction.recorded
+        corrected = correction.corrected
         added = corrected.position - recorded.position
         return added + self.errors[name](recorded.gps_time)
 
@@ -158,9 +173,18 @@ class City:
         centre = place + error(times) + self.rng.normal(scale=NOISE, size=(n, 3))
         tile = np.minimum((times - passed[0]) / DURATION * self.tiles, self.tiles - 1).astype(int)
         features = TieFeatures(
-            tile + 1, np.zeros(n, int), kind, times, centre, direction, np.full(n, NOISE**2),
-            np.full(n, 1e-5), np.full(n, 0.3), np.full(n, 100), np.zeros((n, 3)),
-        )  # fmt: skip
+            tile + 1,
+            np.zeros(n, int),
+            kind,
+            times,
+            centre,
+            direction,
+            np.full(n, NOISE**2),
+            np.full(n, 1e-5),
+            np.full(n, 0.3),
+            np.full(n, 100),
+            np.zeros((n, 3)),
+        )
         return features[np.argsort(times)]
 
     def control(self, way, passed, error, number):
@@ -169,14 +193,23 @@ class City:
         at = np.linspace(passed[0] + 5.0, passed[-1] - 5.0, count)
         plan = np.column_stack([np.interp(at, passed, BLOCK * xy) for xy in way.T])
         true = ORIGIN + np.column_stack([plan, np.full(count, 2.0)]) + [0.0, 5.0, 0.0]
-        name, kind, size = tuple(f"{number}-{k}" for k in range(count)), ("circle",) * count, 0.2
+        name = tuple(f"{number}-{k}" for k in range(count))
+        kind = ("circle",) * count
+        size = 0.2
         normal = np.tile([0.0, -1.0, 0.0], (count, 1))
         seen = true + error(at) + self.rng.normal(scale=NOISE, size=(count, 3))
         covariance = np.tile(NOISE**2 * np.eye(3), (count, 1, 1))
         observed = TargetObservations(
-            name, np.full(count, self.tiles), at, seen, covariance,
-            normal, kind, np.full(count, size), np.full(count, 200),
-        )  # fmt: skip
+            name,
+            np.full(count, self.tiles),
+            at,
+            seen,
+            covariance,
+            normal,
+            kind,
+            np.full(count, size),
+            np.full(count, 200),
+        )
         sigma = np.full((count, 3), NOISE)
         points = ControlPoints(name, true, sigma, kind, np.full(count, size), normal)
         return Matched(observed, points)
@@ -184,10 +217,15 @@ class City:
 
 def run(given):
     "Print what a city of so many drives costs"
-    number, begin = given.drives[0], processor_time()
+    number = given.drives[0]
+    begin = processor_time()
     city = City(number, given.tiles, given.places, given.seed)
-    made, clock = processor_time() - begin, perf_counter()
-    positions, left, within, states = [], [], [], []
+    made = processor_time() - begin
+    clock = perf_counter()
+    positions = []
+    left = []
+    within = []
+    states = []
     with threadpool_limits(1), areas_at_work(given.workers) as work:
         drives = project_drives(city.drives, 1, ORIGIN, True, work, given.limit)
         for corrected, state in drives:
@@ -199,14 +237,23 @@ def run(given):
             rows = slice(None, None, round(RATE))
             positions.append(correction.recorded.position[rows])
             left.append(remains[rows])
-    clock, joined = perf_counter() - clock, processor_time() - begin - made
+    clock = perf_counter() - clock
+    joined = processor_time() - begin - made
     features = sum(len(drive.features) for drive in city.drives)
     held = sum(state in ("controlled", "tied") for state in states)
     size = [np.sqrt((part**2).sum(axis=1).mean()) for part in left]
     print(
-        number, features, made, joined, clock, memory(), held,
-        *np.percentile(size, [50, 95]), 100 * np.mean(within), _apart(positions, left),
-    )  # fmt: skip
+        number,
+        features,
+        made,
+        joined,
+        clock,
+        memory(),
+        held,
+        *np.percentile(size, [50, 95]),
+        100 * np.mean(within),
+        _apart(positions, left),
+    )
 
 
 @contextmanager
@@ -226,7 +273,8 @@ def areas_at_work(workers):
 def _apart(places, left):
     "RMS of the difference of what is left in two drives at a place. Units: m"
     drive = np.repeat(np.arange(len(places)), list(map(len, places)))
-    place, left = np.concatenate(places)[:, :2], np.concatenate(left)
+    place = np.concatenate(places)[:, :2]
+    left = np.concatenate(left)
     first, second = cKDTree(place).query_pairs(SPEED / 2, output_type="ndarray").T
     other = drive[first] != drive[second]
     return np.sqrt(((left[first[other]] - left[second[other]]) ** 2).sum(axis=1).mean())

@@ -32,7 +32,8 @@ def case(bed, rng, kind, name, m):
     shift, _, _ = sized(g, bed.signs, name, m, rng, bed.size)
     rows = replace(g.rows, residual=errors(g, rng, kind) + shift)
     used = ~np.isin(rows.survey_item, np.arange(CHECKED))
-    part, signs = rows.select(used), select(bed.signs, rows, used)
+    part = rows.select(used)
+    signs = select(bed.signs, rows, used)
     inference = infer_causes(part, background(part, g.survey), g.survey, signs, rng, 0)
     label = inference.verdict.label
     cause = cause_for_simulator(part, signs, inference)
@@ -44,14 +45,22 @@ def case(bed, rng, kind, name, m):
     found = FoundCause(rows, used, g.survey, bed.signs, evidence, cause)
     closure = close_gap(found, simulated, rng)
     observed = Observations.of(rows, background(rows, g.survey))
-    whole, model = predict_whole(found, simulated), evidence.likely_model(cause.effect)
+    whole = predict_whole(found, simulated)
+    model = evidence.likely_model(cause.effect)
     folds = make_folds(found, whole, observed, model, simulated, rng)
     truth = [_gone(bed, shift, p.shift) for p in (folds.whole, *folds.predicted)]
     return {
-        "name": name, "m": m, "label": label, "effect": closure.effect, "stated": closure.shrink,
-        "interval": closure.interval, "whole": truth[0], "held": float(np.mean(truth[1:])),
-        "before": closure.before, "after": closure.after,
-    }  # fmt: skip
+        "name": name,
+        "m": m,
+        "label": label,
+        "effect": closure.effect,
+        "stated": closure.shrink,
+        "interval": closure.interval,
+        "whole": truth[0],
+        "held": float(np.mean(truth[1:])),
+        "before": closure.before,
+        "after": closure.after,
+    }
 
 
 def _gone(bed, shift, predicted):
@@ -64,7 +73,8 @@ def run(cases, seed, beds=4):
     ground = [Bed.of(seed + i) for i in range(beds)]
     results = []
     for count in range(cases):
-        name, m = STUDIED[count % len(STUDIED)], SIZES[count // len(STUDIED) % len(SIZES)]
+        name = STUDIED[count % len(STUDIED)]
+        m = SIZES[count // len(STUDIED) % len(SIZES)]
         rng = np.random.default_rng([seed, count])
         kind = ("sines", "walk")[count // beds % 2]
         try:
@@ -87,16 +97,18 @@ def report(results):
             ("stated", "stated"),
         ):
             value = np.array([r[key] for r in part])
-            print(f"  {title}: median {np.median(value):.3f}, 10th percentile "
-                  f"{np.percentile(value, 10):.3f}, range {value.min():.2f} to "
-                  f"{value.max():.2f}")  # fmt: skip
+            print(
+                f"  {title}: median {np.median(value):.3f}, 10th percentile "
+                f"{np.percentile(value, 10):.3f}, range {value.min():.2f} to "
+                f"{value.max():.2f}"
+            )
         off = np.array([r["stated"] - r["held"] for r in part])
-        held = np.mean([
-            r["interval"][0] <= r["held"] <= r["interval"][1] + 1e-9 for r in part
-        ])  # fmt: skip
-        print(f"  stated less true: median {np.median(off):+.3f}, 90 % within "
-              f"{np.percentile(np.abs(off), 90):.3f}; 95 % intervals that hold the true share "
-              f"{held:.0%}; after below zero {sum(r['after'] < 0 for r in part)}")  # fmt: skip
+        held = np.mean([r["interval"][0] <= r["held"] <= r["interval"][1] + 1e-9 for r in part])
+        print(
+            f"  stated less true: median {np.median(off):+.3f}, 90 % within "
+            f"{np.percentile(np.abs(off), 90):.3f}; 95 % intervals that hold the true share "
+            f"{held:.0%}; after below zero {sum(r['after'] < 0 for r in part)}"
+        )
 
 
 def main():
@@ -110,8 +122,10 @@ def main():
         for r in results:
             numbers = " ".join(f"{r[k]:7.3f}" for k in ("whole", "held", "stated"))
             low, high = r["interval"]
-            print(f"{r['name']:20s}{r['m']:2g} {r['label']:34s}{numbers}  {low:.3f} {high:.3f} "
-                  f"{r['before']:6.1f} {r['after']:6.1f}")  # fmt: skip
+            print(
+                f"{r['name']:20s}{r['m']:2g} {r['label']:34s}{numbers}  {low:.3f} {high:.3f} "
+                f"{r['before']:6.1f} {r['after']:6.1f}"
+            )
     report(results)
 
 

@@ -66,7 +66,10 @@ def recorded(scenario, factor):
 
     def survey(seed):
         made = feature_survey(scenario, seed)
-        sigma = None if factor is None else factor * made.recorded.position_sigma
+        if factor is None:
+            sigma = None
+        else:
+            sigma = factor * made.recorded.position_sigma
         return replace(made.recorded, position_sigma=sigma), made.matched
 
     return survey
@@ -111,7 +114,8 @@ def main():
     print(f"| kind of POS | surveys | extent (m) | false alarms | {' | '.join(changes[1:])} |")
     print("|---|---|---|---|" + "---|" * (len(changes) - 1))
     for name in options.kinds or known:
-        rows, extents = [], []
+        rows = []
+        extents = []
         for seed in range(options.seeds):
             with warnings.catch_warnings(action="ignore"):
                 found, extent = terms_found(known[name], seed, changes, options.points)

@@ -43,9 +43,9 @@ def rates(records, probabilities, costs):
 def draw(records, probabilities, path):
     """Both shares over the cost of a false alarm, and the three operating points on them."""
     default = OPERATING_POINTS["default"]
-    curve = np.array([
-        rates(records, probabilities, replace(default, false_alarm=cost)) for cost in FALSE_ALARMS
-    ])  # fmt: skip
+    curve = np.array(
+        [rates(records, probabilities, replace(default, false_alarm=cost)) for cost in FALSE_ALARMS]
+    )
     figure, panel = plt.subplots(figsize=(6.4, 3.9), dpi=140, layout="constrained")
     for column, (title, color) in enumerate(RIGHT.values(), start=1):
         panel.plot(100 * curve[:, 0], 100 * curve[:, column], color=color, label=title, lw=1.6)
@@ -58,10 +58,12 @@ def draw(records, probabilities, path):
         )
     worlds = len({record.world for record in records})
     panel.set(
-        xlabel="Clean surveys that are given a cause (%)", ylabel="Effects named rightly (%)",
-        xlim=(-0.5, 100 * curve[:, 0].max() + 1), ylim=(0, 101),
+        xlabel="Clean surveys that are given a cause (%)",
+        ylabel="Effects named rightly (%)",
+        xlim=(-0.5, 100 * curve[:, 0].max() + 1),
+        ylim=(0, 101),
         title=f"{len(records)} surveys of {worlds} worlds, each judged by what others taught",
-    )  # fmt: skip
+    )
     panel.title.set_fontsize(9)
     panel.grid(color="#e4e4e4")
     panel.legend(frameon=False, fontsize=8, loc="lower right")

@@ -16,7 +16,8 @@ def errors(g: Geometry, rng: Generator, kind: str = "sines") -> np.ndarray:
     kind : str
         sines or walk.
     """
-    rows, m = g.rows, len(g.rows)
+    rows = g.rows
+    m = len(g.rows)
     scale = np.exp(0.2 * rng.standard_normal())
     time = np.append(rows.gps_time, np.where(rows.two_times, rows.gps_time_2, rows.gps_time))
     order = np.argsort(time)

@@ -100,7 +100,8 @@ def feature_survey(scenario, seed, rate=RATE):
     pairs = list(zip(simulated.true_passes, simulated.passes, strict=True))
     parts = [_observe(simulated, *pair, number, rng) for number, pair in enumerate(pairs, 1)]
     target, number, gps_time, position = (np.concatenate(part) for part in zip(*parts, strict=True))
-    targets, n = simulated.targets, len(target)
+    targets = simulated.targets
+    n = len(target)
     observations = TargetObservations(
         tuple(targets.name[i] for i in target),
         number,
@@ -125,11 +126,14 @@ def feature_survey(scenario, seed, rate=RATE):
 
 def _observe(simulated, true, recorded, number, rng):
     """Targets, pass number, times and observed centres of what one pass sees."""
-    coarse, found = true.gps_time[::10], []
-    mounting, stated = simulated.true_mountings[0], simulated.mountings[0]
+    coarse = true.gps_time[::10]
+    found = []
+    mounting = simulated.true_mountings[0]
+    stated = simulated.mountings[0]
     for i, centre in enumerate(simulated.true_centre):
         local = to_scanner(true, mounting, np.tile(centre, (len(coarse), 1)), coarse)
-        across, near = local[:, 2], np.linalg.norm(local, axis=1)
+        across = local[:, 2]
+        near = np.linalg.norm(local, axis=1)
         passed = np.flatnonzero((across[:-1] * across[1:] <= 0) & (near[:-1] < REACH))
         if len(passed):
             k = passed[np.argmin(near[passed])]

@@ -14,9 +14,15 @@ class Outside:
     """Mechanisms that no library knows: shifts (m,) of the rows by one unit of each."""
 
     names = (
-        "lift with speed", "thermal range drift", "roll with turn rate", "mirror wobble",
-        "cyclic range", "local subsidence", "attitude lag", "heading-dependent bias",
-    )  # fmt: skip
+        "lift with speed",
+        "thermal range drift",
+        "roll with turn rate",
+        "mirror wobble",
+        "cyclic range",
+        "local subsidence",
+        "attitude lag",
+        "heading-dependent bias",
+    )
     leads: ClassVar = {  # words of which one should be in the lead
         "lift with speed": ("height error", "speed"),
         "thermal range drift": ("range error", "time"),
@@ -29,10 +35,12 @@ class Outside:
     }
 
     def __init__(self, g):
-        rows, trajectory = g.rows, g.survey.trajectory
+        rows = g.rows
+        trajectory = g.survey.trajectory
         item = rows.pulses.item
         key = np.argsort(item, kind="stable")
-        self.g, self.legs = g, []
+        self.g = g
+        self.legs = []
         for sign in (1.0, -1.0):
             mine = key[np.sign(rows.pulses.weight[key]) == sign]
             known = item[mine]
@@ -44,7 +52,8 @@ class Outside:
 
     def shift(self, name, rng):
         total = np.zeros(len(self.g.rows))
-        number, phase = rng.integers(3), rng.uniform(0, 2 * np.pi)
+        number = rng.integers(3)
+        phase = rng.uniform(0, 2 * np.pi)
         for sign, has, pulses in self.legs:
             moved = self._moved(name, pulses, number, phase)
             along = np.einsum("mi,mi->m", self.g.rows.direction, moved)
@@ -52,11 +61,14 @@ class Outside:
         return total
 
     def _moved(self, name, pulses, number, phase):
-        t, trajectory, mounting = pulses.gps_time, self.trajectory, self.g.survey.mounting
+        t = pulses.gps_time
+        trajectory = self.trajectory
+        mounting = self.g.survey.mounting
         pose = trajectory.at(t)
         start = np.append(trajectory.gps_time[0], trajectory.gaps[:, 1])[trajectory.segment(t)]
         early = np.maximum(t - 0.3, start)
-        before, after = trajectory.at(early), trajectory.at(np.minimum(early + 0.6, t + 0.3))
+        before = trajectory.at(early)
+        after = trajectory.at(np.minimum(early + 0.6, t + 0.3))
         span = (after.gps_time - before.gps_time)[:, None]
         speed = np.linalg.norm(after.position - before.position, axis=1) / span[:, 0]
         turn = (after.attitude * before.attitude.inv()).as_rotvec() / span
@@ -89,11 +101,25 @@ class Outside:
 
 
 STUDIED = (  # deterministic effects, named where the geometry shows them at all
-    "time_offset", "clock_drift", "range_bias", "range_scale", "range_walk", "incidence_bias",
-    "angle_scale", "angle_eccentricity", "heading_drift", "boresight", "lever_arm",
-    "position_step", "position_bump", "map_rotation", "map_scale", "horizontal_datum",
-    "vertical_datum", "target_outlier",
-)  # fmt: skip
+    "time_offset",
+    "clock_drift",
+    "range_bias",
+    "range_scale",
+    "range_walk",
+    "incidence_bias",
+    "angle_scale",
+    "angle_eccentricity",
+    "heading_drift",
+    "boresight",
+    "lever_arm",
+    "position_step",
+    "position_bump",
+    "map_rotation",
+    "map_scale",
+    "horizontal_datum",
+    "vertical_datum",
+    "target_outlier",
+)
 NOISES = {"range_noise": 0.004, "angle_noise": 0.02, "time_jitter": 1e-3, "position_noise": 0.04}
 
 
@@ -128,14 +154,16 @@ def sized(g, signs, name, m, rng, size):
     try:
         shift = bench.change(replace(one, fixed=fixed).effect(way)).shift
     except ValueError:
-        fixed, shift = one.fixed, bench.change(one.effect(way)).shift
+        fixed = one.fixed
+        shift = bench.change(one.effect(way)).shift
     return shift, way, fixed
 
 
 def noisy(g, name, rng):
     """What a random effect does to residuals and to the noise that the points show."""
     effect = make_effect(name, magnitude=NOISES[name])
-    rows, zero = g.rows, np.zeros(len(g.rows))
+    rows = g.rows
+    zero = np.zeros(len(g.rows))
     if name == "position_noise":
         thin = g.survey.trajectory
         moved = effect.apply(thin, rows.reference, rng).position - thin.position

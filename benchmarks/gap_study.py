@@ -46,7 +46,9 @@ def _rho(bed, told, label):
     if len(told) != 1 or label not in compared.effects:
         return 0.0
     name, (way, _) = next(iter(told.items()))
-    return compared.share(name, way, label) if name in compared.effects else 0.0
+    if name in compared.effects:
+        return compared.share(name, way, label)
+    return 0.0
 
 
 def _off(bed, rows, signs, evidence, told, name, m):
@@ -57,15 +59,20 @@ def _off(bed, rows, signs, evidence, told, name, m):
     if "target" in fixed and part.fixed != fixed:
         return None
     same = part.fixed == fixed
-    difference = part.jacobian @ (estimate - way) if same else cause.shift - part.jacobian @ way
+    if same:
+        difference = part.jacobian @ (estimate - way)
+    else:
+        difference = cause.shift - part.jacobian @ way
     z = [(p.estimate - t) / p.sigma for p, t in zip(cause.parameters, way, strict=False)]
     return bed.size(difference) / m, z
 
 
 def case(bed, rng, kind, effects=(), m=3.0, withheld=None, outside=None, noise=None, replicas=0):
     """One survey, diagnosed: a dict of truth and answers."""
-    g, rows = bed.g, bed.g.rows
-    residual, told = errors(g, rng, kind), {}
+    g = bed.g
+    rows = bed.g.rows
+    residual = errors(g, rng, kind)
+    told = {}
     for name in effects:
         shift, way, fixed = sized(g, bed.signs, name, m, rng, bed.size)
         residual += shift
@@ -88,14 +95,24 @@ def case(bed, rng, kind, effects=(), m=3.0, withheld=None, outside=None, noise=N
     if len(effects) == 1 and answer.label == truth:
         off = _off(bed, rows, signs, evidence, told[truth], truth, m)
     return {
-        "truth": truth, "m": m, "kind": kind, "withheld": withheld, "told": told,
-        "label": answer.label, "probability": probability, "set": answer.set,
-        "p": answer.p_value, "lead": evidence.lead()[0],
+        "truth": truth,
+        "m": m,
+        "kind": kind,
+        "withheld": withheld,
+        "told": told,
+        "label": answer.label,
+        "probability": probability,
+        "set": answer.set,
+        "p": answer.p_value,
+        "lead": evidence.lead()[0],
         "score": {k: float(v[0]) for k, v in evidence.score.items()},
-        "off": off, "rho": _rho(bed, told, answer.label),
-        "same": {n: bed.separable.same(n, w if n in bed.separable.effects else None)
-                 for n, (w, _) in told.items()},
-    }  # fmt: skip
+        "off": off,
+        "rho": _rho(bed, told, answer.label),
+        "same": {
+            n: bed.separable.same(n, w if n in bed.separable.effects else None)
+            for n, (w, _) in told.items()
+        },
+    }
 
 
 def jobs(cases, rng):
@@ -124,7 +141,9 @@ def _cycle(rng, number):
 def run(cases, seed, beds=4, save=None):
     """All cells: lists of what `case` returns."""
     ground = [Bed.of(seed + i) for i in range(beds)]
-    rng, results, count = np.random.default_rng(seed), {}, 0
+    rng = np.random.default_rng(seed)
+    results = {}
+    count = 0
     for cell, several in jobs(cases, rng).items():
         results[cell] = []
         for job in several:
@@ -141,7 +160,8 @@ def run(cases, seed, beds=4, save=None):
 
 def right(one):
     """Whether a label is the truth, or by class: what the geometry can't tell from it."""
-    parts, truth = one["label"].split("+"), one["truth"].split("+")
+    parts = one["label"].split("+")
+    truth = one["truth"].split("+")
     strict = sorted(parts) == sorted(truth)
     alike = len(parts) == len(truth) and all(
         any(p == t or p in one["same"].get(t, ()) for p in parts) for t in truth
@@ -151,7 +171,8 @@ def right(one):
 
 def report(cell, results):
     """One line of the table."""
-    n, label = len(results), [one["label"] for one in results]
+    n = len(results)
+    label = [one["label"] for one in results]
     size = np.mean([len(one["set"]) for one in results])
     if cell == "clean":
         claimed = [x for x in label if x not in ("none", *NOISES)]
@@ -192,7 +213,8 @@ def report(cell, results):
     )
     off = [one["off"] for one in results if one.get("off")]
     if off:
-        error, z = np.median([o[0] for o in off]), np.concatenate([o[1] for o in off])
+        error = np.median([o[0] for o in off])
+        z = np.concatenate([o[1] for o in off])
         line += f", error {error:.0%}, 95 % interval holds {np.mean(np.abs(z) < 1.96):.0%}"
     return f"{line} {wrong}"
 
@@ -206,7 +228,8 @@ def _led(one):
 
 def _share(k, n):
     """Share with its 95 % Wilson interval."""
-    z, p = 1.96, k / n
+    z = 1.96
+    p = k / n
     middle = (p + z * z / (2 * n)) / (1 + z * z / n)
     half = z * np.sqrt(p * (1 - p) / n + z * z / (4 * n * n)) / (1 + z * z / n)
     return f"{p:.1%} [{max(middle - half, 0):.0%}, {min(middle + half, 1):.0%}]"
@@ -214,7 +237,8 @@ def _share(k, n):
 
 def calibration(results):
     """Stated probability of the label against how often it was right, over all cells."""
-    stated, hit = [], []
+    stated = []
+    hit = []
     for cell, several in results.items():
         for one in several:
             if cell.startswith(("withheld", "outside")):
@@ -223,14 +247,17 @@ def calibration(results):
                 good = right(one)[1]
             stated.append(one["probability"][one["label"]])
             hit.append(good)
-    stated, hit = np.array(stated), np.array(hit, dtype=float)
+    stated = np.array(stated)
+    hit = np.array(hit, dtype=float)
     bins = np.clip((stated * 5).astype(int), 0, 4)
-    error, lines = 0.0, []
+    error = 0.0
+    lines = []
     for b in np.unique(bins):
         mine = bins == b
         error += abs(stated[mine].mean() - hit[mine].mean()) * mine.mean()
-        lines.append(f"  stated {stated[mine].mean():.2f}, right {hit[mine].mean():.2f} of "
-                     f"{mine.sum()}")  # fmt: skip
+        lines.append(
+            f"  stated {stated[mine].mean():.2f}, right {hit[mine].mean():.2f} of {mine.sum()}"
+        )
     return "\n".join([f"calibration error {error:.3f}", *lines])
 
 

@@ -44,7 +44,9 @@ class Case:
     "A run that is disturbed, and resumed"
 
     def __init__(self, project, out, expected):
-        self.project, self.out, self.expected = project, out, expected
+        self.project = project
+        self.out = out
+        self.expected = expected
         self.process = None
 
     def start(self, *arguments):
@@ -68,7 +70,10 @@ class Case:
     def done(self, line=0):
         "Counts of the tasks that ended, from a line of the log on"
         log = self.out / "log.txt"
-        lines = log.read_text().splitlines()[line:] if log.is_file() else []
+        if log.is_file():
+            lines = log.read_text().splitlines()[line:]
+        else:
+            lines = []
         return Counter(match.groups() for match in map(ENDED.search, lines) if match)
 
     def resumed(self):
@@ -91,7 +96,10 @@ class Case:
 
 def contents(out):
     "Bytes of all results but those that say when they were made, and of tasks"
-    names = [path for path in out.rglob("*") if path.is_file()] if out.is_dir() else []
+    if out.is_dir():
+        names = [path for path in out.rglob("*") if path.is_file()]
+    else:
+        names = []
     return {
         str(path.relative_to(out)): path.read_bytes()
         for path in names
@@ -207,7 +215,9 @@ def tell(rows, wrong, seconds):
 
 
 def main(kills=60):
-    rng, rows, wrong = np.random.default_rng(0), {}, []
+    rng = np.random.default_rng(0)
+    rows = {}
+    wrong = []
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         project = bed.write_project(folder / "city", duration=6.0, tiles=TILES)
@@ -216,11 +226,13 @@ def main(kills=60):
         whole.start("--workers", str(WORKERS))
         if code := whole.end():
             sys.exit(f"The run that nothing disturbs ended with {code}.")
-        seconds, expected = monotonic() - begin, contents(whole.out)
+        seconds = monotonic() - begin
+        expected = contents(whole.out)
         for number in track(range(kills)):
             disturb = DISTURBANCES[number % len(DISTURBANCES)]
             case = Case(project, folder / f"out-{number}", expected)
-            moment, name = float(rng.uniform(0.5, seconds)), disturb.__name__.replace("_", " ")
+            moment = float(rng.uniform(0.5, seconds))
+            name = disturb.__name__.replace("_", " ")
             code = disturb(case, moment, rng)
             faults, tasks = case.resumed()
             rows.setdefault(name, []).append((moment, code, tasks, faults))
@@ -229,7 +241,9 @@ def main(kills=60):
                 subprocess.run(["umount", str(case.out)], check=True)
             shutil.rmtree(case.out)
     tell(rows, wrong, seconds)
-    return 1 if wrong else 0
+    if wrong:
+        return 1
+    return 0
 
 
 if __name__ == "__main__":

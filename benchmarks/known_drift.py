@@ -44,10 +44,12 @@ class Bed:
 
     def __init__(self, seed):
         rng = np.random.default_rng([seed, 0])
-        targets, passes = int(rng.integers(14, 45)), int(rng.integers(1, 3))
+        targets = int(rng.integers(14, 45))
+        passes = int(rng.integers(1, 3))
         patches = int(np.exp(rng.uniform(*np.log((60, 600)))))
         made = geometry(seed, targets, patches, passes, duration=float(rng.uniform(45.0, 80.0)))
-        self.rows, self.survey = made.rows, made.survey
+        self.rows = made.rows
+        self.survey = made.survey
         self.observations = Observations.of(made.rows, background(made.rows, made.survey))
         self.signatures, _ = signatures(made.rows, made.survey)
         unknown = unknown_blocks(self.rows, self.survey)
@@ -58,7 +60,8 @@ class Bed:
 
     def case(self, rng):
         """Rows with drawn errors, the effect that acts on them, and its size in MDB."""
-        drawn, sized = self.observations.whitener(STATED).draw(rng, 1)[:, 0], None
+        drawn = self.observations.whitener(STATED).draw(rng, 1)[:, 0]
+        sized = None
         residual = np.zeros(len(self.rows))
         residual[self.observations.row] = drawn
         if rng.random() > CLEAN:
@@ -71,7 +74,8 @@ class Bed:
 
     def label(self, rows, is_known):
         """The cheapest label by the posterior, of rows in which something may act."""
-        observations, prior = self.observations, dict(SETTINGS.prior)
+        observations = self.observations
+        prior = dict(SETTINGS.prior)
         residual = observations.columns(rows.residual[:, None])
         models = (STATED,)
         if not is_known:
@@ -95,8 +99,11 @@ def figures(results):
     """Shares by what they are of, each of results (truth, mdb, labels by both)."""
 
     def rate(good, some):
-        hits = [[good(truth, label) for label in labels] for truth, mdb, labels in results
-                if some(truth, mdb)]  # fmt: skip
+        hits = [
+            [good(truth, label) for label in labels]
+            for truth, mdb, labels in results
+            if some(truth, mdb)
+        ]
         return (*(np.mean(hits, axis=0) if hits else (np.nan, np.nan)), len(hits))
 
     def right(truth, label):

@@ -31,7 +31,10 @@ ERRORS = {
 
 def survey_with(folder, error, seed, reference):
     """The folder of a simulated survey with an error, or nothing wrong."""
-    effects = [] if ERRORS[error] is None else [{"name": error.split()[0], **ERRORS[error]}]
+    if ERRORS[error] is None:
+        effects = []
+    else:
+        effects = [{"name": error.split()[0], **ERRORS[error]}]
     scenario = Scenario(
         scene={"reference": reference},
         drive={"duration": 40.0, "passes": [{}, {"direction": "back"}]},
@@ -57,7 +60,8 @@ def main():
                     survey = survey_with(Path(folder) / "survey", error, seed, reference)
                     answer = mlscorr.diagnose(survey).document["verdict"]
                 name = "none" if error == "nothing" else error.split()[0]
-                right, total = right + (answer["label"] == name), total + 1
+                right = right + (answer["label"] == name)
+                total = total + 1
                 where = "with reference" if reference else "without"
                 print(f"{error:18s}{seed:3d} {where:15s}{answer['sentence']}", flush=True)
     print(f"{right} of {total} named")

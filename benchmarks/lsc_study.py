@@ -90,18 +90,24 @@ def gross(seeds, adjacent=False):
         found = estimate(spoiled)
         named = {outlier.name for outlier in found.outliers}
         told = any("follow each other" in sentence for sentence in found.warnings)
-        left = [rms(s.check_rmse(f.correction)) for s, f in
-                ((clean, estimate(clean)), (right, estimate(right)), (clean, found))]  # fmt: skip
+        left = [
+            rms(s.check_rmse(f.correction))
+            for s, f in ((clean, estimate(clean)), (right, estimate(right)), (clean, found))
+        ]
         hits = (len(wrong), len(wrong & named), len(named - wrong), told or wrong <= named)
         rows.append((name, *left, *hits))
-    print("scenario        wrong found  good rejected  found or told   clean   known   found  "
-          " found/clean             found/known")  # fmt: skip
+    print(
+        "scenario        wrong found  good rejected  found or told   clean   known   found  "
+        " found/clean             found/known"
+    )
     for name, part in by_scenario(rows, np.array):
         wrong, hit, false = part[:, 3:6].sum(axis=0)
         errors = " ".join(f"{rms(column):7.4f}" for column in part[:, :3].T)
         ratios = "   ".join(interval(part[:, 2] / part[:, i]) for i in (0, 1))
-        print(f"{name:14s} {wrong:6.0f} {hit / wrong:6.1%} {false:10.0f} {part[:, 6].mean():16.1%}"
-              f"     {errors}   {ratios}")  # fmt: skip
+        print(
+            f"{name:14s} {wrong:6.0f} {hit / wrong:6.1%} {false:10.0f} {part[:, 6].mean():16.1%}"
+            f"     {errors}   {ratios}"
+        )
 
 
 def order(seeds):
@@ -127,7 +133,8 @@ def tuned(seeds):
         found = estimate(survey)
         epochs = np.flatnonzero(inside(survey, found))[::5]
         error = survey.true.position - survey.recorded.position
-        chosen, left = found.parameters, []
+        chosen = found.parameters
+        left = []
         for family, scale, time in grid:
             tried = replace(
                 chosen,
@@ -143,10 +150,13 @@ def tuned(seeds):
         rows.append((name, alone, min(left), *left))
     print("scenario        control alone   tuned each   cost RMS   tuned together   cost RMS")
     for name, part in by_scenario(rows, np.array):
-        alone, each = rms(part[:, 0]), rms(part[:, 1])
+        alone = rms(part[:, 0])
+        each = rms(part[:, 1])
         together = min(rms(column) for column in part[:, 2:].T)
-        print(f"{name:14s} {alone:9.4f} {each:14.4f} {alone / each - 1:11.1%} {together:13.4f} "
-              f"{alone / together - 1:13.1%}")  # fmt: skip
+        print(
+            f"{name:14s} {alone:9.4f} {each:14.4f} {alone / each - 1:11.1%} {together:13.4f} "
+            f"{alone / together - 1:13.1%}"
+        )
 
 
 def count(seeds, figure=None):
@@ -173,7 +183,8 @@ def count(seeds, figure=None):
 
 def _polynomial(survey, degree):
     """Least squares trend of the misclosures: a function of gps_time."""
-    time, misclosure = survey.matched.gps_time, survey.matched.misclosure
+    time = survey.matched.gps_time
+    misclosure = survey.matched.misclosure
     curves = [np.polynomial.Legendre.fit(time, column, degree) for column in misclosure.T]
     return lambda at: np.column_stack([curve(at) for curve in curves])
 

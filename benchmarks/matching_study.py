@@ -133,16 +133,25 @@ def long_drive(count):
     drift = 0.5 * np.sin((gps_time[:count, None] - START) / [40.0, 60.0, 90.0])
     drive = Trajectory(gps_time, path, level, np.full(path.shape, 0.3), np.full(path.shape, 2e-4))
     across = np.column_stack([rng.choice([-6.0, 6.0], count), np.zeros(count), np.ones(count)])
-    place, nowhere = path[:count] + across, np.full((count, 3), np.nan)
+    place = path[:count] + across
+    nowhere = np.full((count, 3), np.nan)
     names = tuple(f"T{i}" for i in range(count))
-    kinds, sizes = ("circle",) * count, np.full(count, 0.6)
+    kinds = ("circle",) * count
+    sizes = np.full(count, 0.6)
     control = ControlPoints(names, place, np.full((count, 3), 0.003), kinds, sizes, nowhere)
     noise = rng.normal(0, 0.005, (count, 3))
     variance = np.tile(np.eye(3) * 0.005**2, (count, 1, 1))
     observations = TargetObservations(
-        (None,) * count, np.ones(count, int), gps_time[:count], place + drift + noise, variance,
-        nowhere, kinds, sizes, np.full(count, 100),
-    )  # fmt: skip
+        (None,) * count,
+        np.ones(count, int),
+        gps_time[:count],
+        place + drift + noise,
+        variance,
+        nowhere,
+        kinds,
+        sizes,
+        np.full(count, 100),
+    )
     return observations, control, drive
 
 
@@ -175,16 +184,18 @@ def score(made):
     named = {refusal.name for refusal in result.refusals} | set(result.matched.name)
     silent = sum(name not in named for name in made.control.name)
     silent += sum(not reason for reason in result.reasons)
-    return np.array([
-        np.sum(good & (column == made.truth)),
-        np.sum(good & ~used),
-        np.sum(good & used & (column != made.truth)),
-        np.sum(bad & used),
-        np.sum(bad),
-        np.sum(~on_target & used),
-        np.sum(~on_target),
-        silent,
-    ])  # fmt: skip
+    return np.array(
+        [
+            np.sum(good & (column == made.truth)),
+            np.sum(good & ~used),
+            np.sum(good & used & (column != made.truth)),
+            np.sum(bad & used),
+            np.sum(bad),
+            np.sum(~on_target & used),
+            np.sum(~on_target),
+            silent,
+        ]
+    )
 
 
 def make_canyon(seed, sigma):
@@ -238,7 +249,9 @@ def _places(rng, pair):
 
 
 def _between(least, most, rng):
-    return least if least == most else rng.uniform(least, most)
+    if least == most:
+        return least
+    return rng.uniform(least, most)
 
 
 def _appearances(rng, local):
@@ -246,7 +259,8 @@ def _appearances(rng, local):
     kinds = rng.choice(["circle", "square"], n)
     sizes = rng.choice([0.3, 0.6], n)
     for i in range(0, n - 1, 7):
-        kinds[i + 1], sizes[i + 1] = kinds[i], sizes[i]
+        kinds[i + 1] = kinds[i]
+        sizes[i + 1] = sizes[i]
     return kinds, sizes
 
 
@@ -256,7 +270,8 @@ def _way(ahead):
     steps = np.linspace(0.0, max(float(np.max(ahead)), 1.0) + 1.0, 20_000)
     turn = 0.8 * np.sin(steps / 150.0)
     d = steps[1] - steps[0]
-    east, north = np.cumsum(np.sin(turn)) * d, np.cumsum(np.cos(turn)) * d
+    east = np.cumsum(np.sin(turn)) * d
+    north = np.cumsum(np.cos(turn)) * d
     place = [np.interp(ahead, steps, east), np.interp(ahead, steps, north), 0.01 * ahead]
     return ORIGIN + np.column_stack(place), heading
 
@@ -271,7 +286,8 @@ def _drive(length, number, rng):
     """The true trajectory of a pass; odd ones go back. It stops once for a while."""
     pause = number * (length / SPEED + 120.0)
     elapsed = np.arange(0.0, length / SPEED + 30.0, 0.1)
-    stop, slow = rng.uniform(0, length / SPEED), rng.uniform(5, 25)
+    stop = rng.uniform(0, length / SPEED)
+    slow = rng.uniform(5, 25)
     driven = SPEED * np.where(elapsed < stop, elapsed, np.maximum(elapsed - slow, stop))
     driven = np.clip(driven, 0.0, length)
     ahead = length - driven if number % 2 else driven
@@ -332,7 +348,8 @@ def _canyon(gps_time, rng):
 
 def _outages(gps_time, rng):
     """Wandering velocity errors in outages of 20 to 60 s, bridged back; up to 3 m."""
-    error, size = np.zeros((len(gps_time), 3)), np.zeros((len(gps_time), 3))
+    error = np.zeros((len(gps_time), 3))
+    size = np.zeros((len(gps_time), 3))
     start = gps_time[0] + rng.uniform(0, 40)
     while start < gps_time[-1]:
         rows = np.flatnonzero((gps_time >= start) & (gps_time < start + rng.uniform(20, 60)))
@@ -349,7 +366,8 @@ def _outages(gps_time, rng):
 
 def _sinusoids(gps_time, rng):
     """Sums of sinusoids of 30 to 300 s in each axis; up to 3 m."""
-    periods, phases = rng.uniform(30, 300, (5, 3)), rng.uniform(0, 2 * np.pi, (5, 3))
+    periods = rng.uniform(30, 300, (5, 3))
+    phases = rng.uniform(0, 2 * np.pi, (5, 3))
     argument = 2 * np.pi * gps_time[:, None, None] / periods + phases
     error = (rng.uniform(0.2, 1, (5, 3)) * np.sin(argument)).sum(axis=1)
     error *= rng.uniform(0.5, 3.0) / np.linalg.norm(error, axis=1).max()
@@ -363,14 +381,17 @@ def _survey(local, kinds, sizes, rng, blunders=1.0):
     order = rng.permutation(n)
     pairs = order[: 2 * round(blunders * 0.05 * n)].reshape(-1, 2)
     moved_rows = order[2 * len(pairs) :][: round(blunders * 0.1 * n)]
-    whole, moved = np.ones(n, bool), np.zeros(n)
+    whole = np.ones(n, bool)
+    moved = np.zeros(n)
     surveyed = position + rng.normal(0, 0.003, (n, 3))
     # The two points' names are exchanged, with the appearance that belongs to the name: where
     # that is the same, nothing of it is left to see, nor does it matter.
-    kinds, sizes = kinds.copy(), sizes.copy()
+    kinds = kinds.copy()
+    sizes = sizes.copy()
     for a, b in pairs:
         whole[[a, b]] = kinds[a] == kinds[b] and sizes[a] == sizes[b]
-        kinds[[a, b]], sizes[[a, b]] = kinds[[b, a]], sizes[[b, a]]
+        kinds[[a, b]] = kinds[[b, a]]
+        sizes[[a, b]] = sizes[[b, a]]
     away = rng.standard_normal((len(moved_rows), 3))
     away /= np.linalg.norm(away, axis=1, keepdims=True)
     moved[moved_rows] = rng.uniform(0.3, 3.0, len(moved_rows))
@@ -388,11 +409,13 @@ def _observe(number, local, kinds, sizes, hidden, drive, seen, error, rng):
     extra = round(0.2 * len(rows))
     near = rng.random(extra) < 0.5
     beside = local[rng.choice(len(local), extra)] + rng.normal(0, 1.5, (extra, 3)) * [1, 1, 0.5]
-    anywhere = np.column_stack([
-        rng.uniform(0, local[:, 0].max(), extra),
-        rng.choice([-1, 1], extra) * rng.uniform(4, 15, extra),
-        rng.uniform(0, 4, extra),
-    ])  # fmt: skip
+    anywhere = np.column_stack(
+        [
+            rng.uniform(0, local[:, 0].max(), extra),
+            rng.choice([-1, 1], extra) * rng.uniform(4, 15, extra),
+            rng.uniform(0, 4, extra),
+        ]
+    )
     other = np.where(near[:, None], beside, anywhere)
     like = rng.integers(0, len(local), extra)
     times = np.concatenate([seen[rows], _see(other, drive, rng)])

@@ -70,9 +70,11 @@ def rates(trajectory, matched, error, pos):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         correction = estimate_correction(trajectory, matched, pos).correction
-    time, moved = trajectory.gps_time, correction.corrected.position - trajectory.position
+    time = trajectory.gps_time
+    moved = correction.corrected.position - trajectory.position
     steps = drift_history(trajectory).steps
-    begin, end = time[:-1], time[1:]
+    begin = time[:-1]
+    end = time[1:]
     is_jump = np.isin(begin, trajectory.gaps[:, 0])
     excess = [0.0]
     for before, after, size in zip(steps.before, steps.after, steps.size, strict=True):
@@ -85,9 +87,13 @@ def rates(trajectory, matched, error, pos):
     rate[is_jump] = 0.0
     within = np.abs(error - moved) < 1.96 * correction.corrected.position_sigma
     return Rates(
-        float(rate.max()), float(begin[rate.argmax()]), int(np.sum(rate > LIMIT)), max(excess),
-        left(correction, error), float(within.mean()),
-    )  # fmt: skip
+        float(rate.max()),
+        float(begin[rate.argmax()]),
+        int(np.sum(rate > LIMIT)),
+        max(excess),
+        left(correction, error),
+        float(within.mean()),
+    )
 
 
 def speed(time, error):
@@ -111,9 +117,11 @@ def main():
     for kind, rows in found.items():
         table = np.array([row for _, row in rows])
         rms = np.exp(np.log(table[:, 4]).mean())
-        print(f"{kind:24s} {len(rows):6d} {table[:, 0].max():12.3f} {np.sum(table[:, 2] > 0):13d} "
-              f"{table[:, 2].sum():13.0f} {table[:, 3].max():10.3f} {rms:9.4f} "
-              f"{table[:, 5].mean():8.1%}")  # fmt: skip
+        print(
+            f"{kind:24s} {len(rows):6d} {table[:, 0].max():12.3f} {np.sum(table[:, 2] > 0):13d} "
+            f"{table[:, 2].sum():13.0f} {table[:, 3].max():10.3f} {rms:9.4f} "
+            f"{table[:, 5].mean():8.1%}"
+        )
     listed = [(rate, kind, name) for kind, rows in found.items() for name, rate in rows]
     beyond = sum(rate.beyond > 0 for rate, *_ in listed)
     print(f"{len(listed)} drives, {beyond} beyond {LIMIT} m/s; the fastest:")

@@ -56,12 +56,11 @@ def drive(seed):
 
 def costs(result, folder):
     """Time and size of a copy with sigmas over those of a plain one; the best of three times."""
-    file, correction, sigma = (
-        result.survey.clouds[0],
-        result.estimate.correction,
-        result.point_sigma(),
-    )
-    best, size = [np.inf, np.inf], [0, 0]
+    file = result.survey.clouds[0]
+    correction = result.estimate.correction
+    sigma = result.point_sigma()
+    best = [np.inf, np.inf]
+    size = [0, 0]
     for _ in range(REPEATS):
         for kind, its in enumerate((None, sigma)):
             target = folder / f"copy-{kind}.laz"

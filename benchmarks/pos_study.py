@@ -32,7 +32,10 @@ PEERS = {
     "gp": fit_gaussian_process,
 }
 UNSTATED = Pos(position_sigma=0.5)  # m, a constant that says nothing of the drift
-HELD, FLOAT, MEMORY = 0.02, 0.4, 60.0  # m, m, s: fixed, not fixed, and how long its errors last
+# m, m, s: fixed, not fixed, and how long its errors last
+HELD = 0.02
+FLOAT = 0.4
+MEMORY = 60.0
 WORSE = 1.1  # times the best peer: beyond it a survey counts as worse
 
 
@@ -50,7 +53,10 @@ def surveys(series, seeds):
             for title, factor in (("", 1.0), (" no sigma", None), (" / 10", 0.1), (" x 10", 10.0)):
                 if factor not in (1.0, None) and "filtered" not in name:
                     continue
-                sigma = None if factor is None else factor * survey.recorded.position_sigma
+                if factor is None:
+                    sigma = None
+                else:
+                    sigma = factor * survey.recorded.position_sigma
                 recorded = replace(survey.recorded, position_sigma=sigma)
                 pos = UNSTATED if factor is None else None
                 yield f"{name}{title}", recorded, survey.matched, error, pos
@@ -61,7 +67,8 @@ def surveys(series, seeds):
 
 def unfixed(seed):
     """Recorded trajectory, matched control and error of a drive that GNSS fixes in turns."""
-    rng, time = np.random.default_rng(seed), np.arange(0.0, WINDOW, 0.1)
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, WINDOW, 0.1)
     turns = np.cumsum(rng.uniform(10.0, 60.0, 30))  # s
     size = np.where(np.searchsorted(turns, time) % 2, FLOAT, HELD)[:, None] * [1.0, 1.0, 1.5]
     kept = np.exp(-0.1 / MEMORY)
@@ -73,10 +80,13 @@ def unfixed(seed):
 
 def bumped(seed):
     """Recorded trajectory, matched control and error of a drive whose POS drifts unstated."""
-    rng, time = np.random.default_rng([seed, 1]), np.arange(0.0, WINDOW, 0.1)
+    rng = np.random.default_rng([seed, 1])
+    time = np.arange(0.0, WINDOW, 0.1)
     error = HELD / 2 * rng.normal(size=3) + np.zeros((len(time), 3))
     for _ in range(rng.integers(3, 9)):
-        begin, length = rng.uniform(0.0, WINDOW - 30.0), rng.uniform(10.0, 30.0)  # s
+        # s
+        begin = rng.uniform(0.0, WINDOW - 30.0)
+        length = rng.uniform(10.0, 30.0)
         share = np.clip((time - begin) / length, 0.0, 1.0)[:, None]
         error += FLOAT * rng.normal(size=3) * np.sin(np.pi * share) ** 2
     return window(345_600.0 + time, error, np.full_like(error, HELD), seed)
@@ -131,10 +141,12 @@ def main():
     ratio = table[:, 1:-2].min(axis=1) / table[:, -2]
     means = np.exp(np.log(table[:, :-1]).mean(axis=0))
     print(f"{'geometric mean':34s}" + "".join(f"{value:13.3f}" for value in means))
-    print(f"{len(rows)} surveys: the best peer leaves {np.median(ratio):.2f} times as much in the "
-          f"median; mlscorr leaves more than {WORSE} times as much in "
-          f"{np.sum(ratio < 1 / WORSE)} of them, at worst {1 / ratio.min():.2f} times; "
-          f"{table[:, -1].mean():.1%} within 1.96 sigma")  # fmt: skip
+    print(
+        f"{len(rows)} surveys: the best peer leaves {np.median(ratio):.2f} times as much in the "
+        f"median; mlscorr leaves more than {WORSE} times as much in "
+        f"{np.sum(ratio < 1 / WORSE)} of them, at worst {1 / ratio.min():.2f} times; "
+        f"{table[:, -1].mean():.1%} within 1.96 sigma"
+    )
 
 
 if __name__ == "__main__":

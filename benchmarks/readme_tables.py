@@ -58,7 +58,9 @@ def names_in(text):
 
 def axes(values, digits=2):
     """East, north and height in m, or nothing."""
-    return "" if values is None else " / ".join(f"{value:.{digits}f}" for value in values)
+    if values is None:
+        return ""
+    return " / ".join(f"{value:.{digits}f}" for value in values)
 
 
 def scenarios(_):

@@ -17,8 +17,13 @@ from mlscorr.frames import attitude_from_angles
 from mlscorr.io.trajectories import read_pos_error_series
 from mlscorr.survey import ControlPoints, Matched, Pos, TargetObservations, Trajectory
 
-WINDOW, USED = 248.0, 357_881.0  # s: the windows' length; where a shared survey took its own
-FROM, EVERY, LOST = 357_900.0, 150.0, 60.0  # s: GNSS was withheld 60 s in every 150 s
+# s: the windows' length; where a shared survey took its own
+WINDOW = 248.0
+USED = 357_881.0
+# s: GNSS was withheld 60 s in every 150 s
+FROM = 357_900.0
+EVERY = 150.0
+LOST = 60.0
 
 
 def interval(values, statistic=np.median):
@@ -54,9 +59,13 @@ def cases(path):
 def windows(path):
     """Print what is left of real drift, with its sigma(t) stated and with none."""
     for title, hidden in (("sigma(t) stated", False), ("no sigma stated", True)):
-        rows, within = [], []
+        rows = []
+        within = []
         for _, stated, matched, error in cases(path):
-            trajectory = replace(stated, position_sigma=None) if hidden else stated
+            if hidden:
+                trajectory = replace(stated, position_sigma=None)
+            else:
+                trajectory = stated
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
                 pos = Pos(position_sigma=0.5) if hidden else None
@@ -85,16 +94,21 @@ def _print_windows(title, rows, shares):
         print(f"{name:42s}", *(f"{value:6.3f}" for value in medians))
     for i, name in ((1, "LS, order 5"), (2, "stationary exponential")):
         medians = np.median(total[:, i]) / np.median(total[:, 3])
-        print(f"{name}: {medians:.2f} times by medians, window by window "
-              f"{interval(total[:, i] / total[:, 3])} times mlscorr's error")  # fmt: skip
+        print(
+            f"{name}: {medians:.2f} times by medians, window by window "
+            f"{interval(total[:, i] / total[:, 3])} times mlscorr's error"
+        )
     mean = np.exp(np.log(total[:, 3]).mean())
-    print(f"geometric mean {mean:.3f} m; truth within 1 sigma {shares[0]:.1%}, within 1.96 sigma "
-          f"{shares[1]:.1%}")  # fmt: skip
+    print(
+        f"geometric mean {mean:.3f} m; truth within 1 sigma {shares[0]:.1%}, within 1.96 sigma "
+        f"{shares[1]:.1%}"
+    )
 
 
 def window(gps_time, error, sigma, seed):
     """A drive of 10 m/s with a POS error (true - recorded) and 16 even targets beside it."""
-    rng, n = np.random.default_rng(seed), 16
+    rng = np.random.default_rng(seed)
+    n = 16
     zero = np.zeros(len(gps_time))
     way = np.array([532_000.0, 3_374_000.0, 40.0]) + np.outer(gps_time - gps_time[0], [6.0, 8.0, 0])
     attitude = attitude_from_angles(zero, zero, np.arctan2(0.6, 0.8))
@@ -102,8 +116,10 @@ def window(gps_time, error, sigma, seed):
     recorded = Trajectory(gps_time, way - error, attitude, sigma)
     times = np.linspace(gps_time[0] + 2, gps_time[-1] - 2, n)
     arm = np.column_stack([np.resize([-6.0, 9.0, 14.0, -11.0], n), np.zeros(n), -np.ones(n)])
-    name, kind = tuple(f"T{i:02d}" for i in range(n)), ("circle",) * n
-    up, size = np.tile([0.0, 0.0, 1.0], (n, 1)), np.full(n, 0.6)
+    name = tuple(f"T{i:02d}" for i in range(n))
+    kind = ("circle",) * n
+    up = np.tile([0.0, 0.0, 1.0], (n, 1))
+    size = np.full(n, 0.6)
     centre, seen = (
         t.at(times).position + t.at(times).attitude.apply(arm) for t in (true, recorded)
     )
@@ -111,7 +127,8 @@ def window(gps_time, error, sigma, seed):
     control = ControlPoints(name, surveyed, np.full((n, 3), 0.003), kind, size, up)
     noise = np.tile(0.005**2 * np.eye(3), (n, 1, 1))
     seen = seen + 0.005 * rng.normal(size=(n, 3))
-    passes, points = np.ones(n, int), np.full(n, 300)
+    passes = np.ones(n, int)
+    points = np.full(n, 300)
     observations = TargetObservations(name, passes, times, seen, noise, up, kind, size, points)
     return recorded, Matched(observations, control), error
 

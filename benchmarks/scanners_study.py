@@ -21,7 +21,9 @@ import mlscorr
 from mlscorr.estimate import corrected_mounting
 from mlscorr.simulate import Scenario, simulate
 
-DURATION, SPEED = 25.0, 6.0  # s of each of two opposite passes, m/s
+# s of each of two opposite passes, m/s
+DURATION = 25.0
+SPEED = 6.0
 LINE = {"lines_per_second": 50, "points_per_line": 300}
 LARGEST = np.repeat([0.03, np.radians(0.5)], 3)  # m, rad
 UNITS = np.repeat([1e3, np.degrees(1e3)], 3)  # mm, mdeg
@@ -77,7 +79,8 @@ def study(seed, control):
         "alone": np.array([part.lsc.correction for part in parts]),
     }
     seconds = {"together": between - start, "alone": end - between}
-    square, results = walls(both), {}
+    square = walls(both)
+    results = {}
     for method, estimate in estimates.items():
         error = estimate - lacks
         wall = np.sqrt(error.ravel() @ square @ error.ravel())

@@ -22,7 +22,8 @@ UP = np.array([0.0, 0.0, 1.0])
 FOOTPRINT = [(0.0, 0.0, 0.28)] + [  # sigmas across, and weight
     (1.4 * np.cos(a), 1.4 * np.sin(a), 0.12) for a in np.arange(6) * np.pi / 3
 ]
-DARK, WHITE = 0.06, 0.9
+DARK = 0.06
+WHITE = 0.9
 
 
 @dataclass(frozen=True)
@@ -89,20 +90,26 @@ TARGETS = {  # look -> kind and surfaces' paints from the front
 def view(look, size, rng, incidence=70.0, hidden=0.4, clutter=True, away=(3.0, 20.0), step=None):
     "A View of a target 3-20 m off, up to an incidence (deg) and a share hidden"
     distance = rng.uniform(*away)
-    low = -0.05 if look == "painted disc" else rng.uniform(-0.25, 0.25)
+    if look == "painted disc":
+        low = -0.05
+    else:
+        low = rng.uniform(-0.25, 0.25)
     sight = np.array([np.sqrt(1 - low**2), 0.0, low])
-    tilt, about = np.radians(rng.uniform(0, incidence)), rng.uniform(0, 2 * np.pi)
+    tilt = np.radians(rng.uniform(0, incidence))
+    about = rng.uniform(0, 2 * np.pi)
     side = np.cos(about) * np.array([0, 1.0, 0]) + np.sin(about) * np.cross(sight, [0, 1.0, 0])
     normal = -np.cos(tilt) * sight + np.sin(tilt) * side
     u = np.cross(normal, rng.standard_normal(3))
     u /= np.linalg.norm(u)
-    axes, centre = np.array([u, np.cross(normal, u)]), distance * sight
+    axes = np.array([u, np.cross(normal, u)])
+    centre = distance * sight
     surfaces = [
         Surface(centre - 2e-4 * i * normal, axes, paint)
         for i, paint in enumerate(TARGETS[look][1](size))
     ]
     surfaces += _surroundings(look, size, centre, sight, hidden, clutter, rng)
-    step = np.exp(rng.uniform(np.log(0.6e-3), np.log(2.0e-3))) if step is None else step
+    if step is None:
+        step = np.exp(rng.uniform(np.log(0.6e-3), np.log(2.0e-3)))
     return _scan(surfaces, centre, sight, size, step, rng, len(TARGETS[look][1](size)))
 
 
@@ -142,7 +149,10 @@ def _scan(surfaces, centre, sight, size, step, rng, own):
     start = np.outer(y, [0.0, 1.0, 0.0])
     true = angle + SCANNER.angle_noise * rng.standard_normal(len(angle))
     yaw = SCANNER.angle_noise * rng.standard_normal(len(angle))
-    weights, ranges, values, hits = [], [], [], []
+    weights = []
+    ranges = []
+    values = []
+    hits = []
     for across, along, weight in FOOTPRINT:
         sigma = DIVERGENCE / 4
         hit = _cast(surfaces, start, _beam(true + sigma * across, yaw + sigma * along))
@@ -178,7 +188,9 @@ def _beam(angle, yaw):
 
 def _cast(surfaces, start, beam):
     "Range, reflectance times cosine, and number of the surface hit first, by rays"
-    nearest, value, number = np.full(len(beam), np.inf), np.zeros(len(beam)), np.full(len(beam), 99)
+    nearest = np.full(len(beam), np.inf)
+    value = np.zeros(len(beam))
+    number = np.full(len(beam), 99)
     for i, surface in enumerate(surfaces):
         normal = np.cross(*surface.axes)
         cosine = beam @ normal

@@ -17,7 +17,8 @@ from mlscorr.pipeline.project.settings import SETTINGS
 def seconds_each(scheduler: str, number: int) -> float:
     """Time of one call, of as many as are handed out."""
     with engine(scheduler=scheduler, tell=print) as cluster:
-        start, running = time.perf_counter(), set()
+        start = time.perf_counter()
+        running = set()
         for _ in range(number):
             running.add(cluster.submit(abs, -1))
             if len(running) >= SETTINGS.waiting * cluster.width:

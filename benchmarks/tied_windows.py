@@ -79,7 +79,8 @@ def survey_of(true, recorded, number, rng):
     body = true.at(seen).attitude.inv().apply(twice - true.at(seen).position)
     centre = recorded.at(seen).position + recorded.at(seen).attitude.apply(body)
     centre = centre + EXTRACTION * rng.standard_normal(centre.shape)
-    name, up = tuple(f"T{i:02d}" for i in kept), np.tile([0.0, 0.0, 1.0], (len(kept), 1))
+    name = tuple(f"T{i:02d}" for i in kept)
+    up = np.tile([0.0, 0.0, 1.0], (len(kept), 1))
     shape = ("circle",) * len(kept), np.full(len(kept), 0.6)
     surveyed = place + SURVEYED * rng.standard_normal(place.shape)
     control = ControlPoints(name, surveyed, np.full((len(kept), 3), SURVEYED), *shape, up)
@@ -119,7 +120,8 @@ def main():
                     estimate = believed_correction(recorded, Pos())
                 ties = feature_ties(survey, seed, STREET, arguments.wrong)
                 tied = with_ties(estimate, ties).correction
-            alone, after = measure(survey, estimate.correction), measure(survey, tied)
+            alone = measure(survey, estimate.correction)
+            after = measure(survey, tied)
             rows.append((alone[0], after[0]))
             print(
                 f"{number:7d}{first:9.0f}{alone[0]:8.3f}{alone[1]:8.0%}{after[0]:8.3f}"

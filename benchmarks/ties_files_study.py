@@ -60,7 +60,10 @@ def scenario(scanners=1, duration=DURATION, rng=None, road=False, spinning=False
     canyon = read_scenario(FOLDER / "canyon.toml")
     outages = []
     for start in (0.0, duration + canyon.drive.passes[1].pause)[:passes]:
-        length = duration - 2 * GNSS if rng is None else rng.uniform(*OUTAGE)
+        if rng is None:
+            length = duration - 2 * GNSS
+        else:
+            length = rng.uniform(*OUTAGE)
         latest = duration - GNSS - length
         begin = GNSS if rng is None else rng.uniform(GNSS, latest)
         outages.append((start + begin, length))
@@ -145,7 +148,9 @@ def _sigma_apart(estimate, there, back):
     By the most probable parameters, as that of ties which nobody saw.
     """
     equations = estimate.equations
-    trajectory, ties, number = equations.trajectory, equations.ties, 3 * len(there)
+    trajectory = equations.trajectory
+    ties = equations.ties
+    number = 3 * len(there)
     rows = np.repeat(np.column_stack([there, back]), 3, axis=0)
     probes = Ties(
         gps_time=trajectory.gps_time[rows],
@@ -199,7 +204,10 @@ def main():
     print("control  seed     raw   alone  within    ties  within   apart  within   ratio")
     ratios = {number: [] for number in arguments.control}
     for seed in range(arguments.first, arguments.first + arguments.seeds):
-        rng = np.random.default_rng([seed, 1]) if arguments.elsewhere else None
+        if arguments.elsewhere:
+            rng = np.random.default_rng([seed, 1])
+        else:
+            rng = None
         drive = scenario(
             arguments.scanners,
             rng=rng,
@@ -224,7 +232,8 @@ def main():
                 start = estimate_correction(recorded, control, survey.pos)
                 alone = measure(true, start)
             else:
-                start, alone = believed_correction(recorded, survey.pos), (np.nan, np.nan)
+                start = believed_correction(recorded, survey.pos)
+                alone = (np.nan, np.nan)
             tied = measure(true, tie_passes(survey, start, features))
             ratios[number].append(tied[0] / alone[0])
             print(

@@ -44,15 +44,22 @@ STREETS = {
 }
 # Along which a tie of it holds: right, forward or up.
 AXES = {
-    "facade": "r", "road": "u", "cross wall": "f", "kerb": "r", "eaves": "u", "line": "r",
-    "dash": "f", "pole": "rf",
-}  # fmt: skip
+    "facade": "r",
+    "road": "u",
+    "cross wall": "f",
+    "kerb": "r",
+    "eaves": "u",
+    "line": "r",
+    "dash": "f",
+    "pole": "rf",
+}
 
 
 def feature_ties(survey, seed, street=CANYON, wrong=0.05):
     """Ties of a FeatureSurvey's first two passes in a street; a share of them wrong."""
     rng = np.random.default_rng([seed, 2])
-    true, recorded = survey.true, survey.recorded
+    true = survey.true
+    recorded = survey.recorded
     (first, last), (begin, end) = true.passes[:2]
     kind = np.repeat(list(street), list(street.values()))
     sigma = np.where(np.isin(kind, ["pole", "dash"]), 2 * NOISE, NOISE)
@@ -70,11 +77,17 @@ def feature_ties(survey, seed, street=CANYON, wrong=0.05):
     axis = np.array(list("".join(AXES[name] for name in kind)))[:, None]
     normal = np.where(axis == "u", [0.0, 0.0, 1.0], right[row])
     normal = np.where(axis == "f", forward[row], normal)
-    times, place, sigma = times[row], place[row], sigma[row]
+    times = times[row]
+    place = place[row]
+    sigma = sigma[row]
     back = (true.gps_time >= begin + 1.0) & (true.gps_time <= end - 1.0)
     away = np.linalg.norm(true.position[back] - place[:, None], axis=2)
-    again, seen = true.gps_time[back][away.argmin(axis=1)], away.min(axis=1) < FARTHEST
-    times, again, place, normal = times[seen], again[seen], place[seen], normal[seen]
+    again = true.gps_time[back][away.argmin(axis=1)]
+    seen = away.min(axis=1) < FARTHEST
+    times = times[seen]
+    again = again[seen]
+    place = place[seen]
+    normal = normal[seen]
     sigma = sigma[seen]
     mounting = Mounting(np.zeros(3), Rotation.identity())
     views = [
@@ -140,17 +153,17 @@ def main():
         ratios = {street: [] for street in arguments.streets or STREETS}
         for seed in range(arguments.seeds):
             survey = some_control(feature_survey(scenario, seed), number)
-            left, estimate = survey.true.position - survey.recorded.position, by_control(survey)
+            left = survey.true.position - survey.recorded.position
+            estimate = by_control(survey)
             raw = np.sqrt(np.mean(np.sum(left**2, axis=1)))
             alone = measure(survey, estimate.correction)
             for street, values in ratios.items():
                 ties = feature_ties(survey, seed, STREETS[street], arguments.wrong)
                 with warnings.catch_warnings(action="ignore"):
-                    correction = (
-                        previewed_correction(estimate, ties, with_sigmas=True)
-                        if arguments.preview
-                        else with_ties(estimate, ties).correction
-                    )
+                    if arguments.preview:
+                        correction = previewed_correction(estimate, ties, with_sigmas=True)
+                    else:
+                        correction = with_ties(estimate, ties).correction
                 tied = measure(survey, correction)
                 values.append(tied[0] / alone[0])
                 print(
@@ -159,7 +172,8 @@ def main():
                     flush=True,
                 )
         for street, values in ratios.items():
-            middle, largest = np.median(values), max(values)
+            middle = np.median(values)
+            largest = max(values)
             print(f"{number:7d} median ratio {middle:.2f}, largest {largest:.2f}: {street}")
 
 

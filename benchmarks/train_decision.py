@@ -29,10 +29,12 @@ def main() -> None:
     print_figures(records, probabilities)
     if given.write:
         made_of = {
-            "seeds": [seeds[0], seeds[-1]], "cases": given.cases, "records": len(records),
+            "seeds": [seeds[0], seeds[-1]],
+            "cases": given.cases,
+            "records": len(records),
             "mechanisms": hash_of(sorted(mechanisms)),
             "evidence": first_evidence(seeds[0], mechanisms),
-        }  # fmt: skip
+        }
         path = Path(str(mlscorr.gap.evidence.__file__)).with_name("decision.json")
         path.write_text(json.dumps(document(fit(records), made_of), indent=1) + "\n")
         print(f"Written: {path}")

@@ -45,15 +45,18 @@ def confined(bed, name, rng, m):
         number = g.survey.trajectory.segment(time[0] + fixed["time"])
         return shift, "time", (fixed["time"], g.survey.trajectory.passes[number][1] - time[0])
     if name == "worse POS for a while":
-        start, length = rng.uniform(10, 60), rng.uniform(20, 40)
+        start = rng.uniform(10, 60)
+        length = rng.uniform(20, 40)
         time = g.rows.covariates["time"]
         inside = (time >= start) & (time < start + length)
         moved = np.array([process(rng, g.rows.gps_time, "sines") for _ in range(3)])
         shift = inside * np.einsum("mi,im->m", g.rows.partials[:, :3], moved)
         return shift * 3 * m / bed.size(shift), "time", (start, start + length)
     direction, by, width, times = BANDS[name]
-    values, views = g.rows.covariates[by], displacements(g.rows, g.survey)
-    values = np.degrees(values) if by in ("scan_angle", "incidence") else values
+    values = g.rows.covariates[by]
+    views = displacements(g.rows, g.survey)
+    if by in ("scan_angle", "incidence"):
+        values = np.degrees(values)
     first = rng.uniform(0.05, 0.95 - width)
     start, end = np.quantile(values[g.rows.metric], [first, first + width])
     shift = np.zeros(len(g.rows))
@@ -85,10 +88,13 @@ def case(bed, rng, kind, name, m):
     split = next(split for split in inference.where.splits if split.by == by)
     words = {"scan_angle": "scan angle", "incidence": "incidence angle"}.get(by, by)
     return {
-        "label": inference.verdict.label, "iou": overlap(split.extent, truth), "truth": truth,
-        "extent": split.extent, "headline": inference.where.headline,
+        "label": inference.verdict.label,
+        "iou": overlap(split.extent, truth),
+        "truth": truth,
+        "extent": split.extent,
+        "headline": inference.where.headline,
         "named": f"a {words} of" in inference.where.headline,
-    }  # fmt: skip
+    }
 
 
 def run(seeds, seed, m, beds=2):
@@ -98,7 +104,8 @@ def run(seeds, seed, m, beds=2):
         results = []
         for k in range(seeds):
             rng = np.random.default_rng([seed, number, k])
-            bed, kind = ground[k % beds], ("sines", "walk")[k // beds % 2]
+            bed = ground[k % beds]
+            kind = ("sines", "walk")[k // beds % 2]
             results.append(case(bed, rng, kind, name, m))
         yield name, results
 
@@ -113,14 +120,22 @@ def main():
     for name, several in run(given.seeds, given.seed, given.size):
         iou = [r["iou"] for r in several]
         silent = sum(r["label"] == "none" for r in several)
-        print(f"{name:36s} median IoU {np.median(iou):.2f}, least {min(iou):.2f}, named by the "
-              f"headline {sum(r['named'] for r in several)} of {len(several)}, nothing told "
-              f"{silent}", flush=True)  # fmt: skip
+        print(
+            f"{name:36s} median IoU {np.median(iou):.2f}, least {min(iou):.2f}, named by the "
+            f"headline {sum(r['named'] for r in several)} of {len(several)}, nothing told "
+            f"{silent}",
+            flush=True,
+        )
         for r in several if given.list else ():
             e = r["extent"]
-            told = "-" if e is None else f"{e.low:.1f} to {e.high:.1f} ({e.share:.2f})"
-            print(f"   {r['iou']:.2f} {r['label']:30s} truth {r['truth'][0]:.1f} to "
-                  f"{r['truth'][1]:.1f}, told {told}; {r['headline'][:90]}")  # fmt: skip
+            if e is None:
+                told = "-"
+            else:
+                told = f"{e.low:.1f} to {e.high:.1f} ({e.share:.2f})"
+            print(
+                f"   {r['iou']:.2f} {r['label']:30s} truth {r['truth'][0]:.1f} to "
+                f"{r['truth'][1]:.1f}, told {told}; {r['headline'][:90]}"
+            )
 
 
 if __name__ == "__main__":

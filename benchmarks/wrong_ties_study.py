@@ -57,7 +57,8 @@ class ChangedSurvey(SimulatedSurvey):
             survey = replace(self, later=None)
             survey.__dict__["surfaces"] = Surfaces(self.later[0])  # as a cached property keeps it
         for block in super(ChangedSurvey, survey)._blocks_of(file, number, k, **size):
-            cloud, pulses = block.cloud, block.pulses
+            cloud = block.cloud
+            pulses = block.pulses
             if self.move is not None:
                 origin = np.array(self.scenario.origin)
                 pose = self.true_trajectory.at(cloud.gps_time)
@@ -73,11 +74,14 @@ class Street:
     """Where points are along a simulated street, and what hides or shifts there."""
 
     def __init__(self, survey, rng):
-        self.line, self.targets = survey.scene.centre_line, survey.scene.targets.centre
+        self.line = survey.scene.centre_line
+        self.targets = survey.scene.targets.centre
         lengths, tree = self.line._samples
-        self._lengths, self._tree = lengths, tree
+        self._lengths = lengths
+        self._tree = tree
         way = section(survey.scenario.drive, lengths[-1])
-        self.kerb, self.front = way.road, way.road + way.pavement
+        self.kerb = way.road
+        self.front = way.road + way.pavement
         self.stretches = rng.random(2000) < 0.5
         self.aside = rng.choice([-1.0, 1.0], 2000) * rng.uniform(0.1, 1.0, 2000)
         self.is_window = rng.random(2000) < 0.5
@@ -104,7 +108,8 @@ class Street:
         block = np.floor(s / STRETCH).astype(int) * 2 + (lateral > 0) + 500
         is_front = (np.abs(lateral) > self.front - 0.3) & (height > 0.5) & self.stretches[block]
         is_car = (np.abs(np.abs(lateral) - self.kerb) < 1.2) & (np.abs(height - 1.0) < 0.7)
-        by_window, aside = self.is_window[block], self.aside[block]
+        by_window = self.is_window[block]
+        aside = self.aside[block]
         along = np.where(is_car | by_window, np.where(is_car, 3.0 * aside, WINDOW), 0.0)
         across = np.where(is_front & ~by_window, aside, 0.0)
         moved = along[:, None] * forward + across[:, None] * right
@@ -125,7 +130,8 @@ class Street:
         s, lateral, up, _, _ = self.local(points)
         from_s, from_lateral, from_up, _, _ = self.local(scanner)
         share = (beside - from_lateral) / np.where(lateral > beside, lateral - from_lateral, 1.0)
-        at, z = from_s + share * (s - from_s), from_up + share * (up - from_up)
+        at = from_s + share * (s - from_s)
+        z = from_up + share * (up - from_up)
         here = (np.abs(at[:, None] - self.places) < length / 2).any(axis=1)
         here &= (lateral > beside) & (z > 0.3) & (z < height) & (number == 0)
         return np.where(here[:, None], (share - 1.0)[:, None] * (points - scanner), 0.0)
@@ -139,10 +145,13 @@ def changed(survey, case, seed):
     known = {field.name: getattr(survey, field.name) for field in fields(survey)}
     if case not in ("rebuilt", "parallel"):
         return ChangedSurvey(**known, move=getattr(Street(survey, rng), case))
-    line, scene = survey.scene.centre_line, survey.scene
+    line = survey.scene.centre_line
+    scene = survey.scene
     other = build_scene(survey.scenario, line, line.curve.x[-1] - 60.0, rng)
-    triangles, reflectance = other.mesh.triangles, other.mesh.reflectance
-    keep, own = other.target < 0, np.flatnonzero(scene.target >= 0)
+    triangles = other.mesh.triangles
+    reflectance = other.mesh.reflectance
+    keep = other.target < 0
+    own = np.flatnonzero(scene.target >= 0)
     number = np.append(np.zeros(keep.sum(), int), own)
     mesh = Mesh(
         np.concatenate([triangles[keep], scene.mesh.triangles[own]]),
@@ -188,7 +197,9 @@ def wrong_share(survey, true):
     correction = missing(survey, true, features.centre, features.gps_time)
     sigma = np.full(len(features), SETTINGS.least_gate)  # so that the radius alone is the gate
     pairs = pair_features(features, correction, sigma, SETTINGS.least_gate)
-    return float(np.mean(truly_left(survey, true, pairs)[1] > 5.0)) if len(pairs) else np.nan
+    if len(pairs):
+        return float(np.mean(truly_left(survey, true, pairs)[1] > 5.0))
+    return np.nan
 
 
 def truly_left(survey, true, ties):
@@ -221,11 +232,14 @@ def main():
                 alone, _ = measure(survey, true, "off")
                 tied, estimate = measure(survey, true, "auto")
                 offered = wrong_share(recorded, true)
-            used, wrong, largest = 0, 0, 0.0
+            used = 0
+            wrong = 0
+            largest = 0.0
             if estimate.ties is not None:
                 left, ratio = truly_left(recorded, true, estimate.ties.ties)
                 kept = estimate.ties.used
-                used, wrong = int(kept.sum()), int((ratio[kept] > 5.0).sum())
+                used = int(kept.sum())
+                wrong = int((ratio[kept] > 5.0).sum())
                 largest = left[kept].max(initial=0.0)
             print(
                 f"{case:9s}{seed:5d}{alone:8.3f}{tied:8.3f}{used:7d}{wrong:7d}{offered:15.0%}"

@@ -13,13 +13,16 @@ from pathlib import Path
 from docutils import nodes
 from docutils.utils.math.latex2mathml import tex2mathml
 
-project, author, release = "mlscorr", "mlscorr's authors", metadata.version("mlscorr")
+project = "mlscorr"
+author = "mlscorr's authors"
+release = metadata.version("mlscorr")
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton"]
 root_doc = "docs/index"
 include_patterns = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "docs/**"]
 exclude_patterns = [".*", "assets", "benchmarks", "build", "examples", "mlscorr*", "tests"]
 
-html_theme, html_title = "furo", "mlscorr"
+html_theme = "furo"
+html_title = "mlscorr"
 html_math_renderer = "mathml"
 html_copy_source = html_show_sourcelink = html_show_copyright = False
 html_static_path: list[str] = []

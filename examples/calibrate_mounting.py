@@ -25,7 +25,10 @@ WRONG = (
     {"name": "lever_arm", "magnitude": [0.0004, 0.0145, -0.0642]},  # m: right, forward, up
     {"name": "boresight", "magnitude": [-0.0307, -0.0561, 0.2077]},  # deg
 )
-BLACK, ORANGE, BLUE, GREEN = "#000000", "#e69f00", "#0072b2", "#009e73"
+BLACK = "#000000"
+ORANGE = "#e69f00"
+BLUE = "#0072b2"
+GREEN = "#009e73"
 
 
 def main():
@@ -77,7 +80,8 @@ def draw(survey, result, truth, picture):
     figure = Figure(figsize=(11, 7.5), layout="constrained")
     upper, lower = figure.subfigures(2, 1, height_ratios=(1, 1.1))
     calibration = result.calibration
-    scales, units = (1e3, 180 / np.pi), ("mm", "deg")
+    scales = (1e3, 180 / np.pi)
+    units = ("mm", "deg")
     for part, axes in enumerate(upper.subplots(1, 2)):
         rows = slice(3 * part, 3 * part + 3)
         draw_components(axes, calibration, rows, scales[part], truth and truth[part]["magnitude"])
@@ -121,9 +125,11 @@ def draw_components(axes, calibration, rows, scale, truth):
 
 def draw_misclosures(axes, survey, result):
     """Check points in body axes: there a wrong mounting shows as one shift."""
-    matched, role = result.matched_check, "Check points"
+    matched = result.matched_check
+    role = "Check points"
     if len(matched) == 0:
-        matched, role = result.matched_control, "Control points"
+        matched = result.matched_control
+        role = "Control points"
     to_body = survey.trajectory.at(matched.gps_time).attitude.inv()
     before = to_body.apply(matched.misclosure)
     after = to_body.apply(misclosures(matched, result.calibration.correction()))

@@ -101,7 +101,10 @@ def points_near(survey, row):
 
 def draw_target(axes, survey, points, row, when):
     """Points about a target, and the outline where it was surveyed, in the target's plane."""
-    surveyed = survey.check if row.role == "check" else survey.control
+    if row.role == "check":
+        surveyed = survey.check
+    else:
+        surveyed = survey.control
     index = surveyed.name.index(row.name)
     normal = surveyed.normal[index]
     if not np.isfinite(normal).all():
@@ -114,11 +117,10 @@ def draw_target(axes, survey, points, row, when):
     axes.scatter(*local[order].T, c=points.intensity[order], s=9, cmap="cividis", linewidths=0)
     half = surveyed.size[index] / 2
     turn = np.linspace(0, 2 * np.pi, 200)
-    radius = (
-        half
-        if surveyed.kind[index] == "circle"
-        else half / np.maximum(np.abs(np.cos(turn)), np.abs(np.sin(turn)))
-    )
+    if surveyed.kind[index] == "circle":
+        radius = half
+    else:
+        radius = half / np.maximum(np.abs(np.cos(turn)), np.abs(np.sin(turn)))
     axes.plot(radius * np.cos(turn), radius * np.sin(turn), color="#d55e00", lw=2, label="surveyed")
     axes.set(xlim=(-REACH, REACH), ylim=(-REACH, REACH), aspect="equal", xlabel="in the plane (m)")
     misclosure = np.linalg.norm(getattr(row, when))
@@ -128,7 +130,8 @@ def draw_target(axes, survey, points, row, when):
 
 def draw_correction(axes, result):
     """Corrected - recorded position over time, with its 1-sigma band and the control epochs."""
-    recorded, corrected = result.estimate.correction.recorded, result.trajectory
+    recorded = result.estimate.correction.recorded
+    corrected = result.trajectory
     time = recorded.gps_time - recorded.gps_time[0]
     for axis, color in zip(range(3), ("#0072b2", "#e69f00", "#009e73"), strict=True):
         change = corrected.position[:, axis] - recorded.position[:, axis]

@@ -26,7 +26,9 @@ HIDDEN = [
     {"name": "vertical_datum", "magnitude": 0.06},
 ]
 ROUNDS = 4
-BEFORE, AFTER, BAND = "#d55e00", "#0072b2", "0.85"
+BEFORE = "#d55e00"
+AFTER = "#0072b2"
+BAND = "0.85"
 
 
 def survey_to_explain(folder):
@@ -44,7 +46,8 @@ def survey_to_explain(folder):
 
 def rounds(survey):
     """Diagnoses, each with the simulator that the one before improved, until none is left."""
-    found, simulator = [], None
+    found = []
+    simulator = None
     while len(found) < ROUNDS:
         found.append(mlscorr.diagnose(survey, simulator))
         told = found[-1].document

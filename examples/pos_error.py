@@ -25,7 +25,10 @@ from mlscorr.survey import Trajectory
 
 ROOT = Path(__file__).parents[1]
 SERIES = Path("data", "real_pos_error", "OB_GINS_TXT.err")
-FIRST, PERIOD, OUTAGE = 357_900.0, 150.0, 60.0  # s: outages of the real series
+# s: outages of the real series
+FIRST = 357_900.0
+PERIOD = 150.0
+OUTAGE = 60.0
 SETTLED = 65.0, 145.0  # s after an outage began: GNSS is back
 STEP = 0.1  # s
 LAGS = np.arange(0.0, 50.0, STEP)  # s
@@ -121,7 +124,9 @@ def draw(runs, picture):
     """Size of the error over time, above the autocorrelation in and outside outages."""
     figure = Figure(figsize=(10, 7.5), layout="constrained")
     panels = figure.subplot_mosaic([["over time", "over time"], ["lost", "held"]])
-    over_time, lost, held = panels["over time"], panels["lost"], panels["held"]
+    over_time = panels["over time"]
+    lost = panels["lost"]
+    held = panels["held"]
     for label, (elapsed, errors, color) in runs.items():
         size = np.linalg.norm(errors[0], axis=1)
         over_time.semilogy(elapsed, size, color=color, lw=1, label=label)

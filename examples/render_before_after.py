@@ -60,7 +60,9 @@ def parse():
 def at_hand():
     """A recorded survey, if there is one."""
     path = SHARED / "surveys" / "wuhan_drive"
-    return path if path.exists() else None
+    if path.exists():
+        return path
+    return None
 
 
 def simulated(folder):

@@ -26,9 +26,22 @@ if TYPE_CHECKING:  # what editors and type checkers see of the names that are lo
     from mlscorr.simulate import read_simulator
 
 __all__ = [
-    "apply", "calibrate", "check", "compare", "correct", "diagnose", "doctor", "extract",
-    "find_ties", "init", "plan", "read_simulator", "read_survey", "render", "simulate",
-]  # fmt: skip
+    "apply",
+    "calibrate",
+    "check",
+    "compare",
+    "correct",
+    "diagnose",
+    "doctor",
+    "extract",
+    "find_ties",
+    "init",
+    "plan",
+    "read_simulator",
+    "read_survey",
+    "render",
+    "simulate",
+]
 _READERS = {
     "read_simulator": "mlscorr.simulate.simulator_file",
     "read_survey": "mlscorr.io.surveys.survey_file",

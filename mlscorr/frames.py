@@ -171,9 +171,13 @@ def to_scanner(
 
 
 def georeferenced_anew(
-    trajectory: Trajectory, recorded: Sequence[Mounting], mountings: Sequence[Mounting],
-    position: np.ndarray, gps_time: np.ndarray, scanner: np.ndarray,
-) -> np.ndarray:  # fmt: skip
+    trajectory: Trajectory,
+    recorded: Sequence[Mounting],
+    mountings: Sequence[Mounting],
+    position: np.ndarray,
+    gps_time: np.ndarray,
+    scanner: np.ndarray,
+) -> np.ndarray:
     """Places that recorded mountings gave, as others give them  (Eq. 1). Units: m.
 
     Parameters
@@ -272,9 +276,13 @@ def scanner_partials(
 
 
 def partials_by_scanner(
-    partials: Callable, trajectory: Trajectory, mountings: Mapping[int, Mounting],
-    position: np.ndarray, gps_time: np.ndarray, scanner: np.ndarray,
-) -> np.ndarray:  # fmt: skip
+    partials: Callable,
+    trajectory: Trajectory,
+    mountings: Mapping[int, Mounting],
+    position: np.ndarray,
+    gps_time: np.ndarray,
+    scanner: np.ndarray,
+) -> np.ndarray:
     """Partial derivatives (n, 3, q k) by q unknowns of each of k scanners; zero by another's.
 
     Parameters

@@ -58,7 +58,10 @@ def test_every_survey_toml_can_be_read(page):
     "The sections that the pages show are those that a survey has, or a simulator"
     for block in re.findall(r"```toml\n(.*?)```", page.read_text(), flags=re.S):
         document = tomllib.loads(block)
-        model = ProjectFile if isinstance(document.get("drive"), list) else SimulatorFile
+        if isinstance(document.get("drive"), list):
+            model = ProjectFile
+        else:
+            model = SimulatorFile
         (SurveyFile if "cloud" in document else model).model_validate(document)
 
 

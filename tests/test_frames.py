@@ -67,7 +67,8 @@ def test_places_in_range_and_angles_lie_where_a_scanner_draws_them():
 def test_angles_survive_the_round_trip():
     "Roll, pitch and heading come back from the rotation to 1e-12 rad"
     rng = np.random.default_rng(2)
-    roll, heading = rng.uniform(-np.pi, np.pi, 1000), rng.uniform(0, 2 * np.pi, 1000)
+    roll = rng.uniform(-np.pi, np.pi, 1000)
+    heading = rng.uniform(0, 2 * np.pi, 1000)
     pitch = rng.uniform(-1.5, 1.5, 1000)
     found = angles_from_attitude(attitude_from_angles(roll, pitch, heading))
     assert np.abs(np.subtract(found, [roll, pitch, heading])).max() < 1e-12  # rad
@@ -75,8 +76,10 @@ def test_angles_survive_the_round_trip():
 
 def test_georeferencing_is_equation_1():
     "X_G = T_G + R_P^G (R_L^P X_L + T_L^P), point by point with plain matrices, to 1e-9 m"
-    trajectory, rng = drive(), np.random.default_rng(2)
-    rows, scanner = rng.integers(len(trajectory), size=50), rng.uniform(-80, 80, (50, 3))
+    trajectory = drive()
+    rng = np.random.default_rng(2)
+    rows = rng.integers(len(trajectory), size=50)
+    scanner = rng.uniform(-80, 80, (50, 3))
     found = georeference(trajectory, MOUNTING, scanner, trajectory.gps_time[rows])
     for row, beam, point in zip(rows, scanner, found, strict=True):
         body = MOUNTING.boresight.as_matrix() @ beam + MOUNTING.lever_arm
@@ -86,20 +89,25 @@ def test_georeferencing_is_equation_1():
 
 def test_the_inverse_returns_the_scanner_coordinates():
     "Map points go back to the scanner and return, to 1e-6 m"
-    trajectory, rng = drive(), np.random.default_rng(3)
-    gps_time, scanner = START + rng.uniform(0, 19.9, 5000), rng.uniform(-80, 80, (5000, 3))
+    trajectory = drive()
+    rng = np.random.default_rng(3)
+    gps_time = START + rng.uniform(0, 19.9, 5000)
+    scanner = rng.uniform(-80, 80, (5000, 3))
     xyz = georeference(trajectory, MOUNTING, scanner, gps_time)
     assert np.abs(to_scanner(trajectory, MOUNTING, xyz, gps_time) - scanner).max() < 1e-6  # m
 
 
 def test_each_scanner_has_its_own_mounting():
     "Points of two scanners are georeferenced anew, and differentiated, as those of each alone"
-    trajectory, rng = drive(), np.random.default_rng(6)
-    gps_time, xyz = START + rng.uniform(0, 19.9, 200), rng.uniform(-80, 80, (200, 3))
+    trajectory = drive()
+    rng = np.random.default_rng(6)
+    gps_time = START + rng.uniform(0, 19.9, 200)
+    xyz = rng.uniform(-80, 80, (200, 3))
     xyz += trajectory.position[0]
     arm = np.array([0.2, 0.1, -0.3])  # m
     other = Mounting(arm, Rotation.from_rotvec([0.0, 0.02, 0.0]) * MOUNTING.boresight)
-    recorded, mountings = [MOUNTING, other], [other, MOUNTING]
+    recorded = [MOUNTING, other]
+    mountings = [other, MOUNTING]
     scanner = rng.integers(2, size=200)
     moved = georeferenced_anew(trajectory, recorded, mountings, xyz, gps_time, scanner)
     numbered = dict(enumerate(mountings))
@@ -124,8 +132,11 @@ def test_skew_is_the_cross_product():
 
 def test_partials_are_the_numerical_derivatives_of_equation_1():
     "A small pose change moves points as -Phi(G) says (Eq. 9); the printed Eq. 10 turns them round"
-    trajectory, rng, small = drive(), np.random.default_rng(5), 1e-4
-    gps_time, scanner = START + rng.uniform(0, 19.9, 100), rng.uniform(-80, 80, (100, 3))
+    trajectory = drive()
+    rng = np.random.default_rng(5)
+    small = 1e-4
+    gps_time = START + rng.uniform(0, 19.9, 100)
+    scanner = rng.uniform(-80, 80, (100, 3))
     xyz = georeference(trajectory, MOUNTING, scanner, gps_time)
     partials = pose_partials(trajectory, xyz, gps_time)
 
@@ -151,7 +162,8 @@ def test_a_turn_to_the_left_moves_what_is_ahead_to_the_west():
 
 def test_the_scanner_stands_where_its_own_origin_is_georeferenced():
     "Lever arm and zero beam are one place, to a nanometre"
-    trajectory, gps_time = drive(), START + np.linspace(0.1, 19.0, 50)
+    trajectory = drive()
+    gps_time = START + np.linspace(0.1, 19.0, 50)
     origin = georeference(trajectory, MOUNTING, np.zeros((50, 3)), gps_time)
     assert np.abs(scanner_position(trajectory, MOUNTING, gps_time) - origin).max() < 1e-9  # m
 
@@ -194,7 +206,8 @@ def test_eq_1_is_undone_by_its_inverse(place, start, angles, lever_arm, boresigh
     attitude = attitude_from_angles(*(np.full(3, value) for value in angles))
     trajectory = Trajectory(gps_time, place + np.arange(3.0)[:, None], attitude)
     mounting = Mounting(np.array(lever_arm), Rotation.from_euler("xyz", boresight))
-    at, scanner = gps_time[:1] + 0.5, np.array([beam])
+    at = gps_time[:1] + 0.5
+    scanner = np.array([beam])
     xyz = georeference(trajectory, mounting, scanner, at)
     np.testing.assert_allclose(
         to_scanner(trajectory, mounting, xyz, at), scanner, rtol=0, atol=ROUNDING

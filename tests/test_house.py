@@ -16,8 +16,14 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "mlscorr"
 MODULES = sorted(PACKAGE.rglob("*.py"))
 SECTIONS = ("Parameters\n", "Returns\n", "Raises\n", "Yields\n", "Attributes\n")
-BLANKS = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT,
-          tokenize.ENDMARKER)  # fmt: skip
+BLANKS = (
+    tokenize.COMMENT,
+    tokenize.NL,
+    tokenize.NEWLINE,
+    tokenize.INDENT,
+    tokenize.DEDENT,
+    tokenize.ENDMARKER,
+)
 FUNCTIONS = ast.FunctionDef | ast.AsyncFunctionDef
 DEFINITIONS = ast.ClassDef | FUNCTIONS
 DOCUMENTED = 0.65  # share of the public names with sections
@@ -65,7 +71,10 @@ def numeric_constants(path):
     "Names of the module's constants and of the fields of its Settings that hold numbers"
     for node in parsed(path).body:
         if isinstance(node, ast.Assign | ast.AnnAssign) and holds_number(node.value):
-            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            if isinstance(node, ast.Assign):
+                targets = node.targets
+            else:
+                targets = [node.target]
             names = [n.id for t in targets for n in ast.walk(t) if isinstance(n, ast.Name)]
             if any(name.isupper() for name in names):
                 yield names[0]

@@ -10,9 +10,10 @@ import pytest
 import mlscorr
 
 VERBS = [
-    name for name in mlscorr.__all__
+    name
+    for name in mlscorr.__all__
     if name != "simulate" and "survey" in inspect.signature(getattr(mlscorr, name)).parameters
-]  # fmt: skip
+]
 
 
 def typed_names():

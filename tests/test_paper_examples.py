@@ -60,7 +60,8 @@ def test_each_experiment_prints_its_tables_and_draws(
     script, tables, paper, tmp_path, capsys, monkeypatch
 ):
     "Tables beside the paper's own, said to be of a clone, and a picture"
-    picture, module = tmp_path / f"{script}.png", paper(script)
+    picture = tmp_path / f"{script}.png"
+    module = paper(script)
     if script == "car":  # one order and one number of control points, for time
         monkeypatch.setattr(module, "ORDERS", (5,))
         monkeypatch.setattr(module, "COUNTS", (21,))

@@ -33,11 +33,21 @@ def test_every_table_has_its_command():
 def test_the_blind_check_becomes_a_table(tmp_path):
     "Shares are written in percent, counts and sizes as they are, goals with their sign"
     rows = [
-        {"name": "right effect", "cases": 32, "value": 0.69, "interval": [0.51, 0.82],
-         "goal": [0.92, None]},
-        {"name": "size of the set", "cases": 96, "value": 1.47, "interval": [1.3, 1.65],
-         "goal": [None, 1.5]},
-    ]  # fmt: skip
+        {
+            "name": "right effect",
+            "cases": 32,
+            "value": 0.69,
+            "interval": [0.51, 0.82],
+            "goal": [0.92, None],
+        },
+        {
+            "name": "size of the set",
+            "cases": 96,
+            "value": 1.47,
+            "interval": [1.3, 1.65],
+            "goal": [None, 1.5],
+        },
+    ]
     (tmp_path / "score.json").write_text(json.dumps({"rows": rows}))
     lines = blind(tmp_path).splitlines()
     assert lines[2] == "| right effect | 32 | 69 % [51, 82] | >= 92 % |"

@@ -78,7 +78,9 @@ def known_mechanisms(path: Path | None = None) -> Described:
         File with MECHANISMS, LEADS and UNITS.
     """
     known = described(training_mechanisms())
-    return known if path is None else known | load_mechanisms(path)
+    if path is None:
+        return known
+    return known | load_mechanisms(path)
 
 
 def draw_case(
@@ -101,18 +103,26 @@ def draw_case(
     mdb : float, optional
         Size in minimal detectable biases; drawn by default.
     """
-    drawn = str(rng.choice(list(SHARES), p=list(SHARES.values()))) if kind is None else kind
+    if kind is None:
+        drawn = str(rng.choice(list(SHARES), p=list(SHARES.values())))
+    else:
+        drawn = kind
     rows, background, survey = world.errors(rng)
     case = TrainingCase(drawn, (), 0.0, rows, background, survey, world.signatures, {})
     if drawn == "clean":
         return case
     low, high = np.log(SIZES[drawn])
-    size = float(np.exp(rng.uniform(low, high))) if mdb is None else mdb
+    if mdb is None:
+        size = float(np.exp(rng.uniform(low, high)))
+    else:
+        size = mdb
     ruler = Ruler.of(rows, survey)
     acted = {"noise": _noisy, "outside": _moved}.get(drawn, _changed)(
         case, ruler, rng, size, mechanisms
     )
-    return replace(case, kind="clean") if acted is None else acted
+    if acted is None:
+        return replace(case, kind="clean")
+    return acted
 
 
 def _changed(case, ruler, rng, size, _):
@@ -122,14 +132,18 @@ def _changed(case, ruler, rng, size, _):
     drawn = draw_effects(ruler, case.signatures, names, number, size, rng)
     if drawn is None:
         return None
-    bench, names = Bench(case.rows, case.survey), tuple(sized.effect.name for sized, _ in drawn)
+    bench = Bench(case.rows, case.survey)
+    names = tuple(sized.effect.name for sized, _ in drawn)
     shift = sum(bench.change(sized.effect).shift for sized, _ in drawn)
     without = names[0] if case.kind == "withheld" else None
     return replace(
-        case, names=names, mdb=min(sized.mdb for sized, _ in drawn), likeness=drawn[-1][1],
+        case,
+        names=names,
+        mdb=min(sized.mdb for sized, _ in drawn),
+        likeness=drawn[-1][1],
         rows=replace(case.rows, residual=case.rows.residual + shift),
         signatures=tuple(sign for sign in case.signatures if sign.name != without),
-    )  # fmt: skip
+    )
 
 
 def _moved(case, ruler, rng, size, mechanisms):
@@ -145,7 +159,10 @@ def _moved(case, ruler, rng, size, mechanisms):
 
 def _noisy(case, ruler, rng, size, _):
     """The case with noise, which the scatter of points shows too."""
-    shown = RANDOM if (case.rows.channel == "roughness").any() else ("position_noise",)
+    if (case.rows.channel == "roughness").any():
+        shown = RANDOM
+    else:
+        shown = ("position_noise",)
     # without roughness the stated noise holds all of a row's own
     for name in names_to_try(shown, rng):
         if name == "position_noise" and rng.random() < DRIFTS:
@@ -155,12 +172,14 @@ def _noisy(case, ruler, rng, size, _):
             continue
         rows = case.rows
         if effect_class(name).is_of_pose():
-            shift, extra = _of_pose(case, drawn.effect, rng), 0.0
+            shift = _of_pose(case, drawn.effect, rng)
+            extra = 0.0
         else:
             change = Bench(rows, case.survey).change(drawn.effect, rng)
             own = np.sqrt(change.variance) * rng.standard_normal(len(rows))
             lost = rng.binomial(rows.points, -np.clip(change.shift, -1.0, 0.0)) / rows.points
-            shift, extra = own + np.log1p(change.growth) - lost, change.variance
+            shift = own + np.log1p(change.growth) - lost
+            extra = change.variance
         rows = replace(rows, residual=rows.residual + shift, noise=rows.noise + extra)
         rows = with_loss_variance(rows)
         return replace(case, names=(name,), mdb=drawn.mdb, rows=rows)
@@ -169,21 +188,25 @@ def _noisy(case, ruler, rng, size, _):
 
 def _of_pose(case, effect, rng):
     """What a noisy position makes of residuals (m,)."""
-    rows, path = case.rows, case.survey.trajectory
+    rows = case.rows
+    path = case.survey.trajectory
     moved = effect.apply(path, rows.reference, rng).position - path.position
     return _by_position(rows, lambda at: interpolate(at, path.gps_time, moved))
 
 
 def _drifting(case, rng, size):
     """The case with drift that is larger than stated: everywhere, or in a stretch of time."""
-    rows, trajectory = case.rows, case.survey.trajectory
+    rows = case.rows
+    trajectory = case.survey.trajectory
     time = rows.gps_time[rows.metric]
-    start, length = float(rng.choice(time)), float(rng.uniform(15.0, 50.0))
+    start = float(rng.choice(time))
+    length = float(rng.uniform(15.0, 50.0))
     everywhere = rng.random() < 0.5
     sigma = trajectory.position_sigma.mean() * (2.0 + size) * (1.0 if everywhere else 2.0)
     grid = np.arange(trajectory.gps_time[0], trajectory.gps_time[-1] + 1.0, 1.0)
-    drift = np.column_stack([process(rng, grid, str(rng.choice(["sines", "walk"])))
-                             for _ in range(3)])  # fmt: skip
+    drift = np.column_stack(
+        [process(rng, grid, str(rng.choice(["sines", "walk"]))) for _ in range(3)]
+    )
     if not everywhere:  # grows until GNSS is back
         part = (grid - start) / length
         drift *= np.where((part >= 0) & (part < 1), 2.0 * part, 0.0)[:, None]

@@ -29,12 +29,14 @@ def process(rng: Generator, time: np.ndarray, kind: str) -> np.ndarray:
     t = time - time.min()
     if kind == "sines":
         periods = np.exp(rng.uniform(np.log(8.0), np.log(250.0), 5))
-        phases, sizes = rng.uniform(0, 2 * np.pi, 5), rng.standard_normal(5)
+        phases = rng.uniform(0, 2 * np.pi, 5)
+        sizes = rng.standard_normal(5)
         return np.sqrt(2 / 5) * np.sin(2 * np.pi * t[:, None] / periods + phases) @ sizes
     grid = np.arange(0.0, t.max() + 1.0, 1.0)
     walk = np.cumsum(rng.standard_normal(len(grid)))  # velocity noise, in
-    flicker = sum(np.repeat(rng.standard_normal(len(grid) // k + 1), k)[: len(grid)]
-                  for k in (4, 16, 64))  # fmt: skip
+    flicker = sum(
+        np.repeat(rng.standard_normal(len(grid) // k + 1), k)[: len(grid)] for k in (4, 16, 64)
+    )
     walk = walk / 6 + flicker
     for fixes in (10, 25):  # a crude smoother: GNSS every so often pulls it back
         fit = np.interp(grid, grid[::fixes], walk[::fixes])
@@ -57,7 +59,9 @@ def scatter(rows: Rows, rng: Generator, heavy: bool = True) -> np.ndarray:
     """
 
     def draw(n):
-        return rng.standard_t(5, n) * np.sqrt(3 / 5) if heavy else rng.standard_normal(n)
+        if heavy:
+            return rng.standard_t(5, n) * np.sqrt(3 / 5)
+        return rng.standard_normal(n)
 
     survey = np.clip(draw(3 * len(rows.targets)), -INFERENCE.outlier, INFERENCE.outlier)
     own = draw(len(rows)) * np.sqrt(rows.noise)

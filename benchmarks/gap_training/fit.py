@@ -59,14 +59,17 @@ def _fitted(records, x, y, names, penalty):
     """LearnedDecision of some records."""
     from sklearn.linear_model import LogisticRegression
 
-    kinds, sharpness = len(KINDS), _sharpness(records)
+    kinds = len(KINDS)
+    sharpness = _sharpness(records)
     empty = np.zeros((kinds, x.shape[1])), np.zeros(kinds)
     plain = LearnedDecision(
         names, x.mean(axis=0), np.maximum(x.std(axis=0), 1e-6), *empty, sharpness
     )
     model = LogisticRegression(C=penalty, max_iter=5000).fit(plain.standardised(x), y)
-    weights, bias = empty[0], np.full(kinds, -1e3)
-    weights[model.classes_], bias[model.classes_] = model.coef_, model.intercept_
+    weights = empty[0]
+    bias = np.full(kinds, -1e3)
+    weights[model.classes_] = model.coef_
+    bias[model.classes_] = model.intercept_
     return replace(plain, weights=weights, bias=bias)
 
 
@@ -156,12 +159,15 @@ def figures(
 
     everything = (0.0, np.inf)
     rates = {
-        "clean, open sky: a cause claimed": rate("clean", *everything, claimed,
-                                                 lambda r: r.is_open),
-        "clean, bad sky: a cause claimed": rate("clean", *everything, claimed,
-                                                lambda r: not r.is_open),
-        "clean: noise named": rate("clean", *everything, lambda r, n: n != "none"
-                                   and not claimed(r, n)),
+        "clean, open sky: a cause claimed": rate(
+            "clean", *everything, claimed, lambda r: r.is_open
+        ),
+        "clean, bad sky: a cause claimed": rate(
+            "clean", *everything, claimed, lambda r: not r.is_open
+        ),
+        "clean: noise named": rate(
+            "clean", *everything, lambda r, n: n != "none" and not claimed(r, n)
+        ),
         "one effect right at 1.6 to 2.5 MDB": rate("single", 1.6, 2.5, right),
         "one effect right at 3 MDB and more": rate("single", 3.0, np.inf, right),
         "both of a pair at 3 MDB and more": rate("pair", 3.0, np.inf, right),
@@ -169,7 +175,7 @@ def figures(
         "withheld effect at 3 MDB and more: unknown": rate("withheld", 3.0, np.inf, right),
         "withheld at 3 MDB and more: unknown or noise": rate("withheld", 3.0, np.inf, unnamed),
         "mechanism at 3 MDB and more: unknown": rate("outside", 3.0, np.inf, right),
-    }  # fmt: skip
+    }
     stated = np.array([p[label] for p, label in zip(probabilities, labels, strict=True)])
     hit = np.array([right(r, label) for r, label in pairs], dtype=float)
     rates["calibration error"] = (calibration_error(stated, hit), len(records))

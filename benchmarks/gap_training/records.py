@@ -76,13 +76,18 @@ def collect(
     progress : function
         Is told of each world that is done.
     """
-    folder, records = Path(folder), []
+    folder = Path(folder)
+    records = []
     folder.mkdir(parents=True, exist_ok=True)
     for seed in seeds:
         path = folder / f"{seed}.json"
         if not path.exists():
-            text = json.dumps([vars(r) | {"joint": vars(r.joint)}
-                               for r in _records(seed, cases, mechanisms, replicas)])  # fmt: skip
+            text = json.dumps(
+                [
+                    vars(r) | {"joint": vars(r.joint)}
+                    for r in _records(seed, cases, mechanisms, replicas)
+                ]
+            )
             part = folder / f".{seed}.part"
             part.write_text(text + "\n", encoding="utf-8")
             os.replace(part, path)

@@ -55,13 +55,22 @@ class World:
     def random(cls, seed: int) -> World:
         """World of a seed."""
         rng = np.random.default_rng([seed, 0])
-        shared, targets = bool(rng.random() < 0.4), int(rng.integers(14, 45))
+        shared = bool(rng.random() < 0.4)
+        targets = int(rng.integers(14, 45))
         passes = 2 if shared or rng.random() < 0.6 else 1
-        patches = int(np.exp(rng.uniform(*np.log(PATCHES)))) if shared or rng.random() < 0.7 else 0
+        if shared or rng.random() < 0.7:
+            patches = int(np.exp(rng.uniform(*np.log(PATCHES))))
+        else:
+            patches = 0
         made = geometry(
-            seed, targets, patches, passes, rough=bool(patches and rng.random() < 0.8),
-            shared=shared, duration=float(rng.uniform(45.0, 80.0)),
-        )  # fmt: skip
+            seed,
+            targets,
+            patches,
+            passes,
+            rough=bool(patches and rng.random() < 0.8),
+            shared=shared,
+            duration=float(rng.uniform(45.0, 80.0)),
+        )
         is_open = bool(rng.random() < 0.5)
         scenario = _scenario(rng, made.survey.trajectory, is_open)
         recordings = tuple(_recorded(made.survey, scenario, rng) for _ in range(RECORDINGS))
@@ -75,9 +84,11 @@ class World:
         ----------
         rng : Generator
         """
-        rows, kind = self.geometry.rows, str(rng.choice(KINDS))
+        rows = self.geometry.rows
+        kind = str(rng.choice(KINDS))
         survey, error = self.recordings[rng.integers(len(self.recordings))]
-        m, known = len(rows), survey.trajectory.gps_time
+        m = len(rows)
+        known = survey.trajectory.gps_time
         time = np.append(rows.gps_time, np.where(rows.two_times, rows.gps_time_2, rows.gps_time))
         if kind == "sensors":
             pose = interpolate(time, known, np.hstack([error.position, error.attitude]))
@@ -122,14 +133,17 @@ def _scenario(rng, trajectory, is_open):
 
 def _recorded(survey, scenario, rng):
     """The survey as sensors record it, and their error."""
-    true, parts = survey.trajectory, []
+    true = survey.trajectory
+    parts = []
     for start, end in true.passes:
         inside = (true.gps_time >= start) & (true.gps_time <= end)
         parts.append(pos_error(true.select(inside), scenario, rng))
     columns = ("position", "attitude", "position_sigma", "attitude_sigma")
     error = PosError(*(np.concatenate([getattr(p, name) for p in parts]) for name in columns))
     recorded = replace(
-        true, position=true.position + error.position,
-        position_sigma=error.position_sigma, attitude_sigma=error.attitude_sigma,
-    )  # fmt: skip
+        true,
+        position=true.position + error.position,
+        position_sigma=error.position_sigma,
+        attitude_sigma=error.attitude_sigma,
+    )
     return replace(survey, trajectory=recorded), error

@@ -69,7 +69,8 @@ def residuals(survey):
         title: misclosures(survey.matched_check, correction)
         for title, correction in corrections.items()
     }
-    literal, at = Literal.of(survey, ORDER), survey.checked.gps_time
+    literal = Literal.of(survey, ORDER)
+    at = survey.checked.gps_time
     tuned, _ = literal.tuned(at, raw, TABLE_5_TIME)
     untuned = raw - literal.predict(at, literal.variance, TABLE_5_TIME)
     found |= {
@@ -87,11 +88,17 @@ def tell(found):
     rows = []
     for title, paper in METHODS.items():
         ratio = middle(transformed / found[title])
-        of_paper = paper_numbers(paper_transformed / TABLE_5[paper], 2) if paper else ""
+        if paper:
+            of_paper = paper_numbers(paper_transformed / TABLE_5[paper], 2)
+        else:
+            of_paper = ""
         cells = paper_numbers(TABLE_5[paper]) if paper else "", told_axes(found[title])
         rows.append((title, *cells, of_paper, paper_numbers(ratio, 2)))
-    show("Table 5: check points (15), from 9 control points",
-         ("", "paper E N H", "ours E N H", "paper: transformation / it", "ours"), rows)  # fmt: skip
+    show(
+        "Table 5: check points (15), from 9 control points",
+        ("", "paper E N H", "ours E N H", "paper: transformation / it", "ours"),
+        rows,
+    )
     for title in ("Literal LSC-4, C0 tuned", "Consistent LSC"):
         below = np.mean(found[title] <= LIMITS, axis=0)
         factor = transformed / found[title]
@@ -99,9 +106,11 @@ def tell(found):
         each = ", ".join(
             f"{axis} {told(factor[:, i], 1)} ({won[i]:.0%})" for i, axis in enumerate(AXES)
         )
-        print(f"{title}: within 2 / 2 / 4 cm in {paper_numbers(100 * below, 0)} % of the surveys.\n"
-              f"  Times better than the transformation (share that reaches the paper's factor): "
-              f"{each}")  # fmt: skip
+        print(
+            f"{title}: within 2 / 2 / 4 cm in {paper_numbers(100 * below, 0)} % of the surveys.\n"
+            f"  Times better than the transformation (share that reaches the paper's factor): "
+            f"{each}"
+        )
 
 
 def draw(survey, left):
@@ -118,8 +127,15 @@ def draw(survey, left):
         figure = Figure(figsize=(11.0, 3.8), layout="constrained")
         for i, axes in enumerate(figure.subplots(1, 3)):
             for title, (colour, marker) in drawn.items():
-                axes.plot(number, left[title][order, i], color=colour, marker=marker,
-                          markersize=4, linewidth=0.9, label=title)  # fmt: skip
+                axes.plot(
+                    number,
+                    left[title][order, i],
+                    color=colour,
+                    marker=marker,
+                    markersize=4,
+                    linewidth=0.9,
+                    label=title,
+                )
             axes.axhline(0.0, color="black", linewidth=0.7)
             axes.set(
                 title=f"({'abc'[i]}) {AXES[i]}", xlabel="Check point, as passed", xticks=number[::2]
@@ -130,8 +146,10 @@ def draw(survey, left):
         figure.suptitle(
             "The boat of Mao et al. (2015), Fig. 11, on a simulated clone, not the paper's data: "
             "residuals at 15 check points, from 9 control points",
-            x=0.01, ha="left", fontsize=10,
-        )  # fmt: skip
+            x=0.01,
+            ha="left",
+            fontsize=10,
+        )
         return figure
 
 

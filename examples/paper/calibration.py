@@ -34,7 +34,9 @@ from mlscorr.survey import Matched
 
 METHODS = {"raw": "Raw", "ls": "LS", "lsc": "LSC", "lsc with drift": "LSC with drift"}
 LIMITS = np.array([0.014, 0.011, 0.023])  # m, what the paper's LSC reaches
-BORESIGHT, ACROSS = 0.005, 0.005  # deg and m: what a calibration is wished to reach
+# deg and m: what a calibration is wished to reach
+BORESIGHT = 0.005
+ACROSS = 0.005
 
 
 def main(arguments=None):
@@ -83,19 +85,38 @@ def table_6(results):
     for i, component in enumerate(COMPONENTS):
         unit, digits = ("mm", 1) if i < 3 else ("deg", 3)
         factor = 1e3 if i < 3 else 1.0
-        rows.append((
-            f"{component} ({unit})", f"{factor * TABLE_6['ls'][i]:.{digits}f}",
-            f"{factor * TABLE_6['lsc'][i]:.{digits}f}",
-            *(told(errors[name][:, i], digits) for name in ("ls", "lsc")),
-            f"{rms(errors['ls'][:, i]):.{digits}f}", f"{rms(errors['lsc'][:, i]):.{digits}f}",
-            f"{np.median(sigma[:, i]):.{digits}f}", f"{told_share[i]:.0%}",
-        ))  # fmt: skip
-    head = ("", "paper LS", "paper LSC = our truth", "error of LS", "error of LSC", "RMS LS",
-            "RMS LSC", "LSC's sigma", "determined")  # fmt: skip
-    across, turned = rms(errors["lsc"])[0], rms(errors["lsc"])[3:]
-    show("Table 6: misalignment from 10 control points", head, rows,
-         f"Wished: lever arm across {1e3 * ACROSS:.0f} mm, RMS {across:.1f} mm; boresight "
-         f"{BORESIGHT} deg, RMS {paper_numbers(turned, 3)} deg.")  # fmt: skip
+        rows.append(
+            (
+                f"{component} ({unit})",
+                f"{factor * TABLE_6['ls'][i]:.{digits}f}",
+                f"{factor * TABLE_6['lsc'][i]:.{digits}f}",
+                *(told(errors[name][:, i], digits) for name in ("ls", "lsc")),
+                f"{rms(errors['ls'][:, i]):.{digits}f}",
+                f"{rms(errors['lsc'][:, i]):.{digits}f}",
+                f"{np.median(sigma[:, i]):.{digits}f}",
+                f"{told_share[i]:.0%}",
+            )
+        )
+    head = (
+        "",
+        "paper LS",
+        "paper LSC = our truth",
+        "error of LS",
+        "error of LSC",
+        "RMS LS",
+        "RMS LSC",
+        "LSC's sigma",
+        "determined",
+    )
+    across = rms(errors["lsc"])[0]
+    turned = rms(errors["lsc"])[3:]
+    show(
+        "Table 6: misalignment from 10 control points",
+        head,
+        rows,
+        f"Wished: lever arm across {1e3 * ACROSS:.0f} mm, RMS {across:.1f} mm; boresight "
+        f"{BORESIGHT} deg, RMS {paper_numbers(turned, 3)} deg.",
+    )
 
 
 def table_7(results):
@@ -104,7 +125,8 @@ def table_7(results):
         name: np.array([rms(result["residuals"][name]) for result in results]) for name in METHODS
     }
     of_paper = {"raw": "raw", "ls": "ls", "lsc with drift": "lsc"}
-    rows, within = [], []
+    rows = []
+    within = []
     for name, title in METHODS.items():
         cells = ["", ""]
         if name in of_paper:
@@ -127,8 +149,15 @@ def draw(residuals):
         for i, axes in enumerate(figure.subplots(1, 3)):
             for name, title in METHODS.items():
                 left = residuals[name][:, i]
-                axes.plot(np.arange(1, len(left) + 1), left, color=colours[name], marker="o",
-                          markersize=2.8, linestyle="none", label=title)  # fmt: skip
+                axes.plot(
+                    np.arange(1, len(left) + 1),
+                    left,
+                    color=colours[name],
+                    marker="o",
+                    markersize=2.8,
+                    linestyle="none",
+                    label=title,
+                )
             axes.axhline(0.0, color="black", linewidth=0.7)
             axes.set(title=f"({'abc'[i]}) {AXES[i]}", xlabel="Observation of a check point")
             axes.set_ylabel("Residual (m)")
@@ -137,8 +166,10 @@ def draw(residuals):
         figure.suptitle(
             "The calibration of Mao et al. (2015), Fig. 12, on a simulated clone, not the paper's "
             "data: residuals at 54 check points, from 10 control points",
-            x=0.01, ha="left", fontsize=10,
-        )  # fmt: skip
+            x=0.01,
+            ha="left",
+            fontsize=10,
+        )
         return figure
 
 

@@ -15,7 +15,8 @@ from literal import Literal
 from published import DURATION, RAW, TABLE_1, TABLE_2, TABLE_3, TABLE_4, TIMES
 from tables import introduce, paper_numbers, parse, rms, show, told, told_axes
 
-ORDERS, COUNTS = tuple(TABLE_1), tuple(TABLE_2)
+ORDERS = tuple(TABLE_1)
+COUNTS = tuple(TABLE_2)
 GRID = np.geomspace(0.5, 40.0, 45)  # correlation times over the control interval
 
 
@@ -37,25 +38,44 @@ def table_1(drives):
     """Orders 2 to 5; returns the tuned C0 north (seeds,) by order."""
     raw = np.array([rms(drive.error) for drive in drives])
     rows = [("Raw", paper_numbers(RAW), told_axes(raw), "", "", "")]
-    bases, better = {}, []
+    bases = {}
+    better = []
     for order in ORDERS:
         ls, tuned, untuned, free, base = zip(*(one_order(d, order) for d in drives), strict=True)
-        ls, tuned, bases[order] = np.array(ls), np.array(tuned), np.array(base)[:, NORTH]
+        ls = np.array(ls)
+        tuned = np.array(tuned)
+        bases[order] = np.array(base)[:, NORTH]
         paper_ls, paper_lsc = TABLE_1[order]
         ratio = (
             f"{paper_lsc[NORTH] / paper_ls[NORTH]:.2f}, {told(tuned[:, NORTH] / ls[:, NORTH], 2)}"
         )
         rows += [
             (f"LS-{order}", paper_numbers(paper_ls), told_axes(ls), "", "", ""),
-            (f"LSC-{order}", paper_numbers(paper_lsc), told_axes(tuned), told_axes(untuned),
-             told_axes(free), ratio),
-        ]  # fmt: skip
+            (
+                f"LSC-{order}",
+                paper_numbers(paper_lsc),
+                told_axes(tuned),
+                told_axes(untuned),
+                told_axes(free),
+                ratio,
+            ),
+        ]
         better.append(np.mean(np.linalg.norm(tuned, axis=1) < np.linalg.norm(ls, axis=1)))
-    head = ("", "paper E N H", "literal, C0 tuned", "literal, C0 = v(POS)", "consistent",
-            "LSC/LS N: paper, ours")  # fmt: skip
+    head = (
+        "",
+        "paper E N H",
+        "literal, C0 tuned",
+        "literal, C0 = v(POS)",
+        "consistent",
+        "LSC/LS N: paper, ours",
+    )
     shares = ", ".join(f"{share:.0%}" for share in better)
-    show("Table 1: order of the polynomial (21 control points, dt = 30 s)", head, rows,
-         f"LSC-n (tuned) is better than LS-n in {shares} of the drives, n = 2 to 5.")  # fmt: skip
+    show(
+        "Table 1: order of the polynomial (21 control points, dt = 30 s)",
+        head,
+        rows,
+        f"LSC-n (tuned) is better than LS-n in {shares} of the drives, n = 2 to 5.",
+    )
     return bases
 
 
@@ -64,8 +84,10 @@ def table_2(by_count):
     rows = []
     for count, drives in by_count.items():
         fits = [Literal.of(drive.survey, 5) for drive in drives]
-        tuned = [rms(fit.tuned(drive.gps_time, drive.error, TIMES[count])[0])
-                 for fit, drive in zip(fits, drives, strict=True)]  # fmt: skip
+        tuned = [
+            rms(fit.tuned(drive.gps_time, drive.error, TIMES[count])[0])
+            for fit, drive in zip(fits, drives, strict=True)
+        ]
         ls = [rms(drive.least_squares(5)) for drive in drives]
         free = [rms(drive.consistent()) for drive in drives]
         cells = (told_axes(np.array(values)) for values in (ls, tuned, free))
@@ -82,33 +104,53 @@ def table_3(count, drives):
     swept = [sweep_base(drive, TIMES[count], factors) for drive in drives]
     found, best, left, at_zero = (np.array(column) for column in zip(*swept, strict=True))
     of_paper = unexplained(paper_base, paper_rms**2)
-    start = f"{TABLE_1[5][0][NORTH]} (LS-5)" if count == 21 else "not printed"
-    paper_cells = [("0", start), *zip(map(str, paper_base), map(str, paper_rms),
-                                              strict=True)]  # fmt: skip
-    rows = [(f"{f:.3f}", *cells, told(found[best > 0, i]) if any(best > 0) else "-")
-            for i, (f, cells) in enumerate(zip(factors, paper_cells, strict=True))]  # fmt: skip
-    show(f"Table 3: C0 north ({count} control points, order 5, dt = {TIMES[count]:g} s)",
-         ("C0 / best C0", "paper C0 (m^2)", "paper RMS", "literal RMS"), rows,
-         f"Parabola in C0: 1 - R^2 <= {max(left):.0e}; RMS at C0 = 0 is that of LS-5 to "
-         f"{max(at_zero):.0e} of it.\nPaper: 1 - R^2 = {of_paper:.0e}, "
-         f"{np.sqrt(curve[2]):.4f} m at C0 = 0. Best C0 here {told(best, 3)} m^2, and 0 (not in the"
-         f" rows)\nin {np.mean(best == 0):.0%} of the drives.")  # fmt: skip
+    if count == 21:
+        start = f"{TABLE_1[5][0][NORTH]} (LS-5)"
+    else:
+        start = "not printed"
+    paper_cells = [("0", start), *zip(map(str, paper_base), map(str, paper_rms), strict=True)]
+    rows = [
+        (f"{f:.3f}", *cells, told(found[best > 0, i]) if any(best > 0) else "-")
+        for i, (f, cells) in enumerate(zip(factors, paper_cells, strict=True))
+    ]
+    show(
+        f"Table 3: C0 north ({count} control points, order 5, dt = {TIMES[count]:g} s)",
+        ("C0 / best C0", "paper C0 (m^2)", "paper RMS", "literal RMS"),
+        rows,
+        f"Parabola in C0: 1 - R^2 <= {max(left):.0e}; RMS at C0 = 0 is that of LS-5 to "
+        f"{max(at_zero):.0e} of it.\nPaper: 1 - R^2 = {of_paper:.0e}, "
+        f"{np.sqrt(curve[2]):.4f} m at C0 = 0. Best C0 here {told(best, 3)} m^2, and 0 (not in the"
+        f" rows)\nin {np.mean(best == 0):.0%} of the drives.",
+    )
     return factors, found, best
 
 
 def table_4(count, drives):
     """Sweep of the correlation time; returns RMS (2, seeds, k) on GRID: C0 fixed, and tuned."""
     times, paper_rms = TABLE_4[count]
-    interval, nominal = DURATION / (count - 1), TIMES[count]  # the paper's
+    # the paper's
+    interval = DURATION / (count - 1)
+    nominal = TIMES[count]
     at_paper = np.array([sweep_time(drive, times, [nominal]) for drive in drives])
-    rows = [(f"{time}", f"{time / interval:.1f}", f"{of_paper:.4f}",
-             told(at_paper[:, 0, i]), told(at_paper[:, 1, i]))
-            for i, (time, of_paper) in enumerate(zip(times, paper_rms, strict=True))]  # fmt: skip
+    rows = [
+        (
+            f"{time}",
+            f"{time / interval:.1f}",
+            f"{of_paper:.4f}",
+            told(at_paper[:, 0, i]),
+            told(at_paper[:, 1, i]),
+        )
+        for i, (time, of_paper) in enumerate(zip(times, paper_rms, strict=True))
+    ]
     nominals = nominal * np.array([1.0, 0.5, 2.0])
-    grid = np.moveaxis([
-        sweep_time(drive, GRID * Literal.of(drive.survey, 5).interval, nominals)
-        for drive in drives
-    ], 1, 0)  # fmt: skip
+    grid = np.moveaxis(
+        [
+            sweep_time(drive, GRID * Literal.of(drive.survey, 5).interval, nominals)
+            for drive in drives
+        ],
+        1,
+        0,
+    )
     first, last = np.searchsorted(GRID, np.array(times)[[0, -1]] / interval)
     swept = slice(first, last)
     fixed, half, double, tuned = (best_time(one, swept) for one in grid)

@@ -33,8 +33,10 @@ def draw(by_count, bases, parabolas, grid, curves):
         figure.suptitle(
             "The car of Mao et al. (2015) on simulated clones, not the paper's data: first drive "
             f"(a-c) and medians of {len(by_count[21])} drives (d-f)",
-            x=0.01, ha="left", fontsize=10.5,
-        )  # fmt: skip
+            x=0.01,
+            ha="left",
+            fontsize=10.5,
+        )
         return figure
 
 
@@ -42,9 +44,12 @@ def draw_raw(axes, drive):
     """Figures 5 and 6: the POS error, and what the control points see of it."""
     seen = Literal.of(drive.survey, 5)
     for name, colour, error, found in zip(
-        ("East", "North", "Height"), (BLUE, VERMILLION, GREEN), drive.error.T, seen.misclosure.T,
+        ("East", "North", "Height"),
+        (BLUE, VERMILLION, GREEN),
+        drive.error.T,
+        seen.misclosure.T,
         strict=True,
-    ):  # fmt: skip
+    ):
         axes.plot(since(drive), error, color=colour, label=name)
         axes.plot(seen.gps_time - drive.gps_time[0], found, "o", color=colour, markersize=3.5)
     axes.set_title("(a) POS error, and control points (dots)   [Fig. 5, 6]")
@@ -53,11 +58,14 @@ def draw_raw(axes, drive):
 
 def draw_bases(axes, drive):
     """Figure 7: what is left with too small, best and too large C0, and in consistent mode."""
-    literal, time = Literal.of(drive.survey, 5), TIMES[21]
+    literal = Literal.of(drive.survey, 5)
+    time = TIMES[21]
     best = literal.best_base(drive.gps_time, drive.error, time)
     for factor, colour, name in (
-        (0.0, GREY, "C0 = 0 (LS-5)"), (1.0, BLUE, "best C0"), (2.2, ORANGE, "2.2 best C0")
-    ):  # fmt: skip
+        (0.0, GREY, "C0 = 0 (LS-5)"),
+        (1.0, BLUE, "best C0"),
+        (2.2, ORANGE, "2.2 best C0"),
+    ):
         left = drive.error - literal.predict(drive.gps_time, factor * best, time)
         axes.plot(since(drive), left[:, NORTH], color=colour, label=name)
     left = drive.consistent()[:, NORTH]
@@ -80,15 +88,22 @@ def draw_times(axes, drive):
 def draw_parabolas(axes, parabolas):
     """Figure 8a: RMS over C0, both in units that two different drives share."""
     for count, (factors, found, best) in parabolas.items():
-        relative = middle((found / found[:, :1])[best > 0]) if any(best > 0) else np.ones(1)
+        if any(best > 0):
+            relative = middle((found / found[:, :1])[best > 0])
+        else:
+            relative = np.ones(1)
         if len(relative) > 1:
             dense = np.linspace(0.0, factors[-1], 100)
             square = np.polyval(np.polyfit(factors, relative**2, 2), dense)
             axes.plot(dense, np.sqrt(square), color=COLOURS[count], label=f"{count} control points")
         base, of_paper = (np.array(values) for values in TABLE_3[count])
         curve = np.polyfit(base, of_paper**2, 2)
-        axes.plot(base / (-curve[1] / 2 / curve[0]), of_paper / np.sqrt(curve[2]),
-                  color=COLOURS[count], **PAPER)  # fmt: skip
+        axes.plot(
+            base / (-curve[1] / 2 / curve[0]),
+            of_paper / np.sqrt(curve[2]),
+            color=COLOURS[count],
+            **PAPER,
+        )
     axes.plot([], [], color=BLACK, label="paper's Table 3", **PAPER)
     axes.set_ylim(0.6, 1.3)
     axes.set_title("(d) North RMS by C0   [Fig. 8a, Table 3]")
@@ -99,8 +114,15 @@ def draw_best_bases(axes, bases):
     """Figure 8b: the best C0 over the polynomial's order."""
     orders = list(bases)
     low, median, high = np.percentile(list(bases.values()), (16, 50, 84), axis=1)
-    axes.errorbar(orders, median, (median - low, high - median), color=BLUE, marker="o",
-                  capsize=3, label="clones, 16-84 %")  # fmt: skip
+    axes.errorbar(
+        orders,
+        median,
+        (median - low, high - median),
+        color=BLUE,
+        marker="o",
+        capsize=3,
+        label="clones, 16-84 %",
+    )
     axes.plot(orders, [TABLE_1_C0[order] for order in orders], color=BLACK, label="paper", **PAPER)
     axes.set(yscale="log", xticks=orders, ylim=(0.02, 4.0))
     axes.set_title("(e) Best C0 north by order, 21 control points   [Fig. 8b]")

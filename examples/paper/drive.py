@@ -37,7 +37,8 @@ class Drive:
 
     def consistent(self, order=None):
         """What is left (q, 3) with all parameters from the control points."""
-        survey, chosen = self.survey, {} if order is None else {"order": order}
+        survey = self.survey
+        chosen = {} if order is None else {"order": order}
         found = quietly(estimate_correction, survey.recorded, survey.matched, **chosen)
         return survey.position_left(found.correction)[::10]
 
@@ -50,7 +51,8 @@ class Drive:
 
 def one_order(drive, order):
     """RMS (3,) by LS, literal tuned, literal untuned and consistent; and the tuned C0 (3,)."""
-    literal, time = Literal.of(drive.survey, order), TIMES[21]
+    literal = Literal.of(drive.survey, order)
+    time = TIMES[21]
     left, base = literal.tuned(drive.gps_time, drive.error, time)
     untuned = drive.error - literal.predict(drive.gps_time, literal.variance, time)
     several = drive.least_squares(order), left, untuned, drive.consistent(order)
@@ -62,8 +64,10 @@ def sweep_base(drive, time, factors):
     literal = Literal.of(drive.survey, 5)
     best = literal.best_base(drive.gps_time, drive.error, time)[NORTH]
     scale = best if best > 0 else literal.variance[NORTH]
-    left = (drive.error - literal.predict(drive.gps_time, np.full(3, factor * scale), time)
-            for factor in factors)  # fmt: skip
+    left = (
+        drive.error - literal.predict(drive.gps_time, np.full(3, factor * scale), time)
+        for factor in factors
+    )
     found = np.array([rms(one)[NORTH] for one in left])
     at_zero = abs(found[0] / rms(drive.least_squares(5))[NORTH] - 1.0)
     return found, best, unexplained(factors, found**2), at_zero
@@ -75,7 +79,8 @@ def sweep_time(drive, times, nominals):
     A row for each of m nominal times, with the C0 that is best there; the last with C0 best at
     each of the k. The prediction is linear in C0, so its signal is needed once for each time.
     """
-    literal, at = Literal.of(drive.survey, 5), drive.gps_time
+    literal = Literal.of(drive.survey, 5)
+    at = drive.gps_time
     trend = literal.predict(at, np.zeros(3), times[0])[:, NORTH]
     left = drive.error[:, NORTH] - trend
     signal = np.array([literal.predict(at, np.ones(3), t)[:, NORTH] - trend for t in times])

@@ -26,10 +26,17 @@ from mlscorr.targets import Candidates
 
 DATA = SHARED / "real_pos_error"
 FILES = ("GNSS_RTK.pos", "OB_GINS_TXT.err")
-FIRST, PERIOD, OUTAGE = 357_900.0, 150.0, 60.0  # s: GNSS was withheld, by the data's own notes
+# s: GNSS was withheld, by the data's own notes
+FIRST = 357_900.0
+PERIOD = 150.0
+OUTAGE = 60.0
 LEAD = 45.0  # s with GNSS before each outage; as much follows it
-EVERY, MOVED = 5.0, 3.0  # s and m at least between targets
-SURVEY, EXTRACTION = 0.003, 0.004  # m, one sigma: total station; centres as extraction finds them
+# s and m at least between targets
+EVERY = 5.0
+MOVED = 3.0
+# m, one sigma: total station; centres as extraction finds them
+SURVEY = 0.003
+EXTRACTION = 0.004
 BELIEF = {"grade": "mems", "odometer": True, "processing": "filtered"}  # a car, in real time
 CHOICE = [
     {"grade": grade, "odometer": odometer, "processing": processing}
@@ -69,7 +76,8 @@ def real_drive(rng):
     scenario = Scenario(
         start_time=float(read_poses(path).gps_time[0]), drive={"file": path, "pose_rate": 10.0}
     )
-    true, series = drive(scenario, rng)[2][0], read_pos_error_series(DATA / FILES[1])
+    true = drive(scenario, rng)[2][0]
+    series = read_pos_error_series(DATA / FILES[1])
     inside = (true.gps_time >= series.gps_time[0]) & (true.gps_time <= series.gps_time[-1])
     true = Trajectory(true.gps_time[inside], true.position[inside], true.attitude[inside])
 
@@ -79,19 +87,26 @@ def real_drive(rng):
     error = PosError(at(series.position), at(series.attitude), None, None)
     starts = np.arange(FIRST, true.gps_time[-1] - OUTAGE, PERIOD)
     time = _times(true)
-    side, away = rng.choice([-1.0, 1.0], len(time)), rng.uniform(4.0, 12.0, len(time))
+    side = rng.choice([-1.0, 1.0], len(time))
+    away = rng.uniform(4.0, 12.0, len(time))
     body = np.column_stack([side * away, 0 * away, rng.uniform(-1.8, 3.0, len(time))])
     beam = MOUNTING.boresight.inv().apply(body) * [1.0, 1.0, 0.0]  # in the plane of scan
     return Drive(
-        true, error, record(true, error), tuple((float(s), OUTAGE) for s in starts),
-        time, beam, georeference(true, MOUNTING, beam, time),
-    )  # fmt: skip
+        true,
+        error,
+        record(true, error),
+        tuple((float(s), OUTAGE) for s in starts),
+        time,
+        beam,
+        georeference(true, MOUNTING, beam, time),
+    )
 
 
 def _times(true):
     """Times of targets: every 5 s, where the vehicle has moved on."""
     way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(true.position, axis=0), axis=1)))
-    times, last = [], -np.inf
+    times = []
+    last = -np.inf
     for t in np.arange(true.gps_time[0] + 1.0, true.gps_time[-1] - 1.0, EVERY):
         here = np.interp(t, true.gps_time, way)
         if here - last >= MOVED:
@@ -141,7 +156,9 @@ def window_rows(one, span, recorded, believed, rng):
     surveyed = one.centre[seen] + SURVEY * rng.standard_normal((n, 3))
     observed = georeference(recorded, MOUNTING, one.beam[seen], one.time[seen])
     observed = observed + EXTRACTION * rng.standard_normal((n, 3))
-    up, size, kind = np.tile([0.0, 0.0, 1.0], (n, 1)), np.full(n, 0.6), ("circle",) * n
+    up = np.tile([0.0, 0.0, 1.0], (n, 1))
+    size = np.full(n, 0.6)
+    kind = ("circle",) * n
     control = ControlPoints(names, surveyed, np.full((n, 3), SURVEY), kind, size, up)
     none = ControlPoints((), np.zeros((0, 3)), np.zeros((0, 3)), (), np.zeros(0), np.zeros((0, 3)))
     part = Trajectory(
@@ -151,9 +168,16 @@ def window_rows(one, span, recorded, believed, rng):
         "real drive", Path("real"), None, (), part, MOUNTING, control, none, pos=believed
     )
     matched = TargetObservations(
-        names, np.ones(n, int), one.time[seen], observed,
-        np.tile(EXTRACTION**2 * np.eye(3), (n, 1, 1)), up, kind, size, np.full(n, 300),
-    )  # fmt: skip
+        names,
+        np.ones(n, int),
+        one.time[seen],
+        observed,
+        np.tile(EXTRACTION**2 * np.eye(3), (n, 1, 1)),
+        up,
+        kind,
+        size,
+        np.full(n, 300),
+    )
     empty = PointCloud(np.zeros((0, 3)), np.zeros(0), np.zeros(0))
     return target_rows(survey, matched, Candidates(empty, np.zeros(0, int), empty, {})), survey
 

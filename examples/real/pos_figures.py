@@ -26,10 +26,18 @@ def draw_errors(figure, one, believed, sigmas, cycles):
     for axis, panel in enumerate(panels):
         for start, length in one.outages:
             panel.axvspan(start - FIRST, start + length - FIRST, color="0.92", zorder=0)
-        two, now = 2 * sigmas[0][:, axis], 2 * believed.position_sigma
+        two = 2 * sigmas[0][:, axis]
+        now = 2 * believed.position_sigma
         largest = 1.15 * np.abs(one.error.position[:, axis]).max()
-        panel.fill_between(time, -two, two, color=AFTER, alpha=0.25, lw=0,
-                           label="2 sigma, simulator told of the outages")  # fmt: skip
+        panel.fill_between(
+            time,
+            -two,
+            two,
+            color=AFTER,
+            alpha=0.25,
+            lw=0,
+            label="2 sigma, simulator told of the outages",
+        )
         panel.axhline(now, color=BEFORE, lw=1.2, label="2 sigma as believed")
         panel.axhline(-now, color=BEFORE, lw=1.2)
         panel.plot(time, one.error.position[:, axis], color="black", lw=0.9, label="real error")
@@ -63,7 +71,8 @@ def draw_by_time(figure, cycles, measured):
 
 def draw_by_outage(figure, r):
     """Gap of each outage before and after, with what chance makes of it."""
-    axes, place = figure.subplots(), np.arange(len(r["cycles"]))
+    axes = figure.subplots()
+    place = np.arange(len(r["cycles"]))
     for aside, key, band, color, label in (
         (-0.15, "before", "null_band", BEFORE, "as believed"),
         (0.15, "after", "null_band_after", AFTER, "told of the outages (settings from the others)"),

@@ -34,7 +34,8 @@ from pos_page import interval, most_chosen, windows_told, write
 def main():
     arguments = parse()
     needed(DATA, FILES, "dataset/ of i2Nav-WHU/OB_GINS")
-    out, rng = arguments.out, np.random.default_rng(arguments.seed)
+    out = arguments.out
+    rng = np.random.default_rng(arguments.seed)
     one = real_drive(rng)
     believed = belief(one, arguments.seed)
     models = outage_models(one, arguments.seed)
@@ -104,19 +105,27 @@ def named_over(kinds, told, believed, arguments):
 
 def show(r):
     """The result as text."""
-    print(f"{'outage from':14s}{'diagnosis, shown this outage alone':44s}"
-          "gap before   after (mm)   shrink")  # fmt: skip
+    print(
+        f"{'outage from':14s}{'diagnosis, shown this outage alone':44s}"
+        "gap before   after (mm)   shrink"
+    )
     for row in r["cycles"]:
-        print(f"{row['outage'][0]:.0f} s      {words(row['verdict']):44s}{row['before']:10.0f} "
-              f"{row['after']:12.0f} {row['shrink']:8.0%}")  # fmt: skip
+        print(
+            f"{row['outage'][0]:.0f} s      {words(row['verdict']):44s}{row['before']:10.0f} "
+            f"{row['after']:12.0f} {row['shrink']:8.0%}"
+        )
     for row in r["pairs"]:
-        print(f"two outages, {row['span'][0]:.0f} to {row['span'][1]:.0f} s: "
-              f"{words(row['verdict'])} (probability {row['probability']:.2f}); "
-              f"windows {windows_told(row)}")  # fmt: skip
+        print(
+            f"two outages, {row['span'][0]:.0f} to {row['span'][1]:.0f} s: "
+            f"{words(row['verdict'])} (probability {row['probability']:.2f}); "
+            f"windows {windows_told(row)}"
+        )
     for row in r["quiet"]:
-        print(f"no outage, {row['span'][0]:.0f} to {row['span'][1]:.0f} s: "
-              f"{words(row['verdict'])}; gap {row['gap']:.0f} mm, {row['null_band'][0]:.0f} to "
-              f"{row['null_band'][1]:.0f} mm if nothing is wrong")  # fmt: skip
+        print(
+            f"no outage, {row['span'][0]:.0f} to {row['span'][1]:.0f} s: "
+            f"{words(row['verdict'])}; gap {row['gap']:.0f} mm, {row['null_band'][0]:.0f} to "
+            f"{row['null_band'][1]:.0f} mm if nothing is wrong"
+        )
     for kind, count in r["named"].items():
         print(f"{kind}, over {r['layouts']} layout(s) of targets: {counted(count)}")
     show_whole(r)
@@ -125,16 +134,23 @@ def show(r):
 def show_whole(r):
     """What holds of all outages together, as text."""
     m = r["medians"]
-    print(f"median over {len(r['cycles'])} outages: gap {interval(m['before'])} -> "
-          f"{interval(m['after'])} mm, shrink {interval(m['shrink'], 100)} %")  # fmt: skip
-    print(f"all together: {r['shrink_all']:.0%} of the gap's square gone "
-          f"[{r['shrink_interval'][0]:.0%}, {r['shrink_interval'][1]:.0%}]; "
-          f"{r['plain_in_outages']:.1%} of the excess square lies in the outages "
-          f"({r['rows_in_outages']:.0%} of the targets); errors within 2 sigma: "
-          f"{r['within_2_sigma'][0]:.0%} -> {r['within_2_sigma'][1]:.0%}")  # fmt: skip
-    print("in outages the error is {:.1f} / {:.1f} / {:.1f} times the simulated sigma (E / N / H); "
-          "height ends positive in {} of {}".format(
-              *r["stays"]["over_sigma"], r["stays"]["positive"][2], len(r["cycles"])))  # fmt: skip
+    print(
+        f"median over {len(r['cycles'])} outages: gap {interval(m['before'])} -> "
+        f"{interval(m['after'])} mm, shrink {interval(m['shrink'], 100)} %"
+    )
+    print(
+        f"all together: {r['shrink_all']:.0%} of the gap's square gone "
+        f"[{r['shrink_interval'][0]:.0%}, {r['shrink_interval'][1]:.0%}]; "
+        f"{r['plain_in_outages']:.1%} of the excess square lies in the outages "
+        f"({r['rows_in_outages']:.0%} of the targets); errors within 2 sigma: "
+        f"{r['within_2_sigma'][0]:.0%} -> {r['within_2_sigma'][1]:.0%}"
+    )
+    print(
+        "in outages the error is {:.1f} / {:.1f} / {:.1f} times the simulated sigma (E / N / H); "
+        "height ends positive in {} of {}".format(
+            *r["stays"]["over_sigma"], r["stays"]["positive"][2], len(r["cycles"])
+        )
+    )
     print(f"the simulator with outages makes a gap of {r['simulated']['median']:.0f} mm (median)")
 
 

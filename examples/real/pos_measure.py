@@ -35,7 +35,10 @@ def terms(rows, survey, rng=None, replicas=REPLICAS):
     observed = Observations.of(rows, background(rows, survey))
     whitener = observed.whitener()
     residual = observed.columns(rows.residual[:, None])
-    columns = residual if rng is None else np.hstack([residual, whitener.draw(rng, replicas)])
+    if rng is None:
+        columns = residual
+    else:
+        columns = np.hstack([residual, whitener.draw(rng, replicas)])
     u, sigma = whitener.innovations(columns)
     square = sigma[:, None] ** 2 * (u**2 - 1)
     errors = observed.errors
@@ -56,19 +59,28 @@ def measure(cycles, rows, one, models, rng, replicas=REPLICAS):
     found = []
     for number, span in enumerate(cycles):
         data, survey = rows[span]
-        others = np.delete(score, number, axis=0).sum(axis=0) if len(cycles) > 1 else score[0]
+        if len(cycles) > 1:
+            others = np.delete(score, number, axis=0).sum(axis=0)
+        else:
+            others = score[0]
         chosen = int(np.argmax(others))
         model = with_sigmas(one, survey, models[chosen])
         time, before, plain, old, band = terms(data, survey, rng, replicas)
         _, after, left, new, later = terms(data, model, rng, replicas)
         found.append(
             {
-                "time": time, "before": before, "after": after, "plain": plain, "left": left,
-                "chosen": chosen, "lost": one.lost(time), "gain": new - old,
+                "time": time,
+                "before": before,
+                "after": after,
+                "plain": plain,
+                "left": left,
+                "chosen": chosen,
+                "lost": one.lost(time),
+                "gain": new - old,
                 "band": signed_root(np.percentile(band, SETTINGS.band)),
                 "later": signed_root(np.percentile(later, SETTINGS.band)),
             }
-        )  # fmt: skip
+        )
     return found
 
 
@@ -77,7 +89,8 @@ def simulated_gaps(one, cycles, believed, seed):
     found = []
     for number in range(DRAWS):
         error = simulate_pos(one, BELIEF, [seed, 100 + number], one.outages)
-        recorded, rng = record(one.true, error), np.random.default_rng([seed, 200 + number])
+        recorded = record(one.true, error)
+        rng = np.random.default_rng([seed, 200 + number])
         several = [window_rows(one, span, recorded, believed, rng) for span in cycles]
         found.append([signed_root(terms(*each)[1].mean()) for each in several])
     return np.array(found)
@@ -85,23 +98,30 @@ def simulated_gaps(one, cycles, believed, seed):
 
 def verdict_of(one, span, inference):
     """What one window's diagnosis says, plain."""
-    cause, told = inference.causes[0], inference.verdict
+    cause = inference.causes[0]
+    told = inference.verdict
     bursts = [[b[0], b[0] + b[1], b[2]] for b in cause.model.windows]
     time = np.arange(*span, 0.5)
     found = np.any([(time >= a) & (time < b) for a, b, _ in bursts], axis=0)
-    found, lost = np.broadcast_to(found, time.shape), one.lost(time)
+    found = np.broadcast_to(found, time.shape)
+    lost = one.lost(time)
     return {
-        "span": list(span), "verdict": told.label, "probability": told.probability,
-        "p_value": told.p_value, "windows": bursts,
-        "gap": inference.where.before, "null_band": list(inference.where.null_band),
+        "span": list(span),
+        "verdict": told.label,
+        "probability": told.probability,
+        "p_value": told.p_value,
+        "windows": bursts,
+        "gap": inference.where.before,
+        "null_band": list(inference.where.null_band),
         "outage_found": float(found[lost].mean()) if lost.any() else None,
         "found_in_outage": float(lost[found].mean()) if found.any() else None,
-    }  # fmt: skip
+    }
 
 
 def within(one, believed, measured, models):
     """Share of the real errors (E, N, H) within 2 sigma: as believed, and with outages."""
-    before, after = [], []
+    before = []
+    after = []
     for m in measured:
         rows = (one.true.gps_time >= m["time"].min()) & (one.true.gps_time <= m["time"].max())
         size = np.abs(one.error.position[rows])
@@ -113,13 +133,15 @@ def within(one, believed, measured, models):
 def what_stays(one, measured, models):
     """Of each axis: RMS in outages of the error over the simulated sigma, how many outages end
     with an error of positive sign, and how probable so one-sided a count is by chance."""
-    ratio, ends = [], []
+    ratio = []
+    ends = []
     for m in measured:
         time = one.true.gps_time
         rows = one.lost(time) & (time >= m["time"].min()) & (time <= m["time"].max())
         ratio.append(one.error.position[rows] / models[m["chosen"]][0][rows])
         ends.append(one.error.position[rows][-20:-10].mean(axis=0))  # GNSS is back by the last one
-    up, n = (np.array(ends) > 0).sum(axis=0), len(ends)
+    up = (np.array(ends) > 0).sum(axis=0)
+    n = len(ends)
     return {
         "over_sigma": np.sqrt(np.mean(np.concatenate(ratio) ** 2, axis=0)).tolist(),
         "positive": up.tolist(),
@@ -153,21 +175,27 @@ def summary(cycles, told, measured, rng):
 
 def _of_cycle(span, answer, m):
     """Numbers of one cycle."""
-    inside, squares = m["lost"], (m["before"], m["after"])
+    inside = m["lost"]
+    squares = (m["before"], m["after"])
     before, after = (float(signed_root(square.mean())) for square in squares)
     return {
         "outage": [span[0] + LEAD, span[0] + LEAD + OUTAGE],
-        "verdict": answer.label, "probability": answer.probability, "p_value": answer.p_value,
-        "before": before, "after": after,
-        "null_band": m["band"].tolist(), "null_band_after": m["later"].tolist(),
+        "verdict": answer.label,
+        "probability": answer.probability,
+        "p_value": answer.p_value,
+        "before": before,
+        "after": after,
+        "null_band": m["band"].tolist(),
+        "null_band_after": m["later"].tolist(),
         "plain_in_outage": float(m["plain"][inside].sum() / m["plain"].sum()),
         "innovations_in_outage": float(m["before"][inside].sum() / m["before"].sum()),
         "rows_in_outage": float(inside.mean()),
         "inside": [float(signed_root(square[inside].mean())) for square in squares],
         "outside": [float(signed_root(square[~inside].mean())) for square in squares],
         "shrink": shrunk(m["before"].mean(), m["after"].mean()),
-        "log_likelihood_gain": m["gain"], "settings": CHOICE[m["chosen"]],
-    }  # fmt: skip
+        "log_likelihood_gain": m["gain"],
+        "settings": CHOICE[m["chosen"]],
+    }
 
 
 def _resampled(measured, rng):
@@ -189,4 +217,6 @@ def median_with_interval(values, rng):
 
 def shrunk(before, after):
     """Share of the gap's square that is gone; a gap below zero is left, too."""
-    return float(1 - abs(after) / before) if before > 0 else float("nan")
+    if before > 0:
+        return float(1 - abs(after) / before)
+    return float("nan")

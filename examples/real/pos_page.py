@@ -49,7 +49,9 @@ def windows_told(row):
 
 
 def percent(value):
-    return "-" if value is None else f"{value:.0%}"
+    if value is None:
+        return "-"
+    return f"{value:.0%}"
 
 
 def setting_told(settings):
@@ -71,22 +73,33 @@ def write(out, one, r, cycles, measured, believed, models):
     by_outage = picture(out / "gap_by_outage.png", draw_by_outage, (7.6, 3.2), r)
     parts = [errors(r, drawn), where(r, by_time), which(r), shrinking(r, by_outage)]
     write_page(
-        out / "pos_gap.html", "Simulated against real POS error",
+        out / "pos_gap.html",
+        "Simulated against real POS error",
         "A MEMS GNSS/INS on a real drive, GNSS withheld 60 s in every 150 s",
-        headline(r), REAL, parts,
-    )  # fmt: skip
+        headline(r),
+        REAL,
+        parts,
+    )
     return out / "pos_gap.html"
 
 
 def headline(r):
     """Sentences for the top."""
     pairs = [p for p in r["pairs"] if "position_noise" in p["verdict"].split("+")]
-    count, lost = r["named"].get("two outages", {}), r["all"]["inside"]
+    count = r["named"].get("two outages", {})
+    lost = r["all"]["inside"]
     named = sum(k for label, k in count.items() if "position_noise" in label.split("+"))
-    alone, every = count.get("position_noise", 0), sum(count.values())
+    alone = count.get("position_noise", 0)
+    every = sum(count.values())
     told = [p for p in pairs if p["windows"]]
-    found = np.median([p["outage_found"] for p in told]) if told else 0.0
-    right = np.median([p["found_in_outage"] for p in told]) if told else 0.0
+    if told:
+        found = np.median([p["outage_found"] for p in told])
+    else:
+        found = 0.0
+    if told:
+        right = np.median([p["found_in_outage"] for p in told])
+    else:
+        right = 0.0
     return [
         "The real POS is not the believed one: its position is noisier in windows of time. Shown "
         f"two outages, the diagnosis says so in {named} of {every} cases "
@@ -113,10 +126,15 @@ def errors(r, drawn):
             f"{r['within_2_sigma'][0]:.0%} of the real errors lie within 2 sigma as believed, "
             f"{r['within_2_sigma'][1]:.0%} with the outages (95 % would be right).",
         ],
-        "pictures": [(drawn, "Real error (black) with 2 sigma as believed (orange) and of the "
-                      "simulator that is told of the outages (blue; cut where it leaves the "
-                      "axis). Grey: GNSS was withheld.")],
-    }  # fmt: skip
+        "pictures": [
+            (
+                drawn,
+                "Real error (black) with 2 sigma as believed (orange) and of the "
+                "simulator that is told of the outages (blue; cut where it leaves the "
+                "axis). Grey: GNSS was withheld.",
+            )
+        ],
+    }
 
 
 def where(r, by_time):
@@ -135,11 +153,16 @@ def where(r, by_time):
             f"to the next: only {interval(r['medians']['innovations_in_outage'], 100)} % of "
             "theirs (median) lie inside.",
         ],
-        "pictures": [(by_time, "Gap by the time from the start of the outage, all outages "
-                      "together: by the squared misfit (left) and by innovations (right), as "
-                      "believed and once the simulator is told of the outages. The scale is "
-                      "linear below 10 mm. Grey: GNSS was withheld.")],
-    }  # fmt: skip
+        "pictures": [
+            (
+                by_time,
+                "Gap by the time from the start of the outage, all outages "
+                "together: by the squared misfit (left) and by innovations (right), as "
+                "believed and once the simulator is told of the outages. The scale is "
+                "linear below 10 mm. Grey: GNSS was withheld.",
+            )
+        ],
+    }
 
 
 def which(r):
@@ -157,18 +180,33 @@ def which(r):
 
 
 def pairs_table(r):
-    head = ("window (s of week)", "diagnosis", "probability", "noisier in (s)",
-            "of the outages found", "of that in outages")  # fmt: skip
+    head = (
+        "window (s of week)",
+        "diagnosis",
+        "probability",
+        "noisier in (s)",
+        "of the outages found",
+        "of that in outages",
+    )
     rows = [
-        (f"{p['span'][0]:.0f} to {p['span'][1]:.0f}", words(p["verdict"]),
-         f"{p['probability']:.2f}", windows_told(p), percent(p["outage_found"]),
-         percent(p["found_in_outage"]))
+        (
+            f"{p['span'][0]:.0f} to {p['span'][1]:.0f}",
+            words(p["verdict"]),
+            f"{p['probability']:.2f}",
+            windows_told(p),
+            percent(p["outage_found"]),
+            percent(p["found_in_outage"]),
+        )
         for p in r["pairs"]
-    ]  # fmt: skip
-    return head, rows, (
-        f"Two outages each. 'Noisier in' counts from {FIRST:.0f} s, when GNSS was withheld for "
-        "the first time: outages are 0 to 60 s, 150 to 210 s, and so on."
-    )  # fmt: skip
+    ]
+    return (
+        head,
+        rows,
+        (
+            f"Two outages each. 'Noisier in' counts from {FIRST:.0f} s, when GNSS was withheld for "
+            "the first time: outages are 0 to 60 s, 150 to 210 s, and so on."
+        ),
+    )
 
 
 def cycles_table(r):
@@ -177,11 +215,15 @@ def cycles_table(r):
         (f"{c['outage'][0]:.0f}", words(c["verdict"]), f"{c['probability']:.2f}")
         for c in r["cycles"]
     ]
-    return ("outage from (s)", "diagnosis", "probability"), rows, (
-        "One outage each. Alone it is a single event, which one error of the position that comes "
-        f"and goes ({words('position_bump')}) may explain, too: named in {bumps} of "
-        f"{len(r['cycles'])}."
-    )  # fmt: skip
+    return (
+        ("outage from (s)", "diagnosis", "probability"),
+        rows,
+        (
+            "One outage each. Alone it is a single event, which one error of the position that "
+            f"comes and goes ({words('position_bump')}) may explain, too: named in {bumps} of "
+            f"{len(r['cycles'])}."
+        ),
+    )
 
 
 def quiet_table(r):
@@ -193,26 +235,48 @@ def quiet_table(r):
         "if nothing is wrong (mm)",
     )
     rows = [
-        (f"{q['span'][0]:.0f} to {q['span'][1]:.0f}", words(q["verdict"]), f"{q['p_value']:.2f}",
-         f"{q['gap']:.0f}", "{:.0f} to {:.0f}".format(*q["null_band"]))
+        (
+            f"{q['span'][0]:.0f} to {q['span'][1]:.0f}",
+            words(q["verdict"]),
+            f"{q['p_value']:.2f}",
+            f"{q['gap']:.0f}",
+            "{:.0f} to {:.0f}".format(*q["null_band"]),
+        )
         for q in r["quiet"]
-    ]  # fmt: skip
-    return head, rows, (
-        "The same real drive before the first outage: whether the diagnosis alarms without "
-        "reason. The real error has jolts of up to a decimetre there, too."
-    )  # fmt: skip
+    ]
+    return (
+        head,
+        rows,
+        (
+            "The same real drive before the first outage: whether the diagnosis alarms without "
+            "reason. The real error has jolts of up to a decimetre there, too."
+        ),
+    )
 
 
 def shrinking(r, by_outage):
     """How far the gap shrinks once the simulator is told of the outages."""
-    head = ("outage from (s)", "before (mm)", "after (mm)", "shrink", "inside (mm)",
-            "outside (mm)", "settings chosen on the others")  # fmt: skip
+    head = (
+        "outage from (s)",
+        "before (mm)",
+        "after (mm)",
+        "shrink",
+        "inside (mm)",
+        "outside (mm)",
+        "settings chosen on the others",
+    )
     rows = [
-        (f"{c['outage'][0]:.0f}", f"{c['before']:.0f}", f"{c['after']:.0f}", f"{c['shrink']:.0%}",
-         "{:.0f} → {:.0f}".format(*c["inside"]), "{:.0f} → {:.0f}".format(*c["outside"]),
-         setting_told(c["settings"]))
+        (
+            f"{c['outage'][0]:.0f}",
+            f"{c['before']:.0f}",
+            f"{c['after']:.0f}",
+            f"{c['shrink']:.0%}",
+            "{:.0f} → {:.0f}".format(*c["inside"]),
+            "{:.0f} → {:.0f}".format(*c["outside"]),
+            setting_told(c["settings"]),
+        )
         for c in r["cycles"]
-    ]  # fmt: skip
+    ]
     return {
         "title": "How far the gap shrinks",
         "text": [
@@ -222,16 +286,29 @@ def shrinking(r, by_outage):
             *shrinking_told(r),
             stays_told(r),
         ],
-        "pictures": [(by_outage, "Gap of each outage and the 45 s before and after it. Bars: "
-                      "95 % of what it is if the respective simulator is right.")],
-        "tables": [(head, rows, "Gap by innovations, of the whole window, and of the targets in "
-                    "and out of the outage.")],
-    }  # fmt: skip
+        "pictures": [
+            (
+                by_outage,
+                "Gap of each outage and the 45 s before and after it. Bars: "
+                "95 % of what it is if the respective simulator is right.",
+            )
+        ],
+        "tables": [
+            (
+                head,
+                rows,
+                "Gap by innovations, of the whole window, and of the targets in "
+                "and out of the outage.",
+            )
+        ],
+    }
 
 
 def shrinking_told(r):
     """The gap before and after, in paragraphs."""
-    m, lost, held = r["medians"], r["all"]["inside"], r["all"]["outside"]
+    m = r["medians"]
+    lost = r["all"]["inside"]
+    held = r["all"]["outside"]
     return [
         f"Median over {len(r['cycles'])} outages: {interval(m['before'])} mm before, "
         f"{interval(m['after'])} mm after (negative: the simulator now expects more); "
@@ -255,6 +332,8 @@ def stays_told(r):
         "simulated sigma in E, N and H (RMS). Height ends above the truth in {} of {} outages (by "
         "chance: {:.3f}): the real drift is not of zero mean there, as the simulated one is."
     ).format(
-        *r["stays"]["over_sigma"], r["stays"]["positive"][2], len(r["cycles"]),
+        *r["stays"]["over_sigma"],
+        r["stays"]["positive"][2],
+        len(r["cycles"]),
         r["stays"]["chance"][2],
-    )  # fmt: skip
+    )

@@ -48,7 +48,9 @@ STEP = 0.005  # s between epochs: the attitude is given with each point
 BELIEVED_SCANNER = Scanner(0.02, np.radians(0.01), 10.0)  # Velodyne HDL-32E: 2 cm, 0.01 deg, 10 Hz
 # What our simulator's MEMS unit states with GNSS; 2 cm as RTK does.
 BELIEVED_POS = Pos(0.02, np.radians([0.0136, 0.0136, 0.10]))
-FOLDS, SQUARE = 4, 1.0  # held-out planes, by squares of the ground (m)
+# held-out planes, by squares of the ground (m)
+FOLDS = 4
+SQUARE = 1.0
 CHANCE = 100  # replicas for the p-value
 
 
@@ -66,7 +68,9 @@ def main():
     arguments = parse()
     files = [FILES.format(name) for name in SCENES]
     needed(DATA, files, "Car.adc.laz and Tent.adc.laz of coin-or/Gravity, with a time per point")
-    result, scenes, turned = {}, {}, {}
+    result = {}
+    scenes = {}
+    turned = {}
     for name in SCENES:
         scenes[name] = scene(name)
         answer = study(scenes[name], np.random.default_rng(arguments.seed))
@@ -114,10 +118,17 @@ def scene(name):
     none = ControlPoints((), np.zeros((0, 3)), np.zeros((0, 3)), (), np.zeros(0), np.zeros((0, 3)))
     path = DATA / f"{name}.adc.laz"
     survey = Survey(
-        name, path, None, (CloudFile(path, len(time), 0.0, "GPS seconds"),), trajectory,
-        Mounting(np.zeros(3), Rotation.from_matrix(BEAM)), none, none,
-        BELIEVED_SCANNER, BELIEVED_POS,
-    )  # fmt: skip
+        name,
+        path,
+        None,
+        (CloudFile(path, len(time), 0.0, "GPS seconds"),),
+        trajectory,
+        Mounting(np.zeros(3), Rotation.from_matrix(BEAM)),
+        none,
+        none,
+        BELIEVED_SCANNER,
+        BELIEVED_POS,
+    )
     own = Trajectory(1000.0 + np.arange(len(time)), place, attitude)  # the pose of each point
     beam = to_scanner(own, survey.mounting, xyz, own.gps_time)
     again = georeference(trajectory, survey.mounting, beam, time)
@@ -128,7 +139,9 @@ def scene(name):
 def _epochs(time, place, attitude):
     """Times, positions and attitudes of one pass in even steps, from those of its points."""
     _, first = np.unique(time, return_index=True)
-    time, place, attitude = time[first], place[first], attitude[first]
+    time = time[first]
+    place = place[first]
+    attitude = attitude[first]
     even = np.append(np.arange(time[0], time[-1], STEP), time[-1])
     even = even[np.append(np.diff(even) > 1e-6, True)]
     moved = np.column_stack([np.interp(even, time, column) for column in place.T])
@@ -144,21 +157,24 @@ def study(scene, rng, folds=FOLDS, chance=CHANCE):
     calibration = tie_mounting(survey, start, Matched.none(), collector.features())
     if calibration.ties is None:
         return None
-    ties, estimate = calibration.ties.ties, calibration.lsc
+    ties = calibration.ties.ties
+    estimate = calibration.lsc
     after = np.array(ties.misclosure)
     for out in _folds(ties, folds):
         rest = calibration_with_ties(calibration, Matched.none(), ties[~out])
         after[out] = misfit(survey, rest.lsc.mounting, ties[out])
     calibrated = remounted(scene, estimate.mounting)
     return {
-        "points": len(scene.cloud), "planes": len(ties),
+        "points": len(scene.cloud),
+        "planes": len(ties),
         "pose_check": float(np.percentile(scene.away, 95) * 1e3),
         "boresight": np.degrees(estimate.correction[3:]).tolist(),
         "sigma": np.degrees(estimate.sigma[3:]).tolist(),
         "determined": calibration.determined[3:].tolist(),
-        "before": (1e3 * ties.misclosure).tolist(), "after": (1e3 * after).tolist(),
+        "before": (1e3 * ties.misclosure).tolist(),
+        "after": (1e3 * after).tolist(),
         "left": left(calibrated, rng, chance),
-    }, calibrated.cloud.xyz  # fmt: skip
+    }, calibrated.cloud.xyz
 
 
 def misfit(survey, mounting, ties):
@@ -171,7 +187,8 @@ def misfit(survey, mounting, ties):
 
 def remounted(scene, mounting):
     """The scene as another mounting gives it."""
-    survey, time = scene.survey, scene.cloud.gps_time
+    survey = scene.survey
+    time = scene.cloud.gps_time
     beam = to_scanner(survey.trajectory, survey.mounting, scene.cloud.xyz, time)
     xyz = georeference(survey.trajectory, mounting, beam, time)
     mounted = replace(survey, mounting=mounting)
@@ -181,18 +198,23 @@ def remounted(scene, mounting):
 def left(scene, rng, chance):
     """What the diagnosis says of planes of both passes, plain; None where there are none."""
     patches = find_patches(scene.survey, chunks=lambda file: [scene.cloud])
-    rows = None if patches is None else shared_rows(scene.survey, patches, rng)
+    if patches is None:
+        rows = None
+    else:
+        rows = shared_rows(scene.survey, patches, rng)
     if rows is None:
         return None
     signs, _ = signatures(rows, scene.survey)
     seen = background(rows, scene.survey)
     answer = infer_causes(rows, seen, scene.survey, signs, rng, chance)
     return {
-        "planes": len(rows), "median": float(1e3 * np.median(np.abs(rows.residual))),
-        "verdict": answer.verdict.label, "probability": answer.verdict.probability,
+        "planes": len(rows),
+        "median": float(1e3 * np.median(np.abs(rows.residual))),
+        "verdict": answer.verdict.label,
+        "probability": answer.verdict.probability,
         "p_value": answer.verdict.p_value,
         "causes": [[c.effect, c.probability] for c in answer.causes[:6]],
-    }  # fmt: skip
+    }
 
 
 def _folds(ties, folds):

@@ -54,10 +54,13 @@ def write(out, scenes, result, turned):
         for name, r in result.items()
     ]
     write_page(
-        out / "two_pass_gap.html", "Why two real passes don't meet",
+        out / "two_pass_gap.html",
+        "Why two real passes don't meet",
         "Two passes of a UAV scanner over a car and over a tent: the mounting, and what it leaves",
-        [headline(name, r) for name, r in result.items()], REAL, parts,
-    )  # fmt: skip
+        [headline(name, r) for name, r in result.items()],
+        REAL,
+        parts,
+    )
     return out / "two_pass_gap.html"
 
 
@@ -142,7 +145,8 @@ def paragraphs(r):
 def draw_misfit(figure, r):
     """Misfit of each plane before and after."""
     axes = figure.subplots()
-    before, after = np.array(r["before"]), np.array(r["after"])
+    before = np.array(r["before"])
+    after = np.array(r["after"])
     order = np.argsort(before)
     place = np.arange(len(order))
     axes.axhline(0, color=GREY, lw=0.8)
@@ -174,5 +178,6 @@ def draw_slice(figure, scene, xyz, r):
         panel.set(title=title, xlabel="across the first pass (m)")
         panel.set_aspect("equal")
     panels[0].set_ylabel("height (m)")
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2,
-                  markerscale=5)  # fmt: skip
+    figure.legend(
+        *panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, markerscale=5
+    )

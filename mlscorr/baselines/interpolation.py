@@ -81,7 +81,8 @@ def fit_gaussian_process(trajectory: Trajectory, matched: Matched) -> Correction
             "Scale, correlation time and noise of a Gaussian process need control points at 3 "
             f"epochs at least; here are {len(epochs)}, {SAME_EPOCH:.0f} s or more apart."
         )
-    span, first = float(np.ptp(epochs)), epochs[0]
+    span = float(np.ptp(epochs))
+    first = epochs[0]
     error = np.zeros((len(trajectory), 3))
     for axis, values in enumerate(misclosure.T):
         size = max(float(np.var(values)), 1e-6)  # m^2; a millimetre where all are the same
@@ -99,12 +100,16 @@ def fit_gaussian_process(trajectory: Trajectory, matched: Matched) -> Correction
 def _fit(trajectory, matched, curve: Curve, cut):
     """The position error of each stretch by a curve through its control epochs."""
     epochs, misclosure = _by_epoch(matched)
-    restarts = drift_history(trajectory).steps.middle if cut else np.empty(0)
+    if cut:
+        restarts = drift_history(trajectory).steps.middle
+    else:
+        restarts = np.empty(0)
     of_epoch = np.searchsorted(restarts, epochs)
     of_time = np.searchsorted(restarts, trajectory.gps_time)
     error = curve(epochs, misclosure, trajectory.gps_time)  # for stretches without control
     for stretch in np.unique(of_epoch):
-        inside, rows = of_epoch == stretch, of_time == stretch
+        inside = of_epoch == stretch
+        rows = of_time == stretch
         error[rows] = curve(epochs[inside], misclosure[inside], trajectory.gps_time[rows])
     return _correction(trajectory, error)
 

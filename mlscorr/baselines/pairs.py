@@ -45,7 +45,8 @@ class CentredPairs:
             raise Undetermined(
                 "A transformation needs control points that were found in the cloud; there is none."
             )
-        observations, variance = matched.observations, np.mean(matched.variance, axis=1)
+        observations = matched.observations
+        variance = np.mean(matched.variance, axis=1)
         weight = 1.0 / variance
         start = np.round(observations.position[0])  # keeps the digits of the mean
         origin = start + np.average(observations.position - start, axis=0, weights=weight)
@@ -93,7 +94,8 @@ class CentredPairs:
                 f"lie on one {shape}; there {'is' if self.targets == 1 else 'are'} {self.targets}."
             )
         spread = self.spread(axes)[dimensions - 1]
-        sigma, digits = float(np.median(self.sigma)), 1e-9 * float(np.abs(self.origin).max())
+        sigma = float(np.median(self.sigma))
+        digits = 1e-9 * float(np.abs(self.origin).max())
         least = max(SETTINGS.clear_spread * sigma, digits)
         if spread < least:
             raise Undetermined(

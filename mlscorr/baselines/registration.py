@@ -76,17 +76,24 @@ def fit_icp(matched: Matched, cloud: PointCloud, pass_number: np.ndarray) -> Reg
     score = evaluate(source, surface, SETTINGS.inlier, matrix)
     change = matrix[:3, :3] - np.eye(3)
     registration = Registration(
-        pairs.origin, matrix[:3, 3].copy(), change, variant=variant, fitness=float(score.fitness),
-        inlier_rmse=float(score.inlier_rmse), control_before=_control_rmse(pairs, np.eye(4)),
+        pairs.origin,
+        matrix[:3, 3].copy(),
+        change,
+        variant=variant,
+        fitness=float(score.fitness),
+        inlier_rmse=float(score.inlier_rmse),
+        control_before=_control_rmse(pairs, np.eye(4)),
         control_after=_control_rmse(pairs, matrix),
-    )  # fmt: skip
+    )
     _warn(registration)
     return registration
 
 
 def _motions(source, surface, largest):
     """Variant and 4 x 4 matrix of the ICP of each kind within each distance, coarse to fine."""
-    motions, point, within = [], np.eye(4), largest
+    motions = []
+    point = np.eye(4)
+    within = largest
     while True:
         point = _register(source, surface, within, point, "PointToPoint")
         plane = _register(source, surface, within, point, "PointToPlane")
@@ -105,7 +112,8 @@ def _control_rmse(pairs, matrix):
 
 def _warn(registration):
     """Say aloud what makes the registration doubtful."""
-    variant, fitness = registration.variant, registration.fitness
+    variant = registration.variant
+    fitness = registration.fitness
     if fitness < SETTINGS.poor_fitness:
         warnings.warn(
             f"ICP ({variant}) brings only {100 * fitness:.0f} % of the targets' points within "
@@ -138,8 +146,11 @@ def _register(source, surface, largest, start, estimation):
 def _surfaces(matched, cloud, pass_number, origin):
     """The targets' points and the surveyed surfaces about the origin, as Open3D clouds."""
     tree = cKDTree(cloud.xyz)
-    source, surface, normals = [], [], []
-    observations, surveyed = matched.observations, matched.surveyed
+    source = []
+    surface = []
+    normals = []
+    observations = matched.observations
+    surveyed = matched.surveyed
     for i in range(len(matched)):
         axes = _axes(observations.normal[i])
         local = _points_on(observations, i, axes, tree, cloud, pass_number)
@@ -171,12 +182,16 @@ def _axes(normal):
 def _points_on(observations, i, axes, tree, cloud, pass_number):
     """Bright points (n, 2) of one target in its plane, about its observed centre. Units: m."""
     size = observations.size[i]
-    radius = size / 2 if observations.kind[i] == "circle" else size / np.sqrt(2)
+    if observations.kind[i] == "circle":
+        radius = size / 2
+    else:
+        radius = size / np.sqrt(2)
     rows = np.array(tree.query_ball_point(observations.position[i], radius), dtype=int)
     rows = np.sort(rows[pass_number[rows] == observations.pass_number[i]])
     local = (cloud.xyz[rows] - observations.position[i]) @ axes.T
     on_plane = np.abs(local[:, 2]) < SETTINGS.plane_tolerance
-    local, intensity = local[on_plane, :2], cloud.intensity[rows[on_plane]]
+    local = local[on_plane, :2]
+    intensity = cloud.intensity[rows[on_plane]]
     core = np.linalg.norm(local, axis=1) < size / 3  # inside of any outline
     return local[intensity >= 0.5 * (np.median(intensity[core]) if core.any() else 0.0)]
 

@@ -32,7 +32,9 @@ class AnsweredCase:
     def verdict(self) -> dict:
         """The verdict; of a diagnosis that failed a label that is never right."""
         failed = {"label": "failed", "probability": 1.0, "set": [], "p_value": None, "lead": ""}
-        return self.document["verdict"] if self.document else failed
+        if self.document:
+            return self.document["verdict"]
+        return failed
 
     @property
     def named(self) -> str:
@@ -63,7 +65,9 @@ class AnsweredCase:
     def truth(self) -> str:
         """The label that is right."""
         mechanism = self.label["mechanism"]
-        return mechanism["name"] if mechanism else "+".join(self.label["names"]) or "none"
+        if mechanism:
+            return mechanism["name"]
+        return "+".join(self.label["names"]) or "none"
 
     @property
     def is_noise(self) -> bool:
@@ -94,7 +98,8 @@ class AnsweredCase:
     @property
     def leads(self) -> bool:
         """Whether the lead has one of the words of each entry."""
-        lead, entries = self.verdict["lead"], self.label["mechanism"]["lead"]
+        lead = self.verdict["lead"]
+        entries = self.label["mechanism"]["lead"]
         return all(any(word in lead for word in entry.split("|")) for entry in entries)
 
     def names(self, label: str, by_class: bool = False) -> bool:
@@ -106,7 +111,8 @@ class AnsweredCase:
         by_class : bool
             Also what the geometry can't tell from it.
         """
-        parts, truth = label.split("+"), self.label["names"] or ["none"]
+        parts = label.split("+")
+        truth = self.label["names"] or ["none"]
         if len(parts) != len(truth):
             return False
         if not by_class:

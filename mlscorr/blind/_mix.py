@@ -55,7 +55,8 @@ def causes(is_random: bool = False) -> tuple[str, ...]:
 
 
 def _case(kind, turns, rng):
-    names, mdb = (), 0.0
+    names = ()
+    mdb = 0.0
     if kind == "pair":
         names = tuple(map(str, rng.choice(causes(), 2, replace=False)))
     elif kind in turns:

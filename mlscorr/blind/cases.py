@@ -19,9 +19,12 @@ TRUTH = ("truth.json", "truth.npz")
 
 
 def make_case(
-    folder: Path, case: Case, entropy: tuple[int, ...], find_targets: Callable,
+    folder: Path,
+    case: Case,
+    entropy: tuple[int, ...],
+    find_targets: Callable,
     mechanisms: Path | None = None,
-) -> dict:  # fmt: skip
+) -> dict:
     """Write the survey of a Case into a folder, without its truth; returns its label.
 
     Parameters
@@ -65,13 +68,21 @@ def _drawn(name, case, entropy, find_targets, mechanisms):
     """Label and SimulatedSurvey of one try; the label is None when nothing shows."""
     from mlscorr.simulate import DisplacedSurvey, random_survey
 
-    survey, rng = random_survey((*entropy, 0), name), np.random.default_rng((*entropy, 1))
+    survey = random_survey((*entropy, 0), name)
+    rng = np.random.default_rng((*entropy, 1))
     pos = survey.scenario.pos
     label = {
         "sky": "bad" if pos.outages or pos.canyons else "open",
-        "kind": case.kind, "names": [], "mdb": [], "without": case.without, "effects": [],
-        "parameters": {}, "normal": {}, "likeness": {}, "mechanism": None,
-    }  # fmt: skip
+        "kind": case.kind,
+        "names": [],
+        "mdb": [],
+        "without": case.without,
+        "effects": [],
+        "parameters": {},
+        "normal": {},
+        "likeness": {},
+        "mechanism": None,
+    }
     if case.kind == "clean":
         return label, survey
     ruler = _ruler(survey, find_targets)
@@ -85,10 +96,15 @@ def _drawn(name, case, entropy, find_targets, mechanisms):
         mechanism, _, like = moved
         _, (unit, _), lead = outside[mechanism.name]
         label |= {
-            "mdb": [case.mdb], "likeness": {mechanism.name: like},
-            "mechanism": {"name": mechanism.name, "size": mechanism.size, "unit": unit,
-                          "lead": list(lead)},
-        }  # fmt: skip
+            "mdb": [case.mdb],
+            "likeness": {mechanism.name: like},
+            "mechanism": {
+                "name": mechanism.name,
+                "size": mechanism.size,
+                "unit": unit,
+                "lead": list(lead),
+            },
+        }
         return label, DisplacedSurvey.of(survey, mechanism)
     names = names_to_try(causes(case.kind == "noise"), rng, case.names)
     drawn = draw_effects(ruler, known, names, len(case.names), case.mdb, rng)
@@ -109,7 +125,8 @@ def _ruler(survey, find_targets):
         survey.write(Path(place) / "survey")
         read = read_survey(Path(place) / "survey")
         finding = find_targets(read)
-        matched, patches = finding.matches.matched, find_patches(read)
+        matched = finding.matches.matched
+        patches = find_patches(read)
         return Ruler.of(build_rows(read, matched, finding.candidates, patches).rows, read)
 
 
@@ -141,4 +158,6 @@ def outside_mechanisms(path: Path | None = None) -> Described:
     FileNotFoundError
         When the file is.
     """
-    return described(grading_mechanisms()) if path is None else load_mechanisms(path)
+    if path is None:
+        return described(grading_mechanisms())
+    return load_mechanisms(path)

@@ -46,8 +46,9 @@ def _rates(answered):
     at_2 = [case for case in single if case.goal_size == 2]
     at_3 = [case for case in single if case.is_clear]
     for where, some, goal, wider in (
-        ("2 MDB", at_2, 0.85, 0.88), ("3 MDB and more", at_3, 0.95, 0.97),
-    ):  # fmt: skip
+        ("2 MDB", at_2, 0.85, 0.88),
+        ("3 MDB and more", at_3, 0.95, 0.97),
+    ):
         strict, by_class = ([case.names(case.named, c) for case in some] for c in (False, True))
         yield _share(f"right at {where}", strict, goal)
         yield _share(f"right at {where}, by class", by_class, wider)
@@ -122,14 +123,19 @@ def _figure(name, values, statistic, minimum=None, maximum=None):
     if not values:
         return None
     values = np.array(values, dtype=float)
-    value, number = float(statistic(values)), np.arange(len(values))
+    value = float(statistic(values))
+    number = np.arange(len(values))
     interval = (value, value)
     if len(values) > 1:
         drawn = bootstrap(
-            (number,), lambda index: statistic(values[index]),
-            confidence_level=INFERENCE.confidence, n_resamples=1000, method="percentile",
-            vectorized=False, random_state=np.random.default_rng(0),
-        )  # fmt: skip
+            (number,),
+            lambda index: statistic(values[index]),
+            confidence_level=INFERENCE.confidence,
+            n_resamples=1000,
+            method="percentile",
+            vectorized=False,
+            random_state=np.random.default_rng(0),
+        )
         interval = drawn.confidence_interval
     return _row(name, len(values), value, interval, minimum, maximum)
 
@@ -139,16 +145,22 @@ def _row(name, cases, value, interval, minimum, maximum):
     if minimum is not None or maximum is not None:
         reached = (minimum is None or value >= minimum) and (maximum is None or value <= maximum)
     return {
-        "name": name, "cases": cases, "value": value, "interval": [float(v) for v in interval],
-        "goal": [minimum, maximum], "reached": reached,
-    }  # fmt: skip
+        "name": name,
+        "cases": cases,
+        "value": value,
+        "interval": [float(v) for v in interval],
+        "goal": [minimum, maximum],
+        "reached": reached,
+    }
 
 
 def _closed(case):
     """Share of the gap that closed on held-out data, zero where nothing was found; None where the
     gap was within chance before.
     """
-    return case.document["closure"]["shrink"] if case.document else 0.0
+    if case.document:
+        return case.document["closure"]["shrink"]
+    return 0.0
 
 
 def _estimates(case):
@@ -156,12 +168,15 @@ def _estimates(case):
     if case.document is None or not case.names(case.named):
         return None
     cause = next((c for c in case.document["causes"] if c["effect"] == case.named), None)
-    return None if cause is None else {p["name"]: p for p in cause["parameters"]}
+    if cause is None:
+        return None
+    return {p["name"]: p for p in cause["parameters"]}
 
 
 def _inside(case):
     """For each parameter, whether its 95 % interval holds the truth."""
-    estimates, true = _estimates(case), case.label["parameters"]
+    estimates = _estimates(case)
+    true = case.label["parameters"]
     if estimates is None:
         return []
     return [
@@ -173,11 +188,13 @@ def _inside(case):
 
 def _error(case):
     """Error of the magnitudes over their size, in the metric of what the rows show."""
-    estimates, true = _estimates(case), case.label["parameters"][case.named]
+    estimates = _estimates(case)
+    true = case.label["parameters"][case.named]
     true = {name: value for name, value in true.items() if name not in ("time", "width")}
     if estimates is None or not set(true) <= set(estimates):
         return None
-    normal, values = np.array(case.label["normal"][case.named]), np.array(list(true.values()))
+    normal = np.array(case.label["normal"][case.named])
+    values = np.array(list(true.values()))
     off = np.array([estimates[name]["estimate"] for name in true]) - values
     return float(np.sqrt((off @ normal @ off) / (values @ normal @ values)))
 
@@ -185,8 +202,14 @@ def _error(case):
 def _wrong(case):
     """A case to learn from."""
     return {
-        "case": case.name, "kind": case.kind, "truth": case.truth, "mdb": case.mdb,
-        "said": case.named, "probability": case.verdict["probability"], "set": case.verdict["set"],
-        "lead": case.verdict["lead"], "without": case.label["without"],
+        "case": case.name,
+        "kind": case.kind,
+        "truth": case.truth,
+        "mdb": case.mdb,
+        "said": case.named,
+        "probability": case.verdict["probability"],
+        "set": case.verdict["set"],
+        "lead": case.verdict["lead"],
+        "without": case.label["without"],
         "resembles": case.resemblance if case.label["likeness"] else None,
-    }  # fmt: skip
+    }

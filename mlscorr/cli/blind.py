@@ -85,4 +85,8 @@ def _table(rows):
 def _goal(low, high):
     if low is not None and high is not None:
         return f"{low:g} to {high:g}"
-    return f">= {low:g}" if low is not None else f"<= {high:g}" if high is not None else ""
+    if low is not None:
+        return f">= {low:g}"
+    if high is not None:
+        return f"<= {high:g}"
+    return ""

@@ -67,7 +67,10 @@ def _tell_mounting(content, methods):
                 for method in methods.values()
             )
             about = f"{part.replace('_', ' ')} {'about ' * (start > 0)}{name} ({unit})"
-            determined = "yes" if content["determined"][start + axis] else "no"
+            if content["determined"][start + axis]:
+                determined = "yes"
+            else:
+                determined = "no"
             say(f"{about:34s}{numbers}  {determined}")
 
 

@@ -51,6 +51,9 @@ def _list(title: str, lines: Sequence[str]) -> None:
 
 def _amount(amount):
     """An Amount in one line."""
-    digits = 0 if amount.number >= 10 or amount.number == int(amount.number) else 1
+    if amount.number >= 10 or amount.number == int(amount.number):
+        digits = 0
+    else:
+        digits = 1
     number = f"{amount.number:,.{digits}f}".replace(",", " ")
     return f"{amount.what}: {number}{' ' * bool(amount.unit)}{amount.unit} ({amount.source})"

@@ -121,7 +121,8 @@ def _tell_rounds(ablation):
         words = f"{title(row['effect'])} alone"
         terminal.say(f"{words:34s}{row['before']:9.1f} mm{row['after']:7.1f} mm")
     for row in ablation["rounds"]:
-        words, unit = f"round {row['round']}: {title(row['label'])}", row["unit"]
+        words = f"round {row['round']}: {title(row['label'])}"
+        unit = row["unit"]
         before, after = (signed(row[when], unit) for when in ("before", "after"))
         terminal.say(f"{words:34s}{before:>12s}{after:>10s}")
     terminal.say(ablation["ended"])

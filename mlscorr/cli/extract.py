@@ -6,9 +6,12 @@ from mlscorr.cli.work import print_json, work
 
 
 def extract(
-    survey: SurveyArgument, out: Out, overwrite: Overwrite = False, as_json: Json = False,
+    survey: SurveyArgument,
+    out: Out,
+    overwrite: Overwrite = False,
+    as_json: Json = False,
     quiet: Quiet = False,
-) -> None:  # fmt: skip
+) -> None:
     """List all target-like objects in the cloud of a survey, with or without control points."""
     with work(out, overwrite, survey) as progress:
         from mlscorr.survey import counted

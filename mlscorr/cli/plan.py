@@ -6,9 +6,13 @@ from mlscorr.cli.work import print_json, work
 
 
 def plan(
-    survey: SurveyArgument, out: Out, effects: Effects = None, overwrite: Overwrite = False,
-    as_json: Json = False, quiet: Quiet = False,
-) -> None:  # fmt: skip
+    survey: SurveyArgument,
+    out: Out,
+    effects: Effects = None,
+    overwrite: Overwrite = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
     """Tell which effects a planned survey can show and tell apart; it needs no cloud."""
     with work(out, overwrite, survey, planned=True):
         content = mlscorr.plan(mlscorr.read_survey(survey, planned=True)).write(out, overwrite)
@@ -19,7 +23,10 @@ def plan(
     say(f"{'Smallest effect that shows':39s}{'':>9s}  {'unit':12s}  usual size")
     for parts in content["detectable"].values():
         for part in parts:
-            usual = "" if part["typical"] is None else f"{part['typical']:.3g}"
+            if part["typical"] is None:
+                usual = ""
+            else:
+                usual = f"{part['typical']:.3g}"
             words = f"{parameter_title(part['name']):39s}{part['detectable']:9.3g}"
             say(f"{words}  {part['unit']:12s}  {usual}")
     for members in content["classes"]:

@@ -39,7 +39,8 @@ def _compilation_said():
     from numba.core.event import Listener, install_listener
 
     class Compilation(Listener):
-        due, is_said = float("inf"), False
+        due = float("inf")
+        is_said = False
 
         def on_start(self, _event):
             self.due = min(self.due, monotonic() + PATIENCE)
@@ -62,7 +63,8 @@ def _bars():
     with Progress(console=Console(stderr=True)) as bars:
 
         def progress(title, total):
-            task, start = bars.add_task(title, total=total, visible=False), monotonic()
+            task = bars.add_task(title, total=total, visible=False)
+            start = monotonic()
             return lambda points: bars.update(
                 task, advance=points, visible=monotonic() - start > PATIENCE
             )
@@ -71,7 +73,8 @@ def _bars():
 
 
 def _lines(title, total):
-    done, due = 0, monotonic() + PATIENCE
+    done = 0
+    due = monotonic() + PATIENCE
 
     def advance(points):
         nonlocal done, due

@@ -69,7 +69,10 @@ def tell(sentence: str) -> None:
     ----------
     sentence : str
     """
-    speak = terminal.warn if sentence.startswith(("Warning:", "Failed:")) else terminal.say
+    if sentence.startswith(("Warning:", "Failed:")):
+        speak = terminal.warn
+    else:
+        speak = terminal.say
     speak(sentence)
 
 
@@ -99,5 +102,8 @@ def status(
     if content["is_running"] is False:
         is_done = {stage["stage"]: stage["share"] == 1 for stage in content["all"]}
         is_whole = is_done.get("reports") and all(is_done.values())
-        rest = "all is done" if is_whole else "the same command with --resume goes on"
+        if is_whole:
+            rest = "all is done"
+        else:
+            rest = "the same command with --resume goes on"
         terminal.say(f"Not running: {rest}.")

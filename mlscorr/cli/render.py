@@ -49,10 +49,19 @@ def render(
         pixels = _read_size(size)
     with work(out, overwrite, survey) as progress:
         drawn = mlscorr.render(
-            mlscorr.read_survey(survey), out, corrected, pixels, overwrite, progress,
-            views=tuple(view), engine=str(engine), colour=colour and str(colour), azimuth=azimuth,
-            elevation=elevation, view_angle=view_angle,
-        )  # fmt: skip
+            mlscorr.read_survey(survey),
+            out,
+            corrected,
+            pixels,
+            overwrite,
+            progress,
+            views=tuple(view),
+            engine=str(engine),
+            colour=colour and str(colour),
+            azimuth=azimuth,
+            elevation=elevation,
+            view_angle=view_angle,
+        )
     print_json(drawn, as_json)
     for picture in drawn["pictures"]:
         say(f"{out / picture['file']}: {picture['title']}")

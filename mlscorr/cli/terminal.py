@@ -211,7 +211,10 @@ def _fail(message, code):
 def _stop(has_results):
     """End as interrupted."""
     deafen()
-    done = "all results were written before" if has_results else "nothing was written"
+    if has_results:
+        done = "all results were written before"
+    else:
+        done = "nothing was written"
     warn(f"Interrupted; {has_results if isinstance(has_results, str) else done}.")
     raise typer.Exit(Exit.INTERRUPTED) from None
 
@@ -290,7 +293,8 @@ def say_rmse(rows: Iterable[tuple[str, dict, str]], width: int, decimals: int) -
     heads = "".join(f"{f'E {when}':>11s}{'N':>8s}{'H':>8s}" for when in ("before", "after"))
     say(f"{'RMSE of misclosures (m)':{width}s}{'n':>4s}{heads}")
     for title, group, after in rows:
-        before, left = group["before"]["rmse"], group[after]["rmse"]
+        before = group["before"]["rmse"]
+        left = group[after]["rmse"]
         numbers = enumerate([*before, *left] if before and left else [])
         text = "".join(f"{v:{8 if i % 3 else 11}.{decimals}f}" for i, v in numbers)
         say(f"{title:{width}s}{group['n']:4d}{text or '  none'}")

@@ -6,9 +6,12 @@ from mlscorr.cli.work import print_json, work
 
 
 def ties(
-    survey: SurveyArgument, out: Out, overwrite: Overwrite = False, as_json: Json = False,
+    survey: SurveyArgument,
+    out: Out,
+    overwrite: Overwrite = False,
+    as_json: Json = False,
     quiet: Quiet = False,
-) -> None:  # fmt: skip
+) -> None:
     """Find walls, roads, poles and paint that two passes both saw, and how far apart they lie."""
     from mlscorr.survey import counted
 
@@ -29,6 +32,9 @@ def ties(
             if misfit["n"]
         ]
         first, second = pair["passes"]
-        which = f"Pass {first} by itself" if first == second else f"Passes {first} and {second}"
+        if first == second:
+            which = f"Pass {first} by itself"
+        else:
+            which = f"Passes {first} and {second}"
         say(f"{which}: rms {', '.join(parts)}.")
     say(f"Ties: {out / 'ties.csv'} and {out / 'ties.json'}")

@@ -14,9 +14,12 @@ NAMED = 10  # files in a sentence; more are counted
 
 @contextmanager
 def work(
-    out: Path, overwrite: bool, survey: Path | None = None, inputs: Sequence[Path] = (),
+    out: Path,
+    overwrite: bool,
+    survey: Path | None = None,
+    inputs: Sequence[Path] = (),
     planned: bool = False,
-) -> Iterator[Progress]:  # fmt: skip
+) -> Iterator[Progress]:
     """Check where results go, then show progress; bad data end with a sentence and their code.
 
     Files that were in the folder before and that the command did not write anew are named at the
@@ -43,7 +46,10 @@ def work(
         from mlscorr.io.store import announced, check_output, check_unchanged, input_file
         from mlscorr.io.surveys import input_files
 
-        files = input_files(survey, planned) if survey is not None else []
+        if survey is not None:
+            files = input_files(survey, planned)
+        else:
+            files = []
         check_output(out, [*files, *inputs], overwrite)
         states = [input_file("input", file) for file in [*files, *inputs]]
         before = _entries(out)
@@ -92,7 +98,10 @@ def _name_older(out, before):
     older = sorted(name for name, number in before.items() if after.get(name) == number)
     if not older:
         return
-    more = f" and {len(older) - NAMED} more" if len(older) > NAMED else ""
+    if len(older) > NAMED:
+        more = f" and {len(older) - NAMED} more"
+    else:
+        more = ""
     warn(
         f"Not written by this run, and left as they were in {out}: {', '.join(older[:NAMED])}"
         f"{more}. Delete them if they are results of an earlier run."

@@ -25,7 +25,8 @@ NOTHING = float(np.sqrt(np.finfo(float).tiny))
 @njit(cache=True, nogil=True)
 def _panel(pattern, values, front):
     """Values (h, b) of a front's columns, the block on the diagonal first."""
-    begin, end = pattern.node[front], pattern.node[front + 1]
+    begin = pattern.node[front]
+    end = pattern.node[front + 1]
     width = pattern.first[end] - pattern.first[begin]
     return values[pattern.start[front] : pattern.start[front + 1]].reshape((-1, width))
 
@@ -77,8 +78,10 @@ def factorise(pattern: Pattern, values: np.ndarray) -> int:
 @njit(cache=True, nogil=True)
 def _run_end(pattern, front, k):
     """End of the run of nodes below a front, from the k-th on, whose columns stand side by side."""
-    row, end = pattern.row, pattern.column[front + 1]
-    target, k = pattern.front[row[k]], k + 1
+    row = pattern.row
+    end = pattern.column[front + 1]
+    target = pattern.front[row[k]]
+    k = k + 1
     while k < end and row[k] == row[k - 1] + 1 and pattern.front[row[k]] == target:
         k += 1
     return k
@@ -87,7 +90,8 @@ def _run_end(pattern, front, k):
 @njit(cache=True, nogil=True)
 def _find_row(pattern, front, node, at):
     """Row of a front's panel where a node begins, and where in ``row`` the next is looked for."""
-    begin, end = pattern.node[front], pattern.node[front + 1]
+    begin = pattern.node[front]
+    end = pattern.node[front + 1]
     if node < end:
         return pattern.first[node] - pattern.first[begin], at
     while pattern.row[at] != node:
@@ -135,11 +139,17 @@ def _drop_nothing(panel):
 @njit(cache=True, nogil=True)
 def _subtract(pattern, values, product, front, k, run_end):
     """Subtract columns k to run_end of a product of the blocks below a front from the matrix."""
-    first, row, height = pattern.first, pattern.row, pattern.height
-    target, size = pattern.front[row[k]], first[row[run_end - 1] + 1] - first[row[k]]
-    panel, at = _panel(pattern, values, target), pattern.column[target]
+    first = pattern.first
+    row = pattern.row
+    height = pattern.height
+    target = pattern.front[row[k]]
+    size = first[row[run_end - 1] + 1] - first[row[k]]
+    panel = _panel(pattern, values, target)
+    at = pattern.column[target]
     column = first[row[k]] - first[pattern.node[target]]
-    left, top = height[k], height[pattern.column[front]]  # of all blocks below
+    # of all blocks below
+    left = height[k]
+    top = height[pattern.column[front]]
     for other in range(k, pattern.column[front + 1]):
         high, at = _find_row(pattern, target, row[other], at)
         for p in range(first[row[other] + 1] - first[row[other]]):
@@ -167,7 +177,8 @@ def solve_in_place(pattern: Pattern, values: np.ndarray, x: np.ndarray) -> None:
         panel = _panel(pattern, values, front)
         width = panel.shape[1]
         begin = pattern.first[pattern.node[front]]
-        here, below = x[begin : begin + width], panel[width:]
+        here = x[begin : begin + width]
+        below = panel[width:]
         if step < count:
             _substitute(panel, here)
             if below.shape[0] > 0:
@@ -181,7 +192,8 @@ def solve_in_place(pattern: Pattern, values: np.ndarray, x: np.ndarray) -> None:
 @njit(cache=True, nogil=True)
 def _states_below(pattern, front, count, x):
     """Rows (m, c) of x at the nodes below a front."""
-    gathered, at = np.empty((count, x.shape[1])), 0
+    gathered = np.empty((count, x.shape[1]))
+    at = 0
     for k in range(pattern.column[front], pattern.column[front + 1]):
         for state in range(pattern.first[pattern.row[k]], pattern.first[pattern.row[k] + 1]):
             for c in range(x.shape[1]):
@@ -234,7 +246,8 @@ def _inverted(lower):
     span = STRIP
     while span < width:
         for middle in range(span, width, 2 * span):
-            before, after = slice(middle - span, middle), slice(middle, min(middle + span, width))
+            before = slice(middle - span, middle)
+            after = slice(middle, min(middle + span, width))
             known = np.dot(lower[after, before].copy(), inverse[before, before].copy())
             inverse[after, before] = -np.dot(inverse[after, after].copy(), known)
         span *= 2
@@ -274,11 +287,16 @@ def invert_in_place(pattern: Pattern, values: np.ndarray) -> None:
 @njit(cache=True, nogil=True)
 def _collect(pattern, inverse, known, front, k, run_end):
     """Columns of the inverse at nodes k to run_end below a front, and their mirror image."""
-    first, row, height = pattern.first, pattern.row, pattern.height
-    source, size = pattern.front[row[k]], first[row[run_end - 1] + 1] - first[row[k]]
-    panel, at = _panel(pattern, inverse, source), pattern.column[source]
+    first = pattern.first
+    row = pattern.row
+    height = pattern.height
+    source = pattern.front[row[k]]
+    size = first[row[run_end - 1] + 1] - first[row[k]]
+    panel = _panel(pattern, inverse, source)
+    at = pattern.column[source]
     column = first[row[k]] - first[pattern.node[source]]
-    left, top = height[k], height[pattern.column[front]]
+    left = height[k]
+    top = height[pattern.column[front]]
     for other in range(k, pattern.column[front + 1]):
         high, at = _find_row(pattern, source, row[other], at)
         for p in range(first[row[other] + 1] - first[row[other]]):

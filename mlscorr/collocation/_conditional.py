@@ -78,10 +78,16 @@ def neighbours(number: int, size: int, parameters: int) -> Neighbours:
         Of signals, of states, and of the trend.
     """
     return Neighbours(
-        np.full(number, -np.inf), np.full(number, np.inf), np.zeros((number, 3, 3)),
-        np.zeros((number, 3, 3)), np.zeros((number, 3, 3)), np.zeros((number, 6)), np.zeros(number),
-        np.zeros((2 * size, parameters + 1)), np.zeros((2 * size, 2 * size)),
-    )  # fmt: skip
+        np.full(number, -np.inf),
+        np.full(number, np.inf),
+        np.zeros((number, 3, 3)),
+        np.zeros((number, 3, 3)),
+        np.zeros((number, 3, 3)),
+        np.zeros((number, 6)),
+        np.zeros(number),
+        np.zeros((2 * size, parameters + 1)),
+        np.zeros((2 * size, 2 * size)),
+    )
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -131,12 +137,16 @@ def predict_between(
     """
     before, after, whole, _, inverses, gains, remaining, columns, joint = about
     _, clocks, design, mixing, trend, root, mean, covariance = epochs
-    k, row = layout.first.size, np.zeros(joint.shape[0])
-    values, processes, mixed = np.zeros((k, columns.shape[1])), np.zeros((k, k)), np.zeros(k)
+    k = layout.first.size
+    row = np.zeros(joint.shape[0])
+    values = np.zeros((k, columns.shape[1]))
+    processes = np.zeros((k, k))
+    mixed = np.zeros(k)
     lacking = np.zeros(design.shape[1:])
     for e in range(begin, end):
         for s in range(layout.states.size):
-            x, y = clocks[e, s] - before[s], after[s] - clocks[e, s]
+            x = clocks[e, s] - before[s]
+            y = after[s] - clocks[e, s]
             remaining[s] = _gains(s, layout, x, y, whole, inverses, gains)
         _processes(layout, gains, remaining, columns, joint, row, values, processes)
         if mixing.shape[1] == mixing.shape[2] == 1:
@@ -180,8 +190,10 @@ def _gains(s, layout, before, after, whole, inverses, gains):
 
     before and after are the times to the neighbours by its clock, infinite at the ends.
     """
-    kind, states = layout.kinds[s], layout.states[s]
-    before, after = before * layout.rates[s], after * layout.rates[s]
+    kind = layout.kinds[s]
+    states = layout.states[s]
+    before = before * layout.rates[s]
+    after = after * layout.rates[s]
     q0, q1, q2, _, _, _ = process_noise(kind, before)
     f = transition(kind, after)
     c0 = q0 * f[0] + q1 * f[1] + q2 * f[2]
@@ -208,7 +220,8 @@ def _processes(layout, gains, remaining, columns, joint, row, values, covariance
     k = layout.first.size
     for j in range(k):
         s = layout.signal[j]
-        a, d = 2 * layout.first[j], 2 * layout.states[s]
+        a = 2 * layout.first[j]
+        d = 2 * layout.states[s]
         for c in range(columns.shape[1]):
             values[j, c] = gains[s, 0] * columns[a, c]
             for p in range(1, d):

@@ -44,7 +44,8 @@ def _visible(layout, knots, sides, e):
 
 def _distinct(pairs):
     """Distinct pairs (h, 2) of nodes of some pairs of arrays, where both are some."""
-    bits, codes = 32, [np.zeros(0, dtype=np.int64)]
+    bits = 32
+    codes = [np.zeros(0, dtype=np.int64)]
     codes += [(a << bits | b)[(a >= 0) & (b >= 0)] for a, b in pairs]
     codes = np.sort(np.concatenate(codes))
     codes = codes[np.diff(codes, prepend=-1) > 0]  # sooner than np.unique, which fills a table

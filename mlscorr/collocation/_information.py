@@ -65,7 +65,8 @@ class InformationSolver:
         else:
             knots = like.knots
         processes = np.bincount(layout.signal, minlength=len(signals))
-        sizes, sides = np.repeat(processes * layout.states, np.diff(knots.first)), []
+        sizes = np.repeat(processes * layout.states, np.diff(knots.first))
+        sides = []
         for part in rows:
             sides.append(Sides.of(part, layout, knots, len(sizes)))
             shared = np.full(len(part.noise.repeated), part.misclosure.shape[1])
@@ -140,7 +141,8 @@ class InformationSolver:
             block = self._own_precision(Sides(*(values[number[:1]] for values in known)))
             return block[0][np.ix_(row, row)]
         table = self.layout, self.pattern, self._cells
-        x, parts = np.zeros((self.pattern.states, len(rows))), []
+        x = np.zeros((self.pattern.states, len(rows)))
+        parts = []
         for k, sides in enumerate(self.sides):
             asked = np.unique(number[of_part == k])
             part = Sides(*(values[asked] for values in sides))
@@ -159,7 +161,8 @@ class InformationSolver:
 
     def _own_precision(self, sides):
         """Blocks (n, r, r) of V^-1 of observations."""
-        table, white = (self.layout, self.pattern, self._cells), sides.white
+        table = (self.layout, self.pattern, self._cells)
+        white = sides.white
         known = row_covariances(*table, sides, self._inverse)
         return white.swapaxes(1, 2) @ (np.eye(white.shape[1]) - known) @ white
 
@@ -198,7 +201,8 @@ class InformationSolver:
     @cached_property
     def _factor(self):
         """Values of the factor of L."""
-        pattern, values = self.pattern, self.information()
+        pattern = self.pattern
+        values = self.information()
         before = diagonal(pattern, values)
         state = factorise(pattern, values)
         error = np.zeros(pattern.states)
@@ -216,7 +220,8 @@ class InformationSolver:
 
         Who needs both has the factor worked out again: it is most of the memory.
         """
-        values, _ = self._factor, self._own_solution
+        values = self._factor
+        _ = self._own_solution
         del self.__dict__["_factor"]
         invert_in_place(self.pattern, values)
         return values
@@ -240,8 +245,12 @@ class InformationSolver:
         where = "of a shared error"
         if node < len(self.knots.clock):
             s = np.searchsorted(self.knots.first, node, side="right") - 1
-            signal, clock = self.rows[0].signals[s].covariance, self.knots.clock
-            step = clock[node] - clock[node - 1] if node > self.knots.first[s] else np.inf
+            signal = self.rows[0].signals[s].covariance
+            clock = self.knots.clock
+            if node > self.knots.first[s]:
+                step = clock[node] - clock[node - 1]
+            else:
+                step = np.inf
             where = (
                 f"of signal {s + 1} ({signal.family}, {signal.correlation_time:g} s) at a knot "
                 f"{step:.3g} s after the one before"
@@ -257,7 +266,9 @@ class InformationSolver:
     def _solved(self, columns):
         """States and residuals by columns."""
         is_own = np.array_equal(columns, self.columns)
-        return self._own_solution if is_own else self._estimate(columns)
+        if is_own:
+            return self._own_solution
+        return self._estimate(columns)
 
     def _estimate(self, columns):
         """States x = L^-1 H^T R^-1 c (states, c), and residuals W (c - H x) in parts (n, r, c)."""
@@ -277,7 +288,8 @@ class InformationSolver:
 
     def _prior_steps(self, x):
         """Steps of the states from knot to knot, whitened by their prior, and shared errors."""
-        first, place = self.knots.first, self.pattern.place
+        first = self.knots.first
+        place = self.pattern.place
         for s, d in enumerate(self.layout.states):
             local = np.arange(d * np.sum(self.layout.signal == s))
             for begin in range(first[s], first[s + 1], CHUNK):

@@ -160,9 +160,13 @@ def prior_roots(layout: Layout, knots: Knots) -> tuple[np.ndarray, np.ndarray]:
 
 @njit(cache=True, nogil=True)
 def add_prior(
-    layout: Layout, knots: Knots, pattern: Pattern, roots: np.ndarray, carried: np.ndarray,
+    layout: Layout,
+    knots: Knots,
+    pattern: Pattern,
+    roots: np.ndarray,
+    carried: np.ndarray,
     values: np.ndarray,
-) -> None:  # fmt: skip
+) -> None:
     """Add L0 to the values of a matrix: of the knots, and one for each state of other nodes.
 
     Parameters
@@ -174,14 +178,18 @@ def add_prior(
         As of prior_roots.
     values : (v,) array
     """
-    place, first = pattern.place, pattern.first
+    place = pattern.place
+    first = pattern.first
     for s in range(layout.states.size):
         d = layout.states[s]
         for j in range(knots.first[s], knots.first[s + 1]):
-            here, root, before = place[j], roots[j, :d, :d], -carried[j, :d, :d]
+            here = place[j]
+            root = roots[j, :d, :d]
+            before = -carried[j, :d, :d]
             _add_to_processes(pattern, values, here, here, multiply_transposed(root, root))
             if j > knots.first[s]:
-                there, across = place[j - 1], multiply_transposed(root, before)
+                there = place[j - 1]
+                across = multiply_transposed(root, before)
                 _add_to_processes(
                     pattern, values, there, there, multiply_transposed(before, before)
                 )
@@ -195,7 +203,8 @@ def add_prior(
 @njit(cache=True, nogil=True)
 def _add_to_processes(pattern, values, i, j, block):
     """Add a block to that of each process in block (i, j), if that stands in the lower triangle."""
-    position, d = locate(pattern, i, j), block.shape[0]
+    position = locate(pattern, i, j)
+    d = block.shape[0]
     if position < 0:
         return
     width = panel_width(pattern, j)
@@ -228,8 +237,10 @@ def knot_gains(
     gains, remaining : (q, s, 2 d), (q, s) array
         Of d states at most, those of each signal without a space between a and b.
     """
-    number, width = layout.states.size, 2 * max(layout.states) if layout.states.size else 0
-    gains, remaining = np.zeros((cell.size, number, width)), np.zeros((cell.size, number))
+    number = layout.states.size
+    width = 2 * max(layout.states) if layout.states.size else 0
+    gains = np.zeros((cell.size, number, width))
+    remaining = np.zeros((cell.size, number))
     about = neighbours(number, 0, 0)
     entered = -1
     for e in order:
@@ -237,7 +248,8 @@ def knot_gains(
             entered = cell[e]
             enter_cell(layout, knots, entered, about)
         fill_gains(layout, about, clocks[e])
-        gains[e], remaining[e] = about.gains[:, :width], about.remaining
+        gains[e] = about.gains[:, :width]
+        remaining[e] = about.remaining
     return gains, remaining
 
 

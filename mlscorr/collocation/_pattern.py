@@ -73,7 +73,8 @@ class Pattern(NamedTuple):
         ends = _ends_front(row, column, first)
         node = np.append(0, np.flatnonzero(ends) + 1)
         below = np.diff(column)
-        row, column = row[np.repeat(ends, below)], np.append(0, np.cumsum(below[ends]))
+        row = row[np.repeat(ends, below)]
+        column = np.append(0, np.cumsum(below[ends]))
         widths = np.diff(first[node])
         above = np.append(0, np.cumsum(ordered[row]))
         height = above[:-1] + np.repeat(widths - above[column[:-1]], np.diff(column))
@@ -122,7 +123,9 @@ def _postorder(row, column):
     stands next to its parent. The factor is the same, but children and parents can be fronts.
     """
     below = np.diff(column)
-    count, parent = len(below), np.full(len(below), len(below))  # the root of all
+    # the root of all
+    count = len(below)
+    parent = np.full(len(below), len(below))
     parent[below > 0] = row[column[:-1][below > 0]]
     children = np.lexsort([-below, parent])
     begin = np.searchsorted(parent[children], np.arange(count + 2))
@@ -139,7 +142,8 @@ def _ends_front(row, column, first):
     read, and so are those of the matrix from which it is subtracted.
     """
     ends = np.ones(column.size - 1, np.bool_)
-    begin, joint_work = 0, 0.0
+    begin = 0
+    joint_work = 0.0
     for j in range(column.size - 1):
         below = 0
         for i in row[column[j] : column[j + 1]]:
@@ -147,9 +151,11 @@ def _ends_front(row, column, first):
         separate_work = joint_work + _work(first[j + 1] - first[j], below)
         work = _work(first[j + 1] - first[begin], below)
         if j > begin and row[column[j - 1]] == j and work <= separate_work:
-            ends[j - 1], joint_work = False, work
+            ends[j - 1] = False
+            joint_work = work
         else:
-            begin, joint_work = j, separate_work - joint_work
+            begin = j
+            joint_work = separate_work - joint_work
     return ends
 
 
@@ -167,7 +173,8 @@ def _fill_in(pointer, index):
     count = pointer.size - 1
     row = np.empty(4 * index.size + count, dtype=np.int64)
     column = np.zeros(count + 1, dtype=np.int64)
-    child, sibling = np.full(count, -1), np.full(count, -1)
+    child = np.full(count, -1)
+    sibling = np.full(count, -1)
     mark = np.full(count, -1)
     end = 0
     for j in range(count):
@@ -185,7 +192,8 @@ def _fill_in(pointer, index):
         row[begin:end].sort()
         if end > begin:
             parent = row[begin]
-            sibling[j], child[parent] = child[parent], j
+            sibling[j] = child[parent]
+            child[parent] = j
     return row[:end].copy(), column
 
 
@@ -194,7 +202,8 @@ def _enter(nodes, j, mark, row, end):
     """Write those of some nodes behind the end that column j lacks; its new end."""
     for i in nodes:
         if i > j and mark[i] != j:
-            mark[i], row[end] = j, i
+            mark[i] = j
+            row[end] = i
             end += 1
     return end
 
@@ -217,10 +226,12 @@ def locate(pattern: Pattern, i: int, j: int) -> int:
         return -1
     front = pattern.front[j]
     node = pattern.node[front]
-    width, left = panel_width(pattern, j), pattern.first[j] - pattern.first[node]
+    width = panel_width(pattern, j)
+    left = pattern.first[j] - pattern.first[node]
     if pattern.front[i] == front:
         return pattern.start[front] + (pattern.first[i] - pattern.first[node]) * width + left
-    low, end = pattern.column[front], pattern.column[front + 1]
+    low = pattern.column[front]
+    end = pattern.column[front + 1]
     high = end
     while low < high:
         middle = (low + high) // 2

@@ -40,7 +40,8 @@ def _room(layout, sides):
     _, e, r, _ = sides.mixing.shape
     capacity = 2 * e * layout.states.size + 1
     width = 2 * e * layout.states[layout.signal].sum() + r
-    nodes, begin = np.zeros(capacity, dtype=np.int64), np.zeros(capacity + 1, dtype=np.int64)
+    nodes = np.zeros(capacity, dtype=np.int64)
+    begin = np.zeros(capacity + 1, dtype=np.int64)
     processes = np.searchsorted(layout.signal, np.arange(layout.states.size + 1))
     return Expanded(np.zeros(1, dtype=np.int64), nodes, begin, np.zeros((r, width)), processes)
 
@@ -129,9 +130,14 @@ def add_information(
 
 @njit(cache=True, nogil=True)
 def observe(
-    layout: Layout, pattern: Pattern, cells: np.ndarray, sides: Sides,
-    x: np.ndarray, y: np.ndarray, transposed: bool,
-) -> None:  # fmt: skip
+    layout: Layout,
+    pattern: Pattern,
+    cells: np.ndarray,
+    sides: Sides,
+    x: np.ndarray,
+    y: np.ndarray,
+    transposed: bool,
+) -> None:
     """Y <- y + W H x, or x <- x + H^T W^T y, in place.
 
     Parameters

@@ -84,9 +84,15 @@ def fill_noise(layout: Layout, spans: np.ndarray, out: np.ndarray) -> None:
     """
     for s in range(layout.states.size):
         q = process_noise(layout.kinds[s], spans[s] * layout.rates[s])
-        out[s, 0, 0], out[s, 0, 1], out[s, 0, 2] = q[0], q[1], q[2]
-        out[s, 1, 0], out[s, 1, 1], out[s, 1, 2] = q[1], q[3], q[4]
-        out[s, 2, 0], out[s, 2, 1], out[s, 2, 2] = q[2], q[4], q[5]
+        out[s, 0, 0] = q[0]
+        out[s, 0, 1] = q[1]
+        out[s, 0, 2] = q[2]
+        out[s, 1, 0] = q[1]
+        out[s, 1, 1] = q[3]
+        out[s, 1, 2] = q[4]
+        out[s, 2, 0] = q[2]
+        out[s, 2, 1] = q[4]
+        out[s, 2, 2] = q[5]
 
 
 @njit(cache=True, nogil=True)
@@ -108,7 +114,9 @@ def carry(layout: Layout, blocks: np.ndarray, x: np.ndarray, transposed: bool) -
         f01, f10 = (f[1, 0], f[0, 1]) if transposed else (f[0, 1], f[1, 0])
         f02, f20 = (f[2, 0], f[0, 2]) if transposed else (f[0, 2], f[2, 0])
         f12, f21 = (f[2, 1], f[1, 2]) if transposed else (f[1, 2], f[2, 1])
-        f00, f11, f22 = f[0, 0], f[1, 1], f[2, 2]
+        f00 = f[0, 0]
+        f11 = f[1, 1]
+        f22 = f[2, 2]
         for c in range(x.shape[1]):
             x0 = x[a, c]
             if states == 1:
@@ -118,7 +126,8 @@ def carry(layout: Layout, blocks: np.ndarray, x: np.ndarray, transposed: bool) -
                 x[a, c] = f00 * x0 + f01 * x1
                 x[a + 1, c] = f10 * x0 + f11 * x1
             else:
-                x1, x2 = x[a + 1, c], x[a + 2, c]
+                x1 = x[a + 1, c]
+                x2 = x[a + 2, c]
                 x[a, c] = f00 * x0 + f01 * x1 + f02 * x2
                 x[a + 1, c] = f10 * x0 + f11 * x1 + f12 * x2
                 x[a + 2, c] = f20 * x0 + f21 * x1 + f22 * x2

@@ -41,7 +41,8 @@ def _information(rows, number):
 
     The first is the square of the signal's sigma in a row over that of the row's noise.
     """
-    signal, variance = rows.signals[number], np.einsum("nii->ni", rows.noise.separate)
+    signal = rows.signals[number]
+    variance = np.einsum("nii->ni", rows.noise.separate)
     variance = np.maximum(variance, np.finfo(float).eps ** 2)  # where there is none, others refuse
     n, r = variance.shape
     square = (signal.mixing**2).sum(axis=2).reshape(n, rows.gps_time.shape[1], r)

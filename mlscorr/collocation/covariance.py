@@ -74,17 +74,24 @@ class Covariance:
     @property
     def states(self) -> int:
         """Number of states of the process."""
-        return 2 if self.family == INTEGRATED else self.kind
+        if self.family == INTEGRATED:
+            return 2
+        return self.kind
 
     @property
     def kind(self) -> int:
         """Number of the family."""
-        return INTEGRATED_KIND if self.family == INTEGRATED else FAMILIES.index(self.family) + 1
+        if self.family == INTEGRATED:
+            return INTEGRATED_KIND
+        return FAMILIES.index(self.family) + 1
 
     @property
     def rate(self) -> float:
         """Rate of the process's poles. Units: 1/s."""
-        scale = 1.0 if self.family == INTEGRATED else math.sqrt(2.0 * self.states - 1.0)
+        if self.family == INTEGRATED:
+            scale = 1.0
+        else:
+            scale = math.sqrt(2.0 * self.states - 1.0)
         return scale / self.correlation_time
 
 
@@ -106,7 +113,9 @@ def correlation(kind: int, x: float) -> float:
     e = np.exp(-x)
     if kind == 1:
         return e
-    return (1.0 + x) * e if kind == 2 else (1.0 + x + x * x / 3.0) * e
+    if kind == 2:
+        return (1.0 + x) * e
+    return (1.0 + x + x * x / 3.0) * e
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -172,7 +172,8 @@ def _add_signals(layout, clocks, mixing, row, total):
 def _sides(part):
     """Number (n r) of each row's sides, their clocks (n r e, s), and mixings of each signal."""
     n, r = np.shape(part.misclosure)
-    e, s = np.shape(part.gps_time)[1], len(part.signals)
+    e = np.shape(part.gps_time)[1]
+    s = len(part.signals)
     clocks = np.repeat(part.epochs[1].reshape(n, e, s), r, axis=0).reshape(n * r * e, s)
     widths = [signal.mixing.shape[-1] for signal in part.signals]
     mixings = [

@@ -41,19 +41,26 @@ def _gather(layout, i, states, same, following, columns, joint):
 
     Process by process, its states at i before those at i + 1; zeros where there is no node.
     """
-    has_left, has_right = i >= 0, i + 1 < states.shape[0]
+    has_left = i >= 0
+    has_right = i + 1 < states.shape[0]
     for j in range(layout.first.size):
-        a, d = layout.first[j], layout.states[layout.signal[j]]
+        a = layout.first[j]
+        d = layout.states[layout.signal[j]]
         for p in range(d):
-            u, v = 2 * a + p, 2 * a + d + p
+            u = 2 * a + p
+            v = 2 * a + d + p
             for c in range(columns.shape[1]):
                 columns[u, c] = states[i, a + p, c] if has_left else 0.0
                 columns[v, c] = states[i + 1, a + p, c] if has_right else 0.0
             for other in range(layout.first.size):
-                b, e = 2 * layout.first[other], layout.states[layout.signal[other]]
+                b = 2 * layout.first[other]
+                e = layout.states[layout.signal[other]]
                 for q in range(e):
                     to = layout.first[other] + q
-                    cross = following[i, a + p, to] if has_left and has_right else 0.0
+                    if has_left and has_right:
+                        cross = following[i, a + p, to]
+                    else:
+                        cross = 0.0
                     joint[u, b + q] = same[i, a + p, to] if has_left else 0.0
                     joint[v, b + e + q] = same[i + 1, a + p, to] if has_right else 0.0
                     joint[u, b + e + q] = joint[b + e + q, u] = cross
@@ -61,9 +68,14 @@ def _gather(layout, i, states, same, following, columns, joint):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def interpolate(
-    nodes: np.ndarray, clocks: np.ndarray, layout: Layout, states: np.ndarray, same: np.ndarray,
-    following: np.ndarray, epochs: Epochs,
-) -> None:  # fmt: skip
+    nodes: np.ndarray,
+    clocks: np.ndarray,
+    layout: Layout,
+    states: np.ndarray,
+    same: np.ndarray,
+    following: np.ndarray,
+    epochs: Epochs,
+) -> None:
     """Fill epochs with trend plus signal.
 
     Parameters
@@ -99,12 +111,14 @@ def _slots(layout):
     slot, local = np.zeros((2, 2 * layout.states[layout.signal].sum()), dtype=np.int64)
     u = begin = 0
     for j in range(layout.signal.size):
-        s, d = layout.signal[j], layout.states[layout.signal[j]]
+        s = layout.signal[j]
+        d = layout.states[layout.signal[j]]
         if j > 0 and s != layout.signal[j - 1]:
             begin = layout.first[j]
         for end in range(2):
             for p in range(d):
-                slot[u], local[u] = 2 * s + end, layout.first[j] - begin + p
+                slot[u] = 2 * s + end
+                local[u] = layout.first[j] - begin + p
                 u += 1
     return slot, local
 
@@ -112,7 +126,8 @@ def _slots(layout):
 @njit(cache=True, nogil=True)
 def _gather_knots(pattern, nodes, slots, states, inverse, about):
     """States at the knots (2 s,) about a cell, as of _gather, by the selected inverse."""
-    columns, joint = about.columns, about.joint
+    columns = about.columns
+    joint = about.joint
     slot, local = slots
     positions = np.zeros((nodes.size, nodes.size), dtype=np.int64)
     for a in range(nodes.size):
@@ -135,9 +150,14 @@ def _gather_knots(pattern, nodes, slots, states, inverse, about):
 
 @njit(cache=True, nogil=True)
 def interpolate_knots(
-    layout: Layout, knots: Knots, pattern: Pattern, cells: np.ndarray, states: np.ndarray,
-    inverse: np.ndarray, epochs: Epochs,
-) -> None:  # fmt: skip
+    layout: Layout,
+    knots: Knots,
+    pattern: Pattern,
+    cells: np.ndarray,
+    states: np.ndarray,
+    inverse: np.ndarray,
+    epochs: Epochs,
+) -> None:
     """Fill epochs with trend plus signal.
 
     Parameters
@@ -179,7 +199,10 @@ def predictor_by(
     trend, trend_root : (p,), (p, p) array
         The root is None where only means are asked for.
     """
-    root = np.zeros((len(trend), len(trend))) if trend_root is None else trend_root
+    if trend_root is None:
+        root = np.zeros((len(trend), len(trend)))
+    else:
+        root = trend_root
     processes = np.bincount(layout.signal, minlength=layout.states.size).tolist()
 
     def predict(gps_time, clocks, design, mixings):
@@ -191,16 +214,24 @@ def predictor_by(
                 f"{shapes}: they should be (epochs, quantities, trend parameters) and (epochs, "
                 f"quantities, processes), of {len(trend)} and {processes} columns."
             )
-        mean, covariance = np.empty((q, r)), np.empty((q, r, r))
+        mean = np.empty((q, r))
+        covariance = np.empty((q, r, r))
         for i in range(0, q, CHUNK):
             part = slice(i, i + CHUNK)
             blocks = [np.zeros((len(gps_time[part]), r, 0)), *(m[part] for m in mixings)]
             epochs = Epochs(
-                np.ascontiguousarray(gps_time[part]), np.ascontiguousarray(clocks[part]),
-                np.ascontiguousarray(design[part], dtype=float), np.concatenate(blocks, axis=2),
-                trend, root, mean[part], covariance[part],
-            )  # fmt: skip
+                np.ascontiguousarray(gps_time[part]),
+                np.ascontiguousarray(clocks[part]),
+                np.ascontiguousarray(design[part], dtype=float),
+                np.concatenate(blocks, axis=2),
+                trend,
+                root,
+                mean[part],
+                covariance[part],
+            )
             fill(epochs)
-        return (mean,) if trend_root is None else (mean, covariance)
+        if trend_root is None:
+            return (mean,)
+        return (mean, covariance)
 
     return predict

@@ -96,9 +96,12 @@ class LiteralCollocation:
 
 
 def collocate_literal(
-    gps_time: np.ndarray, misclosure: np.ndarray, noise: Noise, design: np.ndarray,
+    gps_time: np.ndarray,
+    misclosure: np.ndarray,
+    noise: Noise,
+    design: np.ndarray,
     signals: Sequence[LiteralSignal],
-) -> LiteralCollocation:  # fmt: skip
+) -> LiteralCollocation:
     """Collocation as the paper prints it; for its experiments, not for surveys.
 
     Without signals, or with C0 = 0, it is least squares of the trend: with weights

@@ -21,9 +21,13 @@ from mlscorr.collocation.noise import Noise
 
 
 def collocate(
-    gps_time: np.ndarray, misclosure: np.ndarray, noise: Noise, design: np.ndarray,
-    signals: Sequence[Signal], believed: np.ndarray | None = None,
-) -> Collocation:  # fmt: skip
+    gps_time: np.ndarray,
+    misclosure: np.ndarray,
+    noise: Noise,
+    design: np.ndarray,
+    signals: Sequence[Signal],
+    believed: np.ndarray | None = None,
+) -> Collocation:
     r"""Separate misclosures into trend, signal and noise.
 
     Solves l = A x + B s + n with one covariance function throughout (Mao et al. 2015,
@@ -75,8 +79,10 @@ def collocate(
     shared = noise.common.reshape(n, r, noise.common.shape[1])
     check_finite(gps_time, misclosure, noise.separate, shared, design, mixing)
     order = np.argsort(gps_time, kind="stable")
-    layout, clocks = Layout.of(signals), signal_clocks(signals, gps_time)[order]
-    gps_time, mixing = gps_time[order], mixing[order]
+    layout = Layout.of(signals)
+    clocks = signal_clocks(signals, gps_time)[order]
+    gps_time = gps_time[order]
+    mixing = mixing[order]
     own = np.ascontiguousarray(noise.separate[order], dtype=float)
     filtered = filter_covariance(layout, layout.size, _steps(clocks), mixing, own)
     if np.isnan(filtered[2]).any():

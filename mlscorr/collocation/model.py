@@ -95,9 +95,12 @@ class Collocation:
         return self._solved_columns @ np.append(-self.trend, 1.0)
 
     def predict(
-        self, gps_time: np.ndarray, design: np.ndarray, mixings: Sequence[np.ndarray],
+        self,
+        gps_time: np.ndarray,
+        design: np.ndarray,
+        mixings: Sequence[np.ndarray],
         clocks: Sequence[np.ndarray | None] | None = None,
-    ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Trend plus signal at other epochs, with covariance  (Eq. 15).
 
         Parameters
@@ -124,9 +127,12 @@ class Collocation:
         return self._predictor(gps_time, clocks, design, mixings)
 
     def predict_mean(
-        self, gps_time: np.ndarray, design: np.ndarray, mixings: Sequence[np.ndarray],
+        self,
+        gps_time: np.ndarray,
+        design: np.ndarray,
+        mixings: Sequence[np.ndarray],
         clocks: Sequence[np.ndarray | None] | None = None,
-    ) -> np.ndarray:  # fmt: skip
+    ) -> np.ndarray:
         """The mean (q, r) of ``predict`` by itself, which sparse rows know without an inverse."""
         return replace(self, trend_root=None).predict(gps_time, design, mixings, clocks)[0]
 
@@ -152,7 +158,8 @@ class Collocation:
 
     def determined_without(self, rows: np.ndarray) -> bool:
         """Whether the observations other than these determine the trend."""
-        basis, limit = self._leverage[rows], 1.0 - SMALLEST_INFORMATION
+        basis = self._leverage[rows]
+        limit = 1.0 - SMALLEST_INFORMATION
         is_small = np.sum(basis**2) < limit  # of all singular values, which is quick
         return bool(is_small or np.linalg.svd(basis, compute_uv=False)[0] ** 2 < limit)
 
@@ -231,8 +238,12 @@ def solve_trend(
     determinants -= 2 * np.log(believed.sum(axis=1)).sum()
     log_likelihood = -0.5 * (squares + determinants + redundancy * np.log(2 * np.pi))
     return Collocation(
-        solver=solver, misclosure=misclosure, design=design, trend=trend, trend_root=root,
+        solver=solver,
+        misclosure=misclosure,
+        design=design,
+        trend=trend,
+        trend_root=root,
         log_likelihood=float(log_likelihood),
         sigma0=float(np.sqrt(squares / redundancy)) if redundancy else float("nan"),
         believed=believed,
-    )  # fmt: skip
+    )

@@ -113,7 +113,8 @@ class Sides(NamedTuple):
         cell = np.searchsorted(knots.times, gps_time, side="right")
         order = np.argsort(cell, kind="stable")
         gains, remaining = knot_gains(layout, knots, cell, clocks, order)
-        unknown, sigma = np.full(n, -1), np.zeros(rows.misclosure.shape)
+        unknown = np.full(n, -1)
+        sigma = np.zeros(rows.misclosure.shape)
         if len(noise.repeated):
             number = np.searchsorted(noise.repeated[:-1], noise.group)
             unknown = np.where(noise.repeated[number] == noise.group, nodes + number, -1)

@@ -27,7 +27,8 @@ def polynomial_design(
         Parameters of one degree, three axes, follow each other.
     """
     first, last = span
-    middle, half = (first + last) / 2, max((last - first) / 2, SAME_EPOCH)
+    middle = (first + last) / 2
+    half = max((last - first) / 2, SAME_EPOCH)
     argument = (gps_time - middle) / half
     if not extrapolate:
         argument = np.clip(argument, -1, 1)

@@ -110,7 +110,10 @@ class Whitener:
         ----------
         columns : (n, k) array or Whitened
         """
-        white = columns if isinstance(columns, Whitened) else self.whiten(columns)
+        if isinstance(columns, Whitened):
+            white = columns
+        else:
+            white = self.whiten(columns)
         return -0.5 * (white.squares + self.log_determinant)
 
     def innovations(self, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -126,7 +129,8 @@ class Whitener:
             Of unit variance.
         sigma : (n,) array
         """
-        filtered, sigma = self._filter(columns), 1.0 / self.recursion.whiteners
+        filtered = self._filter(columns)
+        sigma = 1.0 / self.recursion.whiteners
         if not self.common.shape[1]:
             return filtered, sigma
         innovations, growth = common_innovations(self._filter(self.common), filtered)
@@ -145,11 +149,14 @@ class Whitener:
         precision : (n,) array
         """
         n = len(self.common)
-        white, weights, precision = self.whiten(columns), np.empty(columns.shape), np.empty(n)
+        white = self.whiten(columns)
+        weights = np.empty(columns.shape)
+        precision = np.empty(n)
         for start in range(0, n, CHUNK):
             part = slice(start, start + CHUNK)
             unit = self.whiten(np.eye(n, len(range(n)[part]), -start))
-            weights[part], precision[part] = unit.product(white), unit.squares
+            weights[part] = unit.product(white)
+            precision[part] = unit.squares
         return weights, precision
 
     def draw(

@@ -81,9 +81,15 @@ def _increment(x, y, z, weight, a, b):
 
 @njit(cache=True, nogil=True)
 def fill_increments(
-    gps_time: np.ndarray, xyz: np.ndarray, epochs: np.ndarray, step: float, is_gap: np.ndarray,
-    table: np.ndarray, increments: np.ndarray, inside: np.ndarray,
-) -> None:  # fmt: skip
+    gps_time: np.ndarray,
+    xyz: np.ndarray,
+    epochs: np.ndarray,
+    step: float,
+    is_gap: np.ndarray,
+    table: np.ndarray,
+    increments: np.ndarray,
+    inside: np.ndarray,
+) -> None:
     """Fill increments (n, 3) and inside (n,) of points.
 
     Parameters
@@ -111,10 +117,19 @@ def fill_increments(
 
 @njit(cache=True, nogil=True)
 def move_integers(
-    xs: np.ndarray, ys: np.ndarray, zs: np.ndarray, scale: np.ndarray, offset: np.ndarray,
-    gps_time: np.ndarray, constant: float, epochs: np.ndarray, step: float, is_gap: np.ndarray,
-    table: np.ndarray, rest: np.ndarray,
-) -> tuple[int, int]:  # fmt: skip
+    xs: np.ndarray,
+    ys: np.ndarray,
+    zs: np.ndarray,
+    scale: np.ndarray,
+    offset: np.ndarray,
+    gps_time: np.ndarray,
+    constant: float,
+    epochs: np.ndarray,
+    step: float,
+    is_gap: np.ndarray,
+    table: np.ndarray,
+    rest: np.ndarray,
+) -> tuple[int, int]:
     """Move the scaled integers of points by whole increments, in place.
 
     Parameters
@@ -144,9 +159,13 @@ def move_integers(
         else:
             weight = (gps_time[p] + constant - epochs[i]) / (epochs[i + 1] - epochs[i])
             ex, ey, ez = _increment(
-                xs[p] * scale[0] + offset[0], ys[p] * scale[1] + offset[1],
-                zs[p] * scale[2] + offset[2], weight, table[i], table[i + 1],
-            )  # fmt: skip
+                xs[p] * scale[0] + offset[0],
+                ys[p] * scale[1] + offset[1],
+                zs[p] * scale[2] + offset[2],
+                weight,
+                table[i],
+                table[i + 1],
+            )
         x = xs[p] + np.rint(ex / scale[0])
         y = ys[p] + np.rint(ey / scale[1])
         z = zs[p] + np.rint(ez / scale[2])

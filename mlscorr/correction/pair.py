@@ -56,9 +56,13 @@ class Correction(Summary):
 
     @classmethod
     def by_pose_error(
-        cls, trajectory: Trajectory, pose: np.ndarray, covariance: np.ndarray | None = None,
-        recorded_mounting: Mounting | None = None, corrected_mounting: Mounting | None = None,
-    ) -> Correction:  # fmt: skip
+        cls,
+        trajectory: Trajectory,
+        pose: np.ndarray,
+        covariance: np.ndarray | None = None,
+        recorded_mounting: Mounting | None = None,
+        corrected_mounting: Mounting | None = None,
+    ) -> Correction:
         """The correction that takes a POS error away, and a mounting's if both are given.
 
         Parameters
@@ -88,11 +92,13 @@ class Correction(Summary):
     @cached_property
     def table(self) -> np.ndarray:
         """Per epoch (n, 15): T - origin, shift, and turn row by row; float64."""
-        old, new = self.recorded, self.corrected
+        old = self.recorded
+        new = self.corrected
         turned = new.attitude
         shift = new.position - old.position
         if self.recorded_mounting is not None and self.corrected_mounting is not None:
-            before, after = self.recorded_mounting, self.corrected_mounting
+            before = self.recorded_mounting
+            after = self.corrected_mounting
             change = after.boresight * before.boresight.inv()
             turned = turned * change
             shift += new.attitude.apply(after.lever_arm - change.apply(before.lever_arm))
@@ -127,9 +133,15 @@ class Correction(Summary):
         increments = np.tile(self.datum, (len(gps_time), 1))
         inside = np.zeros(len(gps_time), dtype=bool)
         fill_increments(
-            np.ascontiguousarray(gps_time, dtype=float), np.ascontiguousarray(xyz - self.origin),
-            self.recorded.gps_time, self._step, self.is_gap, self.table, increments, inside,
-        )  # fmt: skip
+            np.ascontiguousarray(gps_time, dtype=float),
+            np.ascontiguousarray(xyz - self.origin),
+            self.recorded.gps_time,
+            self._step,
+            self.is_gap,
+            self.table,
+            increments,
+            inside,
+        )
         return increments, inside
 
     def apply(self, cloud: PointCloud) -> PointCloud:
@@ -138,9 +150,13 @@ class Correction(Summary):
         return PointCloud(np.add(cloud.xyz, moved, out=moved), cloud.gps_time, cloud.intensity)
 
     def shift_integers(
-        self, xyz: np.ndarray | Sequence[np.ndarray], scale: np.ndarray, offset: np.ndarray,
-        gps_time: np.ndarray, time_constant: float = 0.0,
-    ) -> int:  # fmt: skip
+        self,
+        xyz: np.ndarray | Sequence[np.ndarray],
+        scale: np.ndarray,
+        offset: np.ndarray,
+        gps_time: np.ndarray,
+        time_constant: float = 0.0,
+    ) -> int:
         """Correct the scaled integers of a LAS record in place, as x' = scale * X' + offset.
 
         Only whole increments are added, so that a correction of zero changes no bit.
@@ -169,10 +185,17 @@ class Correction(Summary):
         """
         require_times(len(xyz[0]), len(gps_time))
         outside, overflow = move_integers(
-            *xyz, np.asarray(scale, dtype=float), np.asarray(offset, dtype=float) - self.origin,
-            gps_time, float(time_constant), self.recorded.gps_time, self._step, self.is_gap,
-            self.table, self.datum,
-        )  # fmt: skip
+            *xyz,
+            np.asarray(scale, dtype=float),
+            np.asarray(offset, dtype=float) - self.origin,
+            gps_time,
+            float(time_constant),
+            self.recorded.gps_time,
+            self._step,
+            self.is_gap,
+            self.table,
+            self.datum,
+        )
         require_fit(overflow, scale, offset)
         return outside
 

@@ -14,9 +14,22 @@ from mlscorr.frames import map_root, skew
 from mlscorr.survey import Mounting, Scanner
 
 ELEMENTS = (  # those of the pose's covariance that enter the variances of E, N and H
-    (0, 0), (1, 1), (2, 2), (3, 3), (4, 4), (5, 5), (0, 4), (0, 5), (1, 3), (1, 5), (2, 3), (2, 4),
-    (3, 4), (3, 5), (4, 5),
-)  # fmt: skip
+    (0, 0),
+    (1, 1),
+    (2, 2),
+    (3, 3),
+    (4, 4),
+    (5, 5),
+    (0, 4),
+    (0, 5),
+    (1, 3),
+    (1, 5),
+    (2, 3),
+    (2, 4),
+    (3, 4),
+    (3, 5),
+    (4, 5),
+)
 
 
 @dataclass(frozen=True)
@@ -77,9 +90,13 @@ class PointSigma:
         elements = np.stack([covariance[:, i, j] for i, j in ELEMENTS], axis=1)
         table = np.hstack([place, place + arm, elements])
         return cls(
-            corrected.gps_time, correction.is_gap, correction.origin, table.astype(np.float32),
-            float(scanner.range_noise), float(scanner.angle_noise),
-        )  # fmt: skip
+            corrected.gps_time,
+            correction.is_gap,
+            correction.origin,
+            table.astype(np.float32),
+            float(scanner.range_noise),
+            float(scanner.angle_noise),
+        )
 
     def at(self, xyz: np.ndarray, gps_time: np.ndarray) -> np.ndarray:
         """One sigma (n, 3) of corrected points (n, 3), NaN outside the trajectory. Units: m.
@@ -94,9 +111,13 @@ class PointSigma:
         )
 
     def of_integers(
-        self, xyz: np.ndarray | Sequence[np.ndarray], scale: np.ndarray, offset: np.ndarray,
-        gps_time: np.ndarray, time_constant: float = 0.0,
-    ) -> np.ndarray:  # fmt: skip
+        self,
+        xyz: np.ndarray | Sequence[np.ndarray],
+        scale: np.ndarray,
+        offset: np.ndarray,
+        gps_time: np.ndarray,
+        time_constant: float = 0.0,
+    ) -> np.ndarray:
         """The same for the scaled integers of a LAS record, when they are corrected.
 
         Parameters
@@ -163,17 +184,34 @@ def _variances(xs, ys, zs, scale, offset, gps_time, constant, epochs, index, tab
         x = xs[p] * scale[0] + offset[0]
         y = ys[p] * scale[1] + offset[1]
         z = zs[p] * scale[2] + offset[2]
-        gx, gy, gz = x - row[0], y - row[1], z - row[2]
-        ee, nn, hh, aa, bb, cc = row[6], row[7], row[8], row[9], row[10], row[11]
-        eb, ec, na, nc, ha, hb = row[12], row[13], row[14], row[15], row[16], row[17]
-        ab, ac, bc = row[18], row[19], row[20]
+        gx = x - row[0]
+        gy = y - row[1]
+        gz = z - row[2]
+        ee = row[6]
+        nn = row[7]
+        hh = row[8]
+        aa = row[9]
+        bb = row[10]
+        cc = row[11]
+        eb = row[12]
+        ec = row[13]
+        na = row[14]
+        nc = row[15]
+        ha = row[16]
+        hb = row[17]
+        ab = row[18]
+        ac = row[19]
+        bc = row[20]
         # d(point) = d(position) + turn x G, turn = (a, b, c) about E, N, H  (Eq. 7-9)
         vx = ee + 2.0 * (eb * gz - ec * gy) + bb * gz * gz - 2.0 * bc * gy * gz + cc * gy * gy
         vy = nn + 2.0 * (nc * gx - na * gz) + aa * gz * gz - 2.0 * ac * gx * gz + cc * gx * gx
         vz = hh + 2.0 * (ha * gy - hb * gx) + aa * gy * gy - 2.0 * ab * gx * gy + bb * gx * gx
-        dx, dy, dz = (x - row[3]) ** 2, (y - row[4]) ** 2, (z - row[5]) ** 2
+        dx = (x - row[3]) ** 2
+        dy = (y - row[4]) ** 2
+        dz = (z - row[5]) ** 2
         square = max(dx + dy + dz, 1e-12)
-        along, across = beam[0] / square - beam[1], beam[1] * square
+        along = beam[0] / square - beam[1]
+        across = beam[1] * square
         out[p, 0] = max(vx + along * dx + across, 0.0)
         out[p, 1] = max(vy + along * dy + across, 0.0)
         out[p, 2] = max(vz + along * dz + across, 0.0)

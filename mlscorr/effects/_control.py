@@ -69,9 +69,12 @@ class MapScale(Effect):
     remedy: ClassVar = "Check CRS and projection scale of control and trajectory."
     sides: ClassVar = ("large", "small")
     magnitude: float = quantity(
-        "ratio", 0.01, "map projections for surveying stay within a thousandth (is it in ppm?)",
-        typical=4e-4, source="UTM's scale at the central meridian, 0.9996, not applied",
-    )  # fmt: skip
+        "ratio",
+        0.01,
+        "map projections for surveying stay within a thousandth (is it in ppm?)",
+        typical=4e-4,
+        source="UTM's scale at the central meridian, 0.9996, not applied",
+    )
 
     def _error(self, value, reference, rng):
         return self.magnitude * ((value.position - reference.place) * [1.0, 1.0, 0.0])
@@ -100,10 +103,13 @@ class HorizontalDatum(Effect):
     sides: ClassVar = EAST_NORTH_UP[:2]
     parts: ClassVar = MAP[:2]
     magnitude: tuple[float, float] = quantity(
-        "m", 1000.0, "classical datums lie some hundred metres from WGS 84, not more", count=2,
+        "m",
+        1000.0,
+        "classical datums lie some hundred metres from WGS 84, not more",
+        count=2,
         typical=0.05,
         source="plates move 2-7 cm a year (ITRF2014, Altamimi et al. 2016): an epoch not reduced",
-    )  # fmt: skip
+    )
 
     def _error(self, value, reference, rng):
         return np.array([*self.magnitude, 0.0])
@@ -132,9 +138,12 @@ class VerticalDatum(Effect):
     )
     sides: ClassVar = ("above", "below")
     magnitude: float = quantity(
-        "m", 120.0, "that is more than the geoid's largest height above the ellipsoid",
-        typical=0.03, source="estimate: geoid models hold to a few centimetres",
-    )  # fmt: skip
+        "m",
+        120.0,
+        "that is more than the geoid's largest height above the ellipsoid",
+        typical=0.03,
+        source="estimate: geoid models hold to a few centimetres",
+    )
 
     def _error(self, value, reference, rng):
         return np.array([0.0, 0.0, self.magnitude])
@@ -165,9 +174,13 @@ class TargetOutlier(Effect):
     sides: ClassVar = EAST_NORTH_UP
     parts: ClassVar = MAP
     magnitude: tuple[float, float, float] = quantity(
-        "m", 100.0, "a point that far off is another point", count=3, typical=0.05,
+        "m",
+        100.0,
+        "a point that far off is another point",
+        count=3,
+        typical=0.05,
         source="estimate: a prism constant of 3-5 cm forgotten",
-    )  # fmt: skip
+    )
     target: str = field()
 
     def __post_init__(self):

@@ -29,9 +29,12 @@ class AngleScale(Effect):
     remedy: ClassVar = "Have the scanner's encoder checked."
     sides: ClassVar = ("large", "small")
     magnitude: float = quantity(
-        "ratio", 0.05, "a turn of the mirror would miss 18 deg", typical=1e-4,
+        "ratio",
+        0.05,
+        "a turn of the mirror would miss 18 deg",
+        typical=1e-4,
         source="estimate: 0.3 mm at 3 m and 60 deg; such a term is in Lichti and Licht 2006",
-    )  # fmt: skip
+    )
 
     def _error(self, value, reference, rng):
         return self.magnitude * (np.mod(value.angle + np.pi, 2 * np.pi) - np.pi)
@@ -59,9 +62,12 @@ class AngleEccentricity(Effect):
     remedy: ClassVar = "Have the scanner's encoder checked."
     parts: ClassVar = ("magnitude cos(phase)", "magnitude sin(phase)")
     magnitude: float = quantity(
-        "rad", 0.05, "a disc of 25 mm radius can't be off its axis by more than 1 mm", typical=1e-4,
+        "rad",
+        0.05,
+        "a disc of 25 mm radius can't be off its axis by more than 1 mm",
+        typical=1e-4,
         source="derived: 2.5 um off the axis on a disc of 25 mm radius",
-    )  # fmt: skip
+    )
     phase: float = quantity("rad", 7.0, "a turn has 6.28 rad (is it in degrees?)", default=0.0)
 
     def _error(self, value, reference, rng):
@@ -88,9 +94,13 @@ class AngleNoise(Effect):
         "checked."
     )
     magnitude: float = quantity(
-        "deg", 1.0, "encoders of surveying scanners resolve thousandths", typical=0.002,
-        source="twice the resolution of the RIEGL VQ-250's data sheet, 0.001 deg", least=0.0,
-    )  # fmt: skip
+        "deg",
+        1.0,
+        "encoders of surveying scanners resolve thousandths",
+        typical=0.002,
+        source="twice the resolution of the RIEGL VQ-250's data sheet, 0.001 deg",
+        least=0.0,
+    )
 
     def _error(self, value, reference, rng):
         return np.radians(self.magnitude) * noise_by_pulse(value, rng)

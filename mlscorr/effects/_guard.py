@@ -28,7 +28,10 @@ def checked_change(effect: Any, change: Callable, value: Any, *given: Any) -> An
         Where it raises anything, or gives what can't take the place of the value: of another type,
         shape or kind of numbers, or no numbers.
     """
-    columns = {f.name: getattr(value, f.name) for f in fields(value)} if is_dataclass(value) else {}
+    if is_dataclass(value):
+        columns = {f.name: getattr(value, f.name) for f in fields(value)}
+    else:
+        columns = {}
     arrays = [name for name, column in columns.items() if isinstance(column, np.ndarray)]
     views = {name: np.broadcast_to(columns[name], columns[name].shape) for name in arrays}
     try:

@@ -36,7 +36,9 @@ class Quantity:
     least: float | None = None
 
     def __str__(self):
-        return self.unit if self.count == 1 else f"{self.count} numbers in {self.unit}"
+        if self.count == 1:
+            return self.unit
+        return f"{self.count} numbers in {self.unit}"
 
     def checked(self, label: str, value: Any) -> float | tuple[float, ...]:
         """The value as a float, or as a tuple of as many as count says.
@@ -71,11 +73,15 @@ class Quantity:
             raise ValueError(
                 f"{label} of {numbers.min():g} {self.unit} is less than {self.least:g} {self.unit}."
             )
-        return float(numbers) if self.count == 1 else tuple(map(float, numbers))
+        if self.count == 1:
+            return float(numbers)
+        return tuple(map(float, numbers))
 
     @property
     def _description(self):
-        return f"one number in {self.unit}" if self.count == 1 else str(self)
+        if self.count == 1:
+            return f"one number in {self.unit}"
+        return str(self)
 
 
 def quantity(unit: str, largest: float, why: str, default: float | None = None, **more: Any) -> Any:

@@ -32,9 +32,12 @@ class TimeOffset(Effect):
     )
     sides: ClassVar = ("ahead of", "behind")
     magnitude: float = quantity(
-        "s", 1.0, "more than the step of time messages is a wrong time system", typical=1e-3,
+        "s",
+        1.0,
+        "more than the step of time messages is a wrong time system",
+        typical=1e-3,
         source="estimate: time messages without the pulse per second hold to about 1 ms",
-    )  # fmt: skip
+    )
 
     def _error(self, value, reference, rng):
         return self.magnitude
@@ -90,10 +93,13 @@ class TimeJitter(Effect):
         "computer that stores them."
     )
     magnitude: float = quantity(
-        "s", 0.01, "more than the time of a scan line mixes up the lines", typical=1e-4,
+        "s",
+        0.01,
+        "more than the time of a scan line mixes up the lines",
+        typical=1e-4,
         source="estimate: interrupts of an operating system without real time take 0.1 ms",
         least=0.0,
-    )  # fmt: skip
+    )
 
     def _error(self, value, reference, rng):
         return self.magnitude * noise_by_pulse(value, rng)

@@ -165,7 +165,10 @@ def make_effect(name: str, **parameters: Any) -> Effect:
     unknown = [key for key in parameters if key not in known]
     missing = [key for key, f in known.items() if f.default is MISSING and key not in parameters]
     if unknown or missing:
-        fault = f"has no parameter {unknown[0]!r}" if unknown else f"lacks {missing[0]}"
+        if unknown:
+            fault = f"has no parameter {unknown[0]!r}"
+        else:
+            fault = f"lacks {missing[0]}"
         raise ValueError(f"{name} {fault}; its parameters are {_describe(kind)}.")
     return kind(**parameters)
 
@@ -197,9 +200,12 @@ def in_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:
 
 
 def apply_effects(
-    effects: Iterable[Effect], stage: str, value: Any, reference: Reference,
+    effects: Iterable[Effect],
+    stage: str,
+    value: Any,
+    reference: Reference,
     streams: dict[str, np.random.Generator],
-) -> Any:  # fmt: skip
+) -> Any:
     """A stage's value after all effects of that stage, in their fixed order.
 
     Parameters

@@ -74,7 +74,10 @@ class Effect:
 
     def __post_init__(self):
         for name, kind in self.quantities().items():
-            label = self.name if name == "magnitude" else f"{name} of {self.name}"
+            if name == "magnitude":
+                label = self.name
+            else:
+                label = f"{name} of {self.name}"
             object.__setattr__(self, name, kind.checked(label, getattr(self, name)))
 
     # ---- how it changes the survey
@@ -98,13 +101,19 @@ class Effect:
             Where the code of a user's own effect raises, or makes what can't be used.
         """
         is_own = not type(self).__module__.startswith(f"{__package__}.")
-        change = partial(checked_change, self, self._change) if is_own else self._change
-        return change(value, reference, rng) if np.any(self.magnitude) else value
+        if is_own:
+            change = partial(checked_change, self, self._change)
+        else:
+            change = self._change
+        if np.any(self.magnitude):
+            return change(value, reference, rng)
+        return value
 
     def _change(self, value, reference, rng):
         """As apply, of a magnitude that is not zero."""
         name = STAGES[self.stage]
-        column, error = getattr(value, name), self._error(value, reference, rng)
+        column = getattr(value, name)
+        error = self._error(value, reference, rng)
         return replace(value, **{name: column + np.broadcast_to(error, column.shape)})
 
     def _error(self, value, reference, rng):
@@ -177,7 +186,9 @@ class Effect:
             Where or when it acts, in words.
         """
         words = cls.size_in_words(parameters) if parameters else None
-        return cls.sentence.format(where=where, **words) if words else cls.meaning
+        if words:
+            return cls.sentence.format(where=where, **words)
+        return cls.meaning
 
     @classmethod
     def size_in_words(cls, parameters: dict[str, SizeEstimate]) -> dict[str, str] | None:

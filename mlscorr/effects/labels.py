@@ -48,7 +48,9 @@ def lowered(text: str) -> str:
     >>> lowered("Scanner clock offset"), lowered("GNSS jump")
     ('scanner clock offset', 'GNSS jump')
     """
-    return text if text[1:2].isupper() else text[:1].lower() + text[1:]
+    if text[1:2].isupper():
+        return text
+    return text[:1].lower() + text[1:]
 
 
 def meaning(label: str) -> str:
@@ -74,7 +76,9 @@ def family(label: str) -> str:
     if label in OTHERS:
         return label
     kinds = [effects_by_name().get(name) for name in label.split("+")]
-    return "noise" if all(kind and kind.is_scatter() for kind in kinds) else "effect"
+    if all(kind and kind.is_scatter() for kind in kinds):
+        return "noise"
+    return "effect"
 
 
 def parameter_title(name: str) -> str:

@@ -36,9 +36,13 @@ class Boresight(Effect):
     )
     parts: ClassVar = BODY
     magnitude: tuple[float, float, float] = quantity(
-        "deg", 10.0, "a mounting is known from its drawing to a degree", count=3, typical=0.05,
+        "deg",
+        10.0,
+        "a mounting is known from its drawing to a degree",
+        count=3,
+        typical=0.05,
         source="Mao et al. 2015, Table 6: 0.03, 0.06 and 0.21 deg",
-    )  # fmt: skip
+    )
 
     def _change(self, value, reference, rng):
         turn = Rotation.from_rotvec(self.magnitude, degrees=True)
@@ -67,9 +71,13 @@ class LeverArm(Effect):
     )
     parts: ClassVar = BODY
     magnitude: tuple[float, float, float] = quantity(
-        "m", 5.0, "no car is larger", count=3, typical=0.02,
+        "m",
+        5.0,
+        "no car is larger",
+        count=3,
+        typical=0.02,
         source="Mao et al. 2015, Table 6: 0.0005, 0.015 and 0.065 m",
-    )  # fmt: skip
+    )
 
     def _change(self, value, reference, rng):
         return Mounting(value.lever_arm - np.array(self.magnitude), value.boresight)

@@ -28,7 +28,10 @@ def run_file(path: Path) -> ModuleType:
     try:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:  # a user's code may raise anything
-        line = f" (line {error.lineno})" if isinstance(error, SyntaxError) and error.lineno else ""
+        if isinstance(error, SyntaxError) and error.lineno:
+            line = f" (line {error.lineno})"
+        else:
+            line = ""
         raise ValueError(f"{path} can't be run{line}: {type(error).__name__}: {error}") from error
     return module
 
@@ -53,7 +56,8 @@ def register_file(path: Path | str) -> tuple[type[Effect], ...]:
     FileNotFoundError
         Where there is none.
     """
-    path, before = Path(path), set(known_effects())
+    path = Path(path)
+    before = set(known_effects())
     if not path.is_file():
         raise FileNotFoundError(f"{path} does not exist; give a file that registers effects.")
     run_file(path)

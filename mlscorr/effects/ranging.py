@@ -26,9 +26,13 @@ class BeamDivergence(Effect):
     sentence: ClassVar = "The laser beam is {size} wider than stated."
     remedy: ClassVar = "Ask the maker for the width of the scanner's beam."
     magnitude: float = quantity(
-        "mrad", 20.0, "a footprint of 20 cm at 10 m is no laser scanner's", typical=0.35,
-        source="RIEGL VQ-250 data sheet: 0.35 mrad", least=0.0,
-    )  # fmt: skip
+        "mrad",
+        20.0,
+        "a footprint of 20 cm at 10 m is no laser scanner's",
+        typical=0.35,
+        source="RIEGL VQ-250 data sheet: 0.35 mrad",
+        least=0.0,
+    )
 
     def _change(self, value, reference, rng):
         return value + 1e-3 * self.magnitude
@@ -79,9 +83,12 @@ class RangeBias(Effect):
     remedy: ClassVar = "Have the scanner's zero range checked on a base line."
     sides: ClassVar = ("long", "short")
     magnitude: float = quantity(
-        "m", 1.0, "the manufacturer's calibration can't miss a metre", typical=0.010,
+        "m",
+        1.0,
+        "the manufacturer's calibration can't miss a metre",
+        typical=0.010,
         source="RIEGL VQ-250 data sheet: accuracy 10 mm",
-    )  # fmt: skip
+    )
 
     def _error(self, value, reference, rng):
         return self.magnitude
@@ -154,9 +161,12 @@ class IncidenceBias(Effect):
     remedy: ClassVar = "Check ranges at grazing incidence against a known plane."
     sides: ClassVar = ("long", "short")
     magnitude: float = quantity(
-        "m", 0.1, "it acts ninefold at grazing incidence, and would show to the eye", typical=0.003,
+        "m",
+        0.1,
+        "it acts ninefold at grazing incidence, and would show to the eye",
+        typical=0.003,
         source="estimate: millimetres, as the noise that Soudarissanane et al. 2009 find at 60 deg",
-    )  # fmt: skip
+    )
 
     def _error(self, value, reference, rng):
         return self.magnitude * (1.0 / np.maximum(value.incidence, SETTINGS.grazing_cosine) - 1.0)
@@ -184,9 +194,13 @@ class RangeNoise(Effect):
         "checked."
     )
     magnitude: float = quantity(
-        "m", 1.0, "no surveying scanner is as noisy", typical=0.005,
-        source="RIEGL VQ-250 data sheet: precision 5 mm", least=0.0,
-    )  # fmt: skip
+        "m",
+        1.0,
+        "no surveying scanner is as noisy",
+        typical=0.005,
+        source="RIEGL VQ-250 data sheet: precision 5 mm",
+        least=0.0,
+    )
 
     def _error(self, value, reference, rng):
         return self.magnitude * rng.standard_normal(len(value))
@@ -209,9 +223,13 @@ class Dropout(Effect):
     sentence: ClassVar = "{size} of the pulses that should come back are lost."
     remedy: ClassVar = "Look for wet or dark surfaces, or a dirty window of the scanner."
     magnitude: float = quantity(
-        "ratio", 0.99, "nothing to work with would be left", typical=0.05,
-        source="estimate: dark or wet surfaces return nothing for one pulse in twenty", least=0.0,
-    )  # fmt: skip
+        "ratio",
+        0.99,
+        "nothing to work with would be left",
+        typical=0.05,
+        source="estimate: dark or wet surfaces return nothing for one pulse in twenty",
+        least=0.0,
+    )
 
     def _change(self, value, reference, rng):
         return replace(value, kept=value.kept & (rng.random(len(value)) >= self.magnitude))

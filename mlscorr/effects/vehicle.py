@@ -39,9 +39,12 @@ class HeadingDrift(Effect):
     )
     sides: ClassVar = ("to the right", "to the left")
     magnitude: float = quantity(
-        "deg", 10.0, "any GNSS/INS knows the heading of a moving car better", typical=0.03,
+        "deg",
+        10.0,
+        "any GNSS/INS knows the heading of a moving car better",
+        typical=0.03,
         source="twice the paper's heading sigma of 0.014 deg (Mao et al. 2015, section 3)",
-    )  # fmt: skip
+    )
 
     def _change(self, value, reference, rng):
         start, end = value.passes[value.segment(value.gps_time)].T
@@ -80,9 +83,13 @@ class PositionStep(Effect):
     sides: ClassVar = EAST_NORTH_UP
     parts: ClassVar = MAP
     magnitude: tuple[float, float, float] = quantity(
-        "m", 20.0, GNSS_LOST, count=3, typical=0.19,
+        "m",
+        20.0,
+        GNSS_LOST,
+        count=3,
+        typical=0.19,
         source="one cycle of the GPS L1 carrier, 1575.42 MHz (IS-GPS-200), wrongly fixed",
-    )  # fmt: skip
+    )
     time: float = quantity("s", 86_400.0, IN_TIME, least=0.0)
 
     def _error(self, value, reference, rng):
@@ -121,14 +128,22 @@ class PositionBump(Effect):
     sides: ClassVar = EAST_NORTH_UP
     parts: ClassVar = MAP
     magnitude: tuple[float, float, float] = quantity(
-        "m", 20.0, GNSS_LOST, count=3, typical=0.1,
+        "m",
+        20.0,
+        GNSS_LOST,
+        count=3,
+        typical=0.1,
         source="raw east RMS under multipath, 0.107 m (Mao et al. 2015, Table 5)",
-    )  # fmt: skip
+    )
     time: float = quantity("s", 86_400.0, IN_TIME, least=0.0)
     width: float = quantity(
-        "s", 3600.0, "a bias of an hour is a datum", least=0.1, typical=10.0,
+        "s",
+        3600.0,
+        "a bias of an hour is a datum",
+        least=0.1,
+        typical=10.0,
         source="estimate: a house front of 50-100 m passed at 8 m/s",
-    )  # fmt: skip
+    )
 
     def _error(self, value, reference, rng):
         middle = _moment(self, value, reference)
@@ -160,9 +175,13 @@ class PositionNoise(Effect):
         "is known with the sigmas found."
     )
     magnitude: float = quantity(
-        "m", 10.0, GNSS_LOST, typical=0.02,
-        source="nominal precision of the POS of Mao et al. 2015, section 3", least=0.0,
-    )  # fmt: skip
+        "m",
+        10.0,
+        GNSS_LOST,
+        typical=0.02,
+        source="nominal precision of the POS of Mao et al. 2015, section 3",
+        least=0.0,
+    )
 
     # what a diagnosis says of it besides: of all sigmas, or of windows in which they are larger
     FACTOR: ClassVar = "factor on sigma"
@@ -205,7 +224,10 @@ class PositionNoise(Effect):
             for start, length in zip(starts, lengths, strict=True)
         ]
         left = len(spans) - 2
-        more = ["once more"] if left == 1 else [f"{left} times more"] if left > 1 else []
+        if left == 1:
+            more = ["once more"]
+        else:
+            more = [f"{left} times more"] if left > 1 else []
         return f"up to {max(factors):.0f} times as large {joined([*spans[:2], *more])}"
 
     def _error(self, value, reference, rng):

@@ -151,7 +151,9 @@ def joined(words: Iterable[str], last: str = "and") -> str:
     ('a, b and c', 'a or b', '')
     """
     *first, final = list(words) or [""]
-    return f"{', '.join(first)} {last} {final}" if first else final
+    if first:
+        return f"{', '.join(first)} {last} {final}"
+    return final
 
 
 def vector(
@@ -167,7 +169,8 @@ def vector(
     sides : tuple of p pairs of str
         Words for above and below zero.
     """
-    texts, certain = [], []
+    texts = []
+    certain = []
     for name, (above, below) in zip(names, sides, strict=True):
         value, sigma, unit = parameters.get(name, (None, None, ""))
         if not known(value):

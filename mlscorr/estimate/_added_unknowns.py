@@ -42,9 +42,12 @@ class AddedUnknowns:
 
     @classmethod
     def of(
-        cls, equations: Equations, parameters: SignalParameters, columns: np.ndarray,
+        cls,
+        equations: Equations,
+        parameters: SignalParameters,
+        columns: np.ndarray,
         prior_sigma: np.ndarray,
-    ) -> AddedUnknowns:  # fmt: skip
+    ) -> AddedUnknowns:
         """Estimate the unknowns.
 
         Parameters

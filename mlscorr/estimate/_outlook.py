@@ -41,9 +41,12 @@ class Outlook:
 
     @classmethod
     def of(
-        cls, equations: Equations, families: list[tuple[SignalParameters, float]], rows: np.ndarray,
+        cls,
+        equations: Equations,
+        families: list[tuple[SignalParameters, float]],
+        rows: np.ndarray,
         sights: list[list[int]],
-    ) -> Outlook:  # fmt: skip
+    ) -> Outlook:
         """Before any of them is observed.
 
         Parameters
@@ -56,16 +59,19 @@ class Outlook:
             Epochs at which each target would be seen: as far and as well as the median control
             point, on its side.
         """
-        thinned, at_target = with_fewer_rows(equations), np.concatenate(sights)
+        thinned = with_fewer_rows(equations)
+        at_target = np.concatenate(sights)
         still = np.tile(np.eye(3, 6), (len(rows), 1, 1))
         moved = np.concatenate([still, _target_partials(equations, at_target)])
         at = np.concatenate([rows, at_target])
         weights = np.array([weight for _, weight in families])
         shown = [_shown(equations, chosen, at, moved) for chosen, _ in families]
-        covariances = np.stack([
-            covariance_given(thinned.rows(chosen), [part], thinned.believed(chosen))
-            for (chosen, _), part in zip(families, shown, strict=True)
-        ])  # fmt: skip
+        covariances = np.stack(
+            [
+                covariance_given(thinned.rows(chosen), [part], thinned.believed(chosen))
+                for (chosen, _), part in zip(families, shown, strict=True)
+            ]
+        )
         ends = 3 * (len(rows) + np.cumsum([len(sight) for sight in sights]))
         targets = [np.arange(end - 3 * len(s), end) for end, s in zip(ends, sights, strict=True)]
         noise = [_target_noise(equations.noise, len(equations.names), len(s)) for s in sights]
@@ -128,21 +134,28 @@ def with_fewer_rows(equations: Equations) -> Equations:
         return equations
     thinned = equations.select(np.arange(0, len(equations.names), step))
     noise = thinned.noise
-    own, shared = noise.own / step, None if noise.shared is None else noise.shared / np.sqrt(step)
+    own = noise.own / step
+    if noise.shared is None:
+        shared = None
+    else:
+        shared = noise.shared / np.sqrt(step)
     return replace(thinned, noise=Noise(own, noise.group, shared))
 
 
 def _shown(equations, parameters, rows, partials):
     """SparseRows of what is corrected of points with partials (n, 3, 6) at epochs."""
-    times, n = equations.trajectory.gps_time[rows], len(rows)
-    noise, design = Noise(np.zeros((n, 3, 3))), equations.pose_design(times)[:, :3]
+    times = equations.trajectory.gps_time[rows]
+    n = len(rows)
+    noise = Noise(np.zeros((n, 3, 3)))
+    design = equations.pose_design(times)[:, :3]
     signals = pose_signals(equations.stated_epochs.at(rows), parameters, partials)
     return SparseRows(times[:, None], np.zeros((n, 3)), noise, design, signals)
 
 
 def _target_partials(equations, rows):
     """Partials (n, 3, 6) of targets that are seen as the median control point, at epochs."""
-    trajectory, n = equations.trajectory, len(equations.names)
+    trajectory = equations.trajectory
+    n = len(equations.names)
     turned = stated_sigma(trajectory, equations.pos, equations.observed).rotation.as_matrix()
     arm = np.median(turned.swapaxes(1, 2) @ equations.partials[:n, :, 3:] @ turned, axis=0)
     attitude = trajectory.attitude[rows].as_matrix()

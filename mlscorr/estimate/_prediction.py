@@ -41,13 +41,15 @@ class GridPredictions:
 
         Regular in time: sessions may differ in rate.
         """
-        trajectory, n = self.equations.trajectory, len(self.equations.trajectory)
+        trajectory = self.equations.trajectory
+        n = len(self.equations.trajectory)
         history = self.equations.stated.history
         starts = history.edges[1:-1]
         steps = np.concatenate([history.steps.before, history.steps.after, starts])
         edges = np.searchsorted(trajectory.gps_time, [*trajectory.gaps.ravel(), *steps])
         control = np.searchsorted(trajectory.gps_time, self.equations.observed)
-        time, begins = trajectory.gps_time, np.isin(trajectory.gps_time, trajectory.gaps[:, 1])
+        time = trajectory.gps_time
+        begins = np.isin(trajectory.gps_time, trajectory.gaps[:, 1])
         passed = np.cumsum(np.where(begins, 0.0, np.diff(time, prepend=time[0])))
         shares = np.linspace(0.0, passed[-1], min(n, SETTINGS.prediction_epochs))
         regular = np.interp(shares, passed, np.arange(n)).round().astype(int)
@@ -109,12 +111,15 @@ def predict_pose_error(
     solved : Collocation, optional
         Of these equations under the most probable parameters, where somebody holds it.
     """
-    trajectory, mode = equations.trajectory, posterior.modes[0][0]
+    trajectory = equations.trajectory
+    mode = posterior.modes[0][0]
     solved = solved or equations.solve(mode)
     pose, covariance = solved.predict(*pose_rows(equations, mode))
     sigma = np.sqrt(np.maximum(np.einsum("qii->qi", covariance), SETTINGS.smallest_sigma**2))
     predictions = predictions or GridPredictions(equations)
-    rows, mean, square = predictions.rows, 0.0, 0.0
+    rows = predictions.rows
+    mean = 0.0
+    square = 0.0
     for parameters, weight in posterior.mixture:
         predicted, variance = predictions.under(parameters)
         mean = mean + weight * predicted
@@ -146,8 +151,10 @@ def bridge_steps(
         Position in m, rotation in rad, at every epoch.
     covariance : (n, 6, 6) array
     """
-    time, corrected = trajectory.gps_time, trajectory.position + pose[:, :3]
-    pose, covariance = pose.copy(), covariance.copy()
+    time = trajectory.gps_time
+    corrected = trajectory.position + pose[:, :3]
+    pose = pose.copy()
+    covariance = covariance.copy()
     for before, after, sigma in zip(steps.before, steps.after, steps.sigma, strict=True):
         first, last = np.searchsorted(time, [before, after])
         inside = slice(first + 1, last)

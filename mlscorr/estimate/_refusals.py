@@ -80,10 +80,12 @@ def drift_odds(
     windows : int
         Number of the stretches that are known to be such drift.
     """
-    odds, drifts = 0.0, windows
+    odds = 0.0
+    drifts = windows
     for name in names:
         others = equations.without(set(names) - {name})
-        solved, passes = others.solve(parameters), np.flatnonzero(others.names == name).tolist()
+        solved = others.solve(parameters)
+        passes = np.flatnonzero(others.names == name).tolist()
         misread = gross_evidence(solved, {name: others.target_rows[name]})[name]
         mistaken = _positive(solved, {number: _rows([number]) for number in passes})
         drift = _positive(solved, {number: _rows(_beside(others, number)) for number in passes})

@@ -75,12 +75,14 @@ def find_windows(equations: Equations, screening: Screening) -> tuple[DriftWindo
     """
     rejected = {test.name: test for test in screening.outliers}
     order = np.argsort(equations.observed, kind="stable")
-    names, times = equations.names[order], equations.observed[order]
+    names = equations.names[order]
+    times = equations.observed[order]
     is_out = np.isin(names, list(rejected))
     passes = np.flatnonzero(np.diff(equations.trajectory.segment(times))) + 1
     windows = []
     for start, end in runs(is_out, passes):
-        rows, run = order[start:end], dict.fromkeys(names[start:end].tolist())
+        rows = order[start:end]
+        run = dict.fromkeys(names[start:end].tolist())
         deviations = [_Deviation.of(equations, rejected[name], rows) for name in run]
         if _is_drift(deviations):
             windows.append(_window(equations.trajectory, times, start, end, deviations))
@@ -125,7 +127,8 @@ def _window(trajectory, times, start, end, run):
     first_after = times[end] if end < len(times) else np.inf
     ways = np.vstack([deviation.inside for deviation in run])
     size = float(np.sqrt(np.mean(np.sum(ways**2, axis=1)) / 3))
-    first, last = max(begin, last_before), min(finish, first_after)
+    first = max(begin, last_before)
+    last = min(finish, first_after)
     names = tuple(deviation.name for deviation in run)
     return DriftWindow(float(first), float(last), size, bool(first_after > finish), names)
 

@@ -100,7 +100,8 @@ def _search(equations):
 
     Large surveys are searched in blocks.
     """
-    best, modes = frozenset(), ()
+    best = frozenset()
+    modes = ()
     for _ in range(SETTINGS.rounds):
         modes = [chosen for chosen, _ in most_probable(equations.without(best), modes)]
         names = frozenset()
@@ -133,7 +134,8 @@ def _shrunk(modes):
 
 def _eliminate(equations, parameters, objective):
     """Sets of wrong targets, growing by the most unlikely one, with their log posteriors."""
-    names, score = frozenset(), objective(parameters.family, objective.logarithms(parameters))
+    names = frozenset()
+    score = objective(parameters.family, objective.logarithms(parameters))
     yield names, score
     while may_go(equations, names | {""}):
         kept = equations.without(names)
@@ -141,7 +143,8 @@ def _eliminate(equations, parameters, objective):
         worst = max(gains, key=gains.get)
         if gains[worst] < -np.log(SETTINGS.strong_evidence):
             return
-        names, score = names | {worst}, score + gains[worst]
+        names = names | {worst}
+        score = score + gains[worst]
         yield names, score
 
 
@@ -172,9 +175,12 @@ def _doubtful_pairs(equations, posterior):
     if not may_go(equations, {"", " "}):
         return
     modes = [chosen for chosen, _ in posterior.modes]
-    none, pairs, ways = -np.inf, {}, {}
+    none = -np.inf
+    pairs = {}
+    ways = {}
     for block in Objective.of(equations).blocks:
-        objective, rows = Objective.of(block), block.target_rows
+        objective = Objective.of(block)
+        rows = block.target_rows
         for parameters in _shrunk(modes):
             score = objective(parameters.family, objective.logarithms(parameters))
             none = max(none, score)

@@ -52,9 +52,13 @@ class TieEquations:
 
     @classmethod
     def of(
-        cls, trajectory: Trajectory, pos: Pos, ties: Ties, stated: StatedSigma,
+        cls,
+        trajectory: Trajectory,
+        pos: Pos,
+        ties: Ties,
+        stated: StatedSigma,
         mountings: Mapping[int, Mounting] | None = None,
-    ) -> TieEquations:  # fmt: skip
+    ) -> TieEquations:
         """The equations of ties.
 
         Parameters
@@ -69,7 +73,8 @@ class TieEquations:
             Those with which the ties were georeferenced and whose errors are estimated, by the
             number of their scanner.
         """
-        times, places = ties.gps_time.ravel(), ties.place.reshape(-1, 3)
+        times = ties.gps_time.ravel()
+        places = ties.place.reshape(-1, 3)
         along = along_ties(ties.direction, pose_partials(trajectory, places, times))
         epochs = _epochs(times, stated.history)
         return cls(
@@ -94,11 +99,15 @@ class TieEquations:
         """
         views = np.arange(2 * len(self)).reshape(-1, 2)[rows].ravel()
         return replace(
-            self, gps_time=self.gps_time[rows], misclosure=self.misclosure[rows],
-            variance=self.variance[rows], partials=self.partials[rows],
-            stated=self.stated.at(views), weight=self.weight[rows],
+            self,
+            gps_time=self.gps_time[rows],
+            misclosure=self.misclosure[rows],
+            variance=self.variance[rows],
+            partials=self.partials[rows],
+            stated=self.stated.at(views),
+            weight=self.weight[rows],
             mounting=None if self.mounting is None else self.mounting[rows],
-        )  # fmt: skip
+        )
 
     def with_starts(self, starts: np.ndarray) -> TieEquations:
         """The same with drift that grows from other times on.
@@ -120,7 +129,8 @@ class TieEquations:
             A (q, 6, p) of position and rotation, where the columns of mountings come first: they
             move no pose. What comes behind them no tie sees.
         """
-        n, times = len(self), self.gps_time.ravel()
+        n = len(self)
+        times = self.gps_time.ravel()
         views = self.partials.reshape(2 * n, 1, 6)
         pose = pose_design(times)
         design = (views @ pose).reshape(n, 2, 1, pose.shape[2]).sum(axis=1)

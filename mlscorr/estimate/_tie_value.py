@@ -40,7 +40,8 @@ def tie_value(estimate: Estimate) -> TieValue:
     estimate : Estimate
         With ties.
     """
-    equations, residuals = estimate.equations, estimate.ties
+    equations = estimate.equations
+    residuals = estimate.ties
     if equations.ties is None or residuals is None:
         return TieValue({"control": 1.0}, None)
     solved = equations.solve(estimate.parameters)

@@ -91,7 +91,9 @@ def robust_ties(
         return weighed
     prior = Objective((), weighed.equations.prior(weighed.equations))
     other = graduated(equations, prior.parameters(INTEGRATED, prior.initial), ties)
-    return other if _held(other) > held else weighed
+    if _held(other) > held:
+        return other
+    return weighed
 
 
 def _held(weighed):

@@ -29,14 +29,21 @@ def position_equations(
     order : int
     prior : function of Equations
     """
-    position, times = matched.observations.position, matched.gps_time
+    position = matched.observations.position
+    times = matched.gps_time
     stated = stated_sigma(trajectory, pos, times)
     return Equations(
-        names=np.array(matched.name), gps_time=times, misclosure=matched.misclosure,
+        names=np.array(matched.name),
+        gps_time=times,
+        misclosure=matched.misclosure,
         noise=_noise(matched, stated.history.steps),
-        partials=pose_partials(trajectory, position, times), stated=stated, order=order,
-        prior=prior, trajectory=trajectory, pos=pos,
-    )  # fmt: skip
+        partials=pose_partials(trajectory, position, times),
+        stated=stated,
+        order=order,
+        prior=prior,
+        trajectory=trajectory,
+        pos=pos,
+    )
 
 
 def with_fallbacks(equations: Equations, steps: Steps) -> Equations:
@@ -78,9 +85,12 @@ def with_fallbacks(equations: Equations, steps: Steps) -> Equations:
 
 
 def mounting_equations(
-    equations: Equations, matched: Matched, mountings: Sequence[Mounting], corrected: np.ndarray,
+    equations: Equations,
+    matched: Matched,
+    mountings: Sequence[Mounting],
+    corrected: np.ndarray,
     weak: np.ndarray,
-) -> Equations:  # fmt: skip
+) -> Equations:
     """The equations of what k mountings lack  (Eq. 16-18), from those of the POS error.
 
     Below the targets two epochs of three rows hold each mounting weakly.
@@ -97,7 +107,8 @@ def mounting_equations(
     weak : (6 k,) array
         One sigma of what is known of the mountings without the survey. Units: m and rad.
     """
-    times, position = matched.gps_time, matched.observations.position
+    times = matched.gps_time
+    position = matched.observations.position
     bare = replace(
         equations,
         gps_time=times,
@@ -107,9 +118,13 @@ def mounting_equations(
         order=NO_TREND,
     )
     columns = partials_by_scanner(
-        mounting_partials, equations.trajectory, dict(enumerate(mountings)), position, times,
+        mounting_partials,
+        equations.trajectory,
+        dict(enumerate(mountings)),
+        position,
+        times,
         matched.scanner,
-    )  # fmt: skip
+    )
     return with_mountings(bare, columns, -corrected, weak)
 
 
@@ -127,8 +142,12 @@ def with_mountings(
     lacking, sigma : (6 k,) array
         What is believed to be missing in each lever arm and boresight, and how well. Units: m, rad.
     """
-    n, number = len(equations.names), len(sigma) // 3
-    held = equations.gps_time[0] if n else equations.trajectory.gps_time[0]
+    n = len(equations.names)
+    number = len(sigma) // 3
+    if n:
+        held = equations.gps_time[0]
+    else:
+        held = equations.trajectory.gps_time[0]
     mounting = np.zeros((len(equations.gps_time) + number, 3, len(sigma)))
     mounting[:n] = columns
     mounting[n : n + number] = np.eye(len(sigma)).reshape(number, 3, -1)
@@ -159,7 +178,8 @@ def _noise(matched, steps):
     """Extraction, the step inside which it was seen, and the survey error, which all passes of a
     target share  (Eq. 19).
     """
-    number, times = matched.point_number, matched.gps_time[:, None]
+    number = matched.point_number
+    times = matched.gps_time[:, None]
     shared = matched.surveyed.sigma[np.unique(number, return_index=True)[1]]
     inside = ((times >= steps.before) & (times <= steps.after)).astype(float)
     stepped = np.einsum("ns,si,sj->nij", inside, steps.size, steps.size)

@@ -216,7 +216,9 @@ class Calibration(Summary):
         is_both = (np.sort(ties.scanner) == [0, number]).all(axis=1) & (first == last)
         rows = self.equations.ties.mounting[is_both]
         variance = np.einsum("ni,ij,nj->n", rows, self.lsc.covariance, rows)
-        return float(np.sqrt(variance.mean())) if len(rows) else None
+        if len(rows):
+            return float(np.sqrt(variance.mean()))
+        return None
 
     def of(self, number: int, scanner: np.ndarray) -> Calibration:
         """The calibration of a scanner, with the POS error by all of them.
@@ -245,7 +247,9 @@ def sigma_note(determined: np.ndarray) -> str:
     """On what sigmas of a mounting rest, of its components (6,) that are determined or not."""
     parts = ", ".join(compress(MOUNTING_COMPONENTS, ~determined))
     note = f"not determined: {parts}; its sigma holds only as far as the POS's own do"
-    return note if parts else ""
+    if parts:
+        return note
+    return ""
 
 
 def mounted_corrections(

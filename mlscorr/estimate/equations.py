@@ -101,7 +101,10 @@ class Equations(Summary):
         starts : (k,) array
             One for each segment. Units: s.
         """
-        ties = None if self.ties is None else self.ties.with_starts(starts)
+        if self.ties is None:
+            ties = None
+        else:
+            ties = self.ties.with_starts(starts)
         return replace(self, stated=replace(self.stated, starts=starts), ties=ties)
 
     @property
@@ -123,11 +126,14 @@ class Equations(Summary):
 
     def _rows(self, kept):
         return replace(
-            self, gps_time=self.gps_time[kept], misclosure=self.misclosure[kept],
-            noise=self.noise.select(kept), partials=self.partials[kept],
+            self,
+            gps_time=self.gps_time[kept],
+            misclosure=self.misclosure[kept],
+            noise=self.noise.select(kept),
+            partials=self.partials[kept],
             stated=self.stated.at(kept),
             mounting=None if self.mounting is None else self.mounting[kept],
-        )  # fmt: skip
+        )
 
     def without_fallbacks(self) -> Equations:
         """The equations of control points alone."""
@@ -137,7 +143,8 @@ class Equations(Summary):
 
     def without_outer_fallbacks(self) -> Equations:
         """The equations without fall-backs outside the control span."""
-        n, first = len(self.gps_time), len(self.gps_time) - self.fallbacks
+        n = len(self.gps_time)
+        first = len(self.gps_time) - self.fallbacks
         fallbacks = self.gps_time[first:]
         inside = (fallbacks >= self.span[0]) & (fallbacks <= self.span[1])
         kept = np.append(np.arange(first), np.arange(first, n)[inside])
@@ -150,7 +157,9 @@ class Equations(Summary):
         ----------
         names : collection of str
         """
-        return self.select(~np.isin(self.names, list(names))) if names else self
+        if names:
+            return self.select(~np.isin(self.names, list(names)))
+        return self
 
     @property
     def span(self) -> tuple[float, float]:
@@ -168,7 +177,8 @@ class Equations(Summary):
         Where they are none or as good as one, or where ties tell more of the time than how far
         apart targets stand, the believed correlation time as the paper's rule has it.
         """
-        control, recorded_time = np.sort(self.observed), self.trajectory.recorded_time
+        control = np.sort(self.observed)
+        recorded_time = self.trajectory.recorded_time
         is_short = len(control) == 0 or recorded_time(*control[[0, -1]]) < SAME_EPOCH
         if is_short or self.ties is not None:
             return self.pos.correlation_time / SETTINGS.start_ratio
@@ -197,7 +207,8 @@ class Equations(Summary):
         control = self.gps_time, self.misclosure, self.noise, self.design
         if parameters is None:
             return collocate(*control, ())
-        rows, believed = self.rows(parameters), self.believed(parameters)
+        rows = self.rows(parameters)
+        believed = self.believed(parameters)
         if self.ties is None:
             return collocate(*control, rows[0].signals, believed)
         like = None if like is None else like.solver
@@ -231,7 +242,8 @@ class Equations(Summary):
         """
         if not self._is_dense:
             return np.array([self.weigh(each, solved).log_likelihood for each in near])
-        rows, changed = self.rows(parameters), [self.rows(each) for each in near]
+        rows = self.rows(parameters)
+        changed = [self.rows(each) for each in near]
         believed = [self.believed(each) for each in near]
         return solved.log_likelihood + likelihood_changes(solved, rows, changed, believed)
 
@@ -272,7 +284,9 @@ class Equations(Summary):
         """A (n + h, 3, p) of the observations; no epoch without a target tells of a trend."""
         trend = self._trend(self.gps_time)
         trend[len(self.names) :] = 0.0
-        return trend if self.mounting is None else np.concatenate([self.mounting, trend], axis=2)
+        if self.mounting is None:
+            return trend
+        return np.concatenate([self.mounting, trend], axis=2)
 
     def pose_design(self, gps_time: np.ndarray) -> np.ndarray:
         """A (q, 6, p) of position and rotation at any epochs; a mounting moves no pose.

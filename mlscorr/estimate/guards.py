@@ -91,7 +91,10 @@ def find_guards(
         With its sigmas.
     """
     ratio = _variance_ratio(equations, parameters, corrected)
-    test = None if equations.ties is not None else _global_test(equations, parameters)
+    if equations.ties is not None:
+        test = None
+    else:
+        test = _global_test(equations, parameters)
     everywhere = Guards((0.0, 0.0), (), ratio, test)
     return guards_of(equations.trajectory.scanned_passes, equations.observed, everywhere)
 
@@ -153,9 +156,12 @@ def _global_test(equations, parameters):
         return None
     moments = np.zeros(3)  # what it is, its expectation and its variance
     for block in Objective.of(equations).blocks:
-        solved, rows = block.solve(parameters), np.arange(3 * len(block.names))
-        projected, noise = solved.projected[rows], block.noise.block(rows)
-        weights, precision = solved.weights[rows], solved.solver.precision(rows)
+        solved = block.solve(parameters)
+        rows = np.arange(3 * len(block.names))
+        projected = solved.projected[rows]
+        noise = block.noise.block(rows)
+        weights = solved.weights[rows]
+        precision = solved.solver.precision(rows)
         shares = (precision - projected @ projected.T) @ noise
         moments += weights @ noise @ weights, np.trace(shares), 2 * np.sum(shares * shares.T)
     statistic, expected, variance = moments
@@ -175,7 +181,8 @@ def sparse_warnings(equations: Equations, order: int) -> Iterator[str]:
     order : int
         Of the trend, as asked for.
     """
-    targets, epochs = len(equations.target_rows), len(control_epochs(equations.observed))
+    targets = len(equations.target_rows)
+    epochs = len(control_epochs(equations.observed))
     if equations.order < order:
         yield (
             f"{counted(targets, 'control point')} at {counted(epochs, 'epoch')} "
@@ -267,11 +274,10 @@ def _extrapolated(equations, time):
     ends = _scanned_times(equations)[[0, -1]]
     for length, where in ((first - ends[0], "before the first"), (ends[1] - last, "past the last")):
         if length > time:
-            effect = (
-                "only the trend applies"
-                if length >= SETTINGS.faded_times * time
-                else "it fades to the trend"
-            )
+            if length >= SETTINGS.faded_times * time:
+                effect = "only the trend applies"
+            else:
+                effect = "it fades to the trend"
             yield (
                 f"Signal extrapolated {length:.0f} s {where} control point ({length / time:.1f} "
                 f"correlation times): {effect} there."
@@ -281,7 +287,8 @@ def _extrapolated(equations, time):
 def _faded(equations, time, start, end):
     """A sentence about the longest gap between control points where signals fade in it."""
     first, last = equations.span
-    scanned, length = _scanned_times(equations), end - start
+    scanned = _scanned_times(equations)
+    length = end - start
     away = np.minimum(scanned - start, end - scanned).max(initial=0.0)
     if 2 * away > SETTINGS.faded_times * time and first <= start and end <= last:
         yield (

@@ -96,10 +96,14 @@ def believed_mounting(
 
 
 def calibration_by(
-    trajectory: Trajectory, recorded: Sequence[Mounting], equations: Equations,
-    screening: Screening, least_squares: tuple[np.ndarray, MountingEstimate], used: np.ndarray,
+    trajectory: Trajectory,
+    recorded: Sequence[Mounting],
+    equations: Equations,
+    screening: Screening,
+    least_squares: tuple[np.ndarray, MountingEstimate],
+    used: np.ndarray,
     notes: tuple[str, ...],
-) -> Calibration:  # fmt: skip
+) -> Calibration:
     """The Calibration by equations, and the parameters that were chosen for them.
 
     Parameters
@@ -118,11 +122,18 @@ def calibration_by(
     parameters = posterior.modes[0][0]
     drift = Correction.by_pose_error(trajectory, *predict_pose_error(equations, posterior))
     return Calibration(
-        trajectory=trajectory, recorded=tuple(recorded), lsc=lsc, ls=least_squares[1],
-        determined=determined, screening=screening, used=used,
-        guards=find_guards(equations, parameters, drift.corrected), equations=equations,
-        drift=drift, notes=notes,
-    )  # fmt: skip
+        trajectory=trajectory,
+        recorded=tuple(recorded),
+        lsc=lsc,
+        ls=least_squares[1],
+        determined=determined,
+        screening=screening,
+        used=used,
+        guards=find_guards(equations, parameters, drift.corrected),
+        equations=equations,
+        drift=drift,
+        notes=notes,
+    )
 
 
 def control_fault(matched: Matched, number: int) -> str:
@@ -157,7 +168,8 @@ def _least_squares(equations, matched, recorded):
 
     Iterated, as a rotation is not linear; the targets are georeferenced anew each time.
     """
-    correction, step = np.zeros(6 * len(recorded)), 0.0
+    correction = np.zeros(6 * len(recorded))
+    step = 0.0
     for _ in range(SETTINGS.iterations):
         correction = correction + step  # here, so that the last equations are about the last one
         mountings, about = linearized(equations, matched, recorded, correction)
@@ -167,7 +179,8 @@ def _least_squares(equations, matched, recorded):
             break
     # What the weak hold of the mounting adds to the redundancy is what it adds to the estimate
     held = solved.trend_covariance / _weak(recorded) ** 2
-    observed, sigma0 = 3 * len(matched), 1.0
+    observed = 3 * len(matched)
+    sigma0 = 1.0
     redundancy = observed - len(correction) + np.trace(held)
     if round(redundancy) > 0:  # less than one observation too many tells nothing of the noise
         sigma0 = solved.sigma0 * np.sqrt(observed / redundancy)
@@ -223,7 +236,10 @@ def prior_sigma(mounting: Mounting) -> np.ndarray:
 def _collocation(equations, posterior, recorded, start):
     """The estimate by collocation, averaged over the parameters, and what is determined (6 k,)."""
     shifting = with_shift(equations)
-    mean, square, shifted, sigma0 = 0.0, 0.0, 0.0, 0.0
+    mean = 0.0
+    square = 0.0
+    shifted = 0.0
+    sigma0 = 0.0
     for parameters, probability in posterior.points:
         solved = equations.solve(parameters)
         mean += probability * solved.trend
@@ -231,7 +247,8 @@ def _collocation(equations, posterior, recorded, start):
         sigma0 += probability * solved.sigma0
         free = shifting.solve(parameters)
         shifted += probability * np.diag(free.trend_covariance)[: len(start)]
-    correction, covariance = combined_correction(start, mean), square - np.outer(mean, mean)
+    correction = combined_correction(start, mean)
+    covariance = square - np.outer(mean, mean)
     estimate = MountingEstimate.about(recorded, correction, covariance, float(sigma0))
     return estimate, is_determined(shifted)
 

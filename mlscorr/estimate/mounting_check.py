@@ -67,11 +67,14 @@ def find_mounting_error(
     mountings : sequence of Mounting
         Of all scanners, as recorded.
     """
-    equations, residuals = estimate.equations, estimate.ties
+    equations = estimate.equations
+    residuals = estimate.ties
     if equations.ties is None or residuals is None:
         return None
-    used, targets = residuals.ties[residuals.used], matched[estimate.used]
-    trajectory, numbered = equations.trajectory, dict(enumerate(mountings))
+    used = residuals.ties[residuals.used]
+    targets = matched[estimate.used]
+    trajectory = equations.trajectory
+    numbered = dict(enumerate(mountings))
     ties = mounting_columns(trajectory, numbered, used)
     control = np.zeros((len(equations.gps_time), 3, ties.shape[1]))
     sightings = targets.observations.position, targets.gps_time, targets.scanner
@@ -99,7 +102,8 @@ def scanner_warnings(estimate: Estimate, names: Sequence[str]) -> Iterator[str]:
     least = np.repeat(SETTINGS.determined_sigma, 3)
     for number, name in enumerate(names[1:] or names):
         of_it = slice(6 * number, 6 * number + 6)
-        lacks, covariance = solved.trend[of_it], solved.trend_covariance[of_it, of_it]
+        lacks = solved.trend[of_it]
+        covariance = solved.trend_covariance[of_it, of_it]
         sigma = np.sqrt(np.diag(covariance))
         statistic = lacks @ np.linalg.solve(covariance, lacks)
         is_large = np.abs(lacks) > np.maximum(SETTINGS.setup_sigmas * sigma, least)

@@ -59,9 +59,12 @@ class MountingEstimate:
 
     @classmethod
     def about(
-        cls, recorded: Sequence[Mounting], correction: np.ndarray, covariance: np.ndarray,
+        cls,
+        recorded: Sequence[Mounting],
+        correction: np.ndarray,
+        covariance: np.ndarray,
         sigma0: float,
-    ) -> MountingEstimate:  # fmt: skip
+    ) -> MountingEstimate:
         """The estimate by corrections of recorded mountings; the calibrated ones know their sigmas.
 
         Parameters
@@ -144,7 +147,8 @@ def combined_correction(correction: np.ndarray, more: np.ndarray) -> np.ndarray:
     correction, more : (6 k,) array
         Lever arm and rotation of each. Units: m and rad.
     """
-    first, second = correction.reshape(-1, 6), more.reshape(-1, 6)
+    first = correction.reshape(-1, 6)
+    second = more.reshape(-1, 6)
     turn = Rotation.from_rotvec(second[:, 3:]) * Rotation.from_rotvec(first[:, 3:])
     return np.hstack([first[:, :3] + second[:, :3], turn.as_rotvec()]).ravel()
 

@@ -68,7 +68,10 @@ def compare_orders(
     for tried in orders:
         with_order = replace(equations, order=tried)
         objective = Objective.of(with_order)
-        modes = families if tried == order else most_probable(with_order, start)
+        if tried == order:
+            modes = families
+        else:
+            modes = most_probable(with_order, start)
         for chosen, _ in modes:
             value = objective(chosen.family, objective.logarithms(chosen))
             solved = with_order.solve(chosen)

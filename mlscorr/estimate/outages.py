@@ -45,11 +45,15 @@ def with_likely_starts(equations: Equations) -> tuple[Equations, SignalParameter
         Of control points, and of some ties, whose epochs tell starts apart between the points.
     """
     history = equations.stated.history
-    edges, stated = history.edges, equations.stated.starts
+    edges = history.edges
+    stated = equations.stated.starts
     ends_by_step = np.isin(edges[1:], history.steps.middle)
     begins_pass = np.isin(edges[:-1], history.trajectory.passes[:, 0])
     segments = list(zip(edges[:-1], edges[1:], begins_pass, ends_by_step, strict=True))
-    tied = () if equations.ties is None else equations.ties.gps_time.ravel()
+    if equations.ties is None:
+        tied = ()
+    else:
+        tied = equations.ties.gps_time.ravel()
     times = np.append(equations.observed, tied)
     objective = Objective.of(equations)
     mode, _ = objective.maximum(INTEGRATED, objective.initial)
@@ -108,11 +112,14 @@ def _contradicted(equations, parameters):
     number = equations.fallbacks
     if number == 0:
         return None
-    solved, first = equations.solve(parameters), 3 * (len(equations.gps_time) - number)
+    solved = equations.solve(parameters)
+    first = 3 * (len(equations.gps_time) - number)
     critical = chdtri(3, SETTINGS.significance / number)
     statistics = []
     for step in range(number):
         residual, covariance = solved.leave_out(np.arange(3) + first + 3 * step)
         statistics.append(float(residual @ np.linalg.solve(covariance, residual)))
     worst = int(np.argmax(statistics))
-    return worst if statistics[worst] > critical else None
+    if statistics[worst] > critical:
+        return worst
+    return None

@@ -131,13 +131,17 @@ def predict_accuracy(trajectory: Trajectory, matched: Matched, pos: Pos) -> Plan
 def _places(equations, families, sigma):
     """NextControl, at most PLACES, by the 3D sigma (n,) at all epochs of the trajectory."""
     families = [family for family in families if family[1] > SETTINGS.smallest_share]
-    trajectory, regular = equations.trajectory, _even_rows(equations.trajectory)
+    trajectory = equations.trajectory
+    regular = _even_rows(equations.trajectory)
     candidates = np.unique(_candidate_rows(trajectory, regular, sigma))
     rows = np.union1d(regular, candidates)
-    is_even, at = np.isin(rows, regular), np.searchsorted(rows, candidates)
+    is_even = np.isin(rows, regular)
+    at = np.searchsorted(rows, candidates)
     sights = [_passing(trajectory, equations, row) for row in candidates]
     outlook = Outlook.of(equations, families, rows, sights)
-    observed, names, places = equations.observed, equations.names, []
+    observed = equations.observed
+    names = equations.names
+    places = []
     taken: list[int] = []
     square = sigma[rows] ** 2
     limit = LIMIT * float(np.median(np.interp(observed, trajectory.gps_time, sigma)))
@@ -158,19 +162,23 @@ def _places(equations, families, sigma):
         drive = [float(np.sqrt(np.mean(root[is_even] ** 2))) for root in roots]
         share = [float(np.mean(root[is_even] < limit)) for root in roots]
         there = [float(root[at[best]]) for root in roots]
-        row, passes = candidates[best], len(sights[best])
-        place, time = trajectory.position[row, :2].tolist(), float(trajectory.gps_time[row])
+        row = candidates[best]
+        passes = len(sights[best])
+        place = trajectory.position[row, :2].tolist()
+        time = float(trajectory.gps_time[row])
         why = _reason(observed[:-passes], names, time, drive, share, limit, passes)
         places.append(NextControl(time, *place, *there, *drive, *share, limit, passes, why))
         names = np.append(names, [f"place {number}"] * passes)
-        square, outlook = after, chosen
+        square = after
+        outlook = chosen
     return tuple(places)
 
 
 def _reason(observed, names, time, drive, share, limit, passes):
     """Why a target belongs at a time, in words, beside those that are observed by their names."""
     order = np.argsort(observed, kind="stable")
-    times, names = observed[order], names[order]
+    times = observed[order]
+    names = names[order]
     after = int(np.searchsorted(times, time))
     if 0 < after < len(times):
         where = (
@@ -181,7 +189,10 @@ def _reason(observed, names, time, drive, share, limit, passes):
         side, near = ("Before the first", 0) if after == 0 else ("After the last", -1)
         where = f"{side} control point, {names[near]}, by {abs(time - times[near]):.0f} s"
     often = f", seen by {passes} passes" if passes > 1 else ""
-    before = "as before" if share[0] == share[1] else f"instead of {100 * share[0]:.1f} %"
+    if share[0] == share[1]:
+        before = "as before"
+    else:
+        before = f"instead of {100 * share[0]:.1f} %"
     return (
         f"{where}{often}: along the drive the 3D sigma falls from {1e3 * drive[0]:.1f} to "
         f"{1e3 * drive[1]:.1f} mm (RMS), and {100 * share[1]:.1f} % of it, {before}, are "

@@ -220,8 +220,12 @@ def previewed_correction(
     before, rows = _tie_equations(estimate.equations, ties, mountings)
     before = replace(before, tolerance=SETTINGS.coarse_tolerance)
     weighed = robust_ties(before, estimate.parameters, rows)
-    asked, solved = pose_rows(weighed.equations, weighed.parameters), weighed.solved
-    pose = solved.predict(*asked) if with_sigmas else (solved.predict_mean(*asked),)
+    asked = pose_rows(weighed.equations, weighed.parameters)
+    solved = weighed.solved
+    if with_sigmas:
+        pose = solved.predict(*asked)
+    else:
+        pose = (solved.predict_mean(*asked),)
     return Correction.by_pose_error(estimate.correction.recorded, *pose)
 
 
@@ -248,7 +252,8 @@ def _tie_equations(equations, ties, mountings):
 def _estimate(trajectory, names, predictions, screening, notes):
     """The Estimate by equations, as predictions have them, and the parameters chosen for them."""
     kept = predictions.equations
-    posterior, used = screening.posterior, np.isin(np.asarray(names, dtype=object), kept.names)
+    posterior = screening.posterior
+    used = np.isin(np.asarray(names, dtype=object), kept.names)
     parameters = posterior.modes[0][0]
     solved = predictions.take(parameters)
     left_out = np.full((len(names), 3), np.nan)
@@ -256,19 +261,30 @@ def _estimate(trajectory, names, predictions, screening, notes):
     pose_error = predict_pose_error(kept, posterior, predictions, solved)
     correction = Correction.by_pose_error(trajectory, *pose_error)
     return Estimate(
-        correction=correction, equations=kept, screening=screening, used=used, left_out=left_out,
-        log_likelihood=solved.log_likelihood, sigma0=solved.sigma0,
+        correction=correction,
+        equations=kept,
+        screening=screening,
+        used=used,
+        left_out=left_out,
+        log_likelihood=solved.log_likelihood,
+        sigma0=solved.sigma0,
         guards=find_guards(kept, parameters, correction.corrected),
-        support=find_support(kept, solved, parameters, correction.corrected), notes=notes,
-    )  # fmt: skip
+        support=find_support(kept, solved, parameters, correction.corrected),
+        notes=notes,
+    )
 
 
 def _screened(trajectory, matched, pos, order):
     """Equations, their Screening, and the windows of drift that runs of rejected targets show."""
-    windows, more, plain = (), (), None
+    windows = ()
+    more = ()
+    plain = None
     for _ in range(SETTINGS.rounds):
         windows += more
-        raised = with_windows(trajectory, windows) if windows else trajectory
+        if windows:
+            raised = with_windows(trajectory, windows)
+        else:
+            raised = trajectory
         equations = position_equations(raised, matched, pos, order, position_prior)
         equations = replace(equations, order=affordable_order(order, equations))
         equations = with_drift_history(equations)

@@ -195,7 +195,8 @@ def most_probable(
     """
     objective = Objective.of(equations)
     near = {chosen.family: objective.logarithms(chosen) for chosen in start}
-    modes, at = [], objective.initial
+    modes = []
+    at = objective.initial
     for family in (*FAMILIES, INTEGRATED):
         at, value = objective.maximum(family, near.get(family, at))
         modes.append((objective.parameters(family, at), value))
@@ -270,7 +271,8 @@ def _blocks(equations):
         return (equations,)
     order = np.argsort(equations.observed, kind="stable")
     _, first, target, counts = np.unique(equations.names[order], True, True, True)
-    before, rank = np.empty(len(first), int), np.argsort(first)
+    before = np.empty(len(first), int)
+    rank = np.argsort(first)
     before[rank] = np.cumsum(counts[rank]) - counts[rank]
     block = (before * number // len(order))[target]
     parts = (equations.select(np.sort(order[block == k])) for k in np.unique(block))

@@ -34,11 +34,14 @@ def with_scanner_errors(calibration: Calibration, matched: Matched) -> Calibrati
         Its control points, as georeferenced with the recorded mounting.
     """
     columns = _columns(calibration, matched[calibration.used])
-    equations, parameters = calibration.equations, calibration.parameters[0][0]
+    equations = calibration.equations
+    parameters = calibration.parameters[0][0]
     known = SETTINGS.unmeasured_scanner, SETTINGS.least_scanner_error
     prior, least = (np.tile(sigma, len(calibration.recorded)) for sigma in known)
     lacks = AddedUnknowns.of(equations, parameters, columns, prior)
-    is_wrong, correction, sigma = lacks.is_wrong(least), lacks.correction, lacks.sigma
+    is_wrong = lacks.is_wrong(least)
+    correction = lacks.correction
+    sigma = lacks.sigma
     if not is_wrong.any():
         errors = ScannerErrors(correction, sigma, sigma < least, is_wrong)
         return replace(calibration, scanner=errors)
@@ -48,7 +51,8 @@ def with_scanner_errors(calibration: Calibration, matched: Matched) -> Calibrati
     lacks = AddedUnknowns.of(equations, parameters, columns, free)
     shifted = AddedUnknowns.of(with_shift(equations), parameters, columns, free).trend_variance
     determined = calibration.determined & is_determined(shifted[: len(calibration.determined)])
-    correction[is_wrong], sigma[is_wrong] = lacks.correction, lacks.sigma
+    correction[is_wrong] = lacks.correction
+    sigma[is_wrong] = lacks.sigma
     equations = with_added(equations, -columns @ lacks.correction)
     pose_error = predict_pose_error(equations, calibration.posterior)
     freed = replace(
@@ -60,13 +64,17 @@ def with_scanner_errors(calibration: Calibration, matched: Matched) -> Calibrati
         scanner=ScannerErrors(correction, sigma, sigma < least, is_wrong),
     )
     residuals = calibration.ties
-    return freed if residuals is None else freed.with_residuals(residuals.ties, residuals.used)
+    if residuals is None:
+        return freed
+    return freed.with_residuals(residuals.ties, residuals.used)
 
 
 def _columns(calibration, targets):
     """Partial derivatives of all misclosures by ranges and encoder: of targets, then of ties."""
-    equations, mountings = calibration.equations, calibration.lsc.mountings
-    trajectory, numbered = equations.trajectory, dict(enumerate(mountings))
+    equations = calibration.equations
+    mountings = calibration.lsc.mountings
+    trajectory = equations.trajectory
+    numbered = dict(enumerate(mountings))
 
     def partials(place, *sighting):
         place = georeferenced_anew(trajectory, calibration.recorded, mountings, place, *sighting)

@@ -60,8 +60,12 @@ def pose_signals(
     partials : (n, 3, 6) array
         Of the points by position and rotation.
     """
-    position, rotation = partials[:, :, :3], partials[:, :, 3:]
-    family = "matern32" if parameters.family == INTEGRATED else parameters.family
+    position = partials[:, :, :3]
+    rotation = partials[:, :, 3:]
+    if parameters.family == INTEGRATED:
+        family = "matern32"
+    else:
+        family = parameters.family
     least = position * stated.least[:, None]
     jitter = Covariance("exponential", parameters.jitter_time)
     bias = Covariance(family, parameters.bias_time)
@@ -92,7 +96,9 @@ def drift_signals(parameters: SignalParameters) -> int:
     ----------
     parameters : SignalParameters
     """
-    return 2 if parameters.family == INTEGRATED else 1
+    if parameters.family == INTEGRATED:
+        return 2
+    return 1
 
 
 def _drift(stated, parameters, position):
@@ -123,7 +129,8 @@ def drift_alone(
     shown : (h,) bool array
         Of the last h rows.
     """
-    rows, first = len(shown), drift_signals(parameters)
+    rows = len(shown)
+    first = drift_signals(parameters)
     if rows == 0:
         return signals
     changed = []

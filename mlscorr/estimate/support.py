@@ -114,7 +114,8 @@ def find_support(
     """
     is_drifting = _is_drifting(equations, parameters)
     codes = _reasons(equations, solved, parameters, corrected, is_drifting)
-    history, starts = equations.stated.history, equations.stated.starts
+    history = equations.stated.history
+    starts = equations.stated.starts
     ends_by_step = np.isin(history.edges[1:], history.steps.middle)
     drifting = equations.trajectory.gps_time[is_drifting]
     epochs = [np.searchsorted(drifting, times) for times in (starts, history.edges[1:])]
@@ -143,8 +144,10 @@ def _reasons(equations, solved, parameters, corrected, is_drifting):
     that of its control. Where ties hold the passes together, a control point holds both, and the
     variance alone decides.
     """
-    trajectory, stated = equations.trajectory, equations.stated_epochs
-    time, control = trajectory.gps_time, np.sort(equations.observed)
+    trajectory = equations.trajectory
+    stated = equations.stated_epochs
+    time = trajectory.gps_time
+    control = np.sort(equations.observed)
     if len(control) == 0:
         return np.full(len(time), NO_CONTROL)
     is_open = is_drifting & _is_drift_open(equations, solved, parameters, corrected)
@@ -175,7 +178,8 @@ def _is_drift_open(equations, solved, parameters, corrected):
     Nor of the whole position error's: drift and a slow bias may stand for each other, so that
     neither is known where their sum is.
     """
-    time, stated = equations.trajectory.gps_time, equations.stated_epochs
+    time = equations.trajectory.gps_time
+    stated = equations.stated_epochs
     signals = pose_signals(stated, parameters, np.broadcast_to(np.eye(6), (len(time), 6, 6)))
     mixings = [signal.mixing for signal in signals]
     trend = equations.pose_design(time)
@@ -210,7 +214,8 @@ def weak_stretches(codes: np.ndarray, trajectory: Trajectory) -> Iterator[WeakSt
     trajectory : Trajectory
         With its sigmas.
     """
-    time, part = trajectory.gps_time, trajectory.segment(trajectory.gps_time)
+    time = trajectory.gps_time
+    part = trajectory.segment(trajectory.gps_time)
     size = np.linalg.norm(trajectory.position_sigma, axis=1)
     way = np.linalg.norm(np.diff(trajectory.position, axis=0), axis=1)
     is_empty = ~np.isin(np.arange(len(time)), trajectory.scanned_rows)
@@ -220,6 +225,10 @@ def weak_stretches(codes: np.ndarray, trajectory: Trajectory) -> Iterator[WeakSt
         if codes[first] != HELD and end - first > 1:
             rows = slice(first, end)
             yield WeakStretch(
-                float(time[first]), float(time[end - 1]), float(way[first : end - 1].sum()),
-                float(size[rows].max()), REASONS[codes[first]], float(way[:first].sum()),
-            )  # fmt: skip
+                float(time[first]),
+                float(time[end - 1]),
+                float(way[first : end - 1].sum()),
+                float(size[rows].max()),
+                REASONS[codes[first]],
+                float(way[:first].sum()),
+            )

@@ -68,7 +68,8 @@ def all_tests(
     visit : function of SignalParameters and a Collocation, optional
         Called with each solution of these equations while it is held, for what else it tells.
     """
-    tests, targets = [], len(equations.target_rows)
+    tests = []
+    targets = len(equations.target_rows)
     for block in Objective.of(equations).blocks:
         whole = len(block.names) == len(equations.names)
         tests += _tests(block, block.target_rows, posterior, targets, visit if whole else None)
@@ -114,7 +115,8 @@ def _test(equations, name, left_out, targets):
     """
     rows = equations.target_rows[name]
     critical = float(chdtri(len(rows), SETTINGS.significance / targets))
-    mean, square = 0.0, 0.0
+    mean = 0.0
+    square = 0.0
     for weight, residual, covariance in left_out:
         mean = mean + weight * residual
         square = square + weight * (covariance + np.outer(residual, residual))

@@ -77,7 +77,9 @@ class TieResiduals:
         """
         rows = (self.ties.scanner == number).any(axis=1)
         residuals = TieResiduals(self.ties[rows], self.used[rows], self.after[rows])
-        return residuals if rows.any() else None
+        if rows.any():
+            return residuals
+        return None
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -122,14 +124,16 @@ def add_ties(equations: Equations, parameters: SignalParameters, ties: TieEquati
     ties : TieEquations
     """
     weighed = robust_ties(equations, parameters, ties)
-    tied, parameters = weighed.equations, weighed.parameters
+    tied = weighed.equations
+    parameters = weighed.parameters
     tied = tied.with_starts(with_likely_starts(sample(tied))[0].stated.starts)
     rows = tied.ties
     objective = Objective.of(sample(tied))
     at, _ = objective.maximum(parameters.family, objective.logarithms(parameters))
     parameters = objective.parameters(parameters.family, at)  # the weights of the ties stay
     weighed = solved_ties(tied, parameters).graded((student,))
-    tied, ratio = weighed.equations, np.abs(weighed.ratio)
+    tied = weighed.equations
+    ratio = np.abs(weighed.ratio)
     factor = float(np.clip(np.median(ratio) / MEDIAN, 1.0, SETTINGS.tie_cut))
     used = ratio <= SETTINGS.tie_cut * factor
     kept = replace(rows, variance=factor**2 * rows.variance, weight=np.ones(len(rows)))
@@ -152,7 +156,9 @@ def screen_with_ties(
         Of these.
     ties : TieEquations
     """
-    parameters, kept, rejected = screening.posterior.modes[0][0], equations, []
+    parameters = screening.posterior.modes[0][0]
+    kept = equations
+    rejected = []
     untied = GridPredictions(equations), screening, np.zeros(len(ties), dtype=bool)
     while True:
         tied = add_ties(kept, parameters, ties)

@@ -49,9 +49,14 @@ def calibration_with_ties(calibration: Calibration, matched: Matched, ties: Ties
         return calibration.with_residuals(ties, is_used)
     used = calibration.used & ~np.isin(matched.name, [o.name for o in screening.outliers])
     changed = calibration_by(
-        calibration.trajectory, calibration.recorded, predictions.equations, screening,
-        (correction, calibration.ls), used, calibration.notes,
-    )  # fmt: skip
+        calibration.trajectory,
+        calibration.recorded,
+        predictions.equations,
+        screening,
+        (correction, calibration.ls),
+        used,
+        calibration.notes,
+    )
     return changed.with_residuals(ties, is_used)
 
 
@@ -80,8 +85,11 @@ def previewed_mounting(
 
 def _converged(calibration, matched, ties) -> tuple[WeighedTies, np.ndarray]:
     """Equations with robust weights about the mountings that they give, and these' correction."""
-    recorded, targets, step = calibration.recorded, matched[calibration.used], 0.0
-    correction, equations = calibration.lsc.correction, calibration.equations
+    recorded = calibration.recorded
+    targets = matched[calibration.used]
+    step = 0.0
+    correction = calibration.lsc.correction
+    equations = calibration.equations
     for _ in range(SETTINGS.iterations):
         correction = correction + step  # here, so that the last equations are about the last one
         mountings, about = linearized(equations, targets, recorded, correction)
@@ -105,7 +113,8 @@ def georeferenced_ties(
         Of each scanner: the recorded one, and that about which the equations are.
     ties : Ties
     """
-    trajectory, views = equations.trajectory, (ties.place, ties.gps_time, ties.scanner)
+    trajectory = equations.trajectory
+    views = (ties.place, ties.gps_time, ties.scanner)
     place = georeferenced_anew(trajectory, recorded, mountings, *views)
     misclosure = np.einsum("ni,ni->n", ties.direction, place[:, 1] - place[:, 0])
     moved = replace(ties, place=place, misclosure=misclosure)

@@ -42,9 +42,13 @@ def positional_accuracy(
     """
     if len(residuals) == 0:
         based_on = None
-    fit, survey = ({"rmse_horizontal": _rms(v, 2), "rmse_vertical": _rms(v[:, 2:], 1)} for v in (
-        np.asarray(residuals, float).reshape(-1, 3), np.asarray(survey_sigma, float).reshape(-1, 3)
-    ))  # fmt: skip
+    fit, survey = (
+        {"rmse_horizontal": _rms(v, 2), "rmse_vertical": _rms(v[:, 2:], 1)}
+        for v in (
+            np.asarray(residuals, float).reshape(-1, 3),
+            np.asarray(survey_sigma, float).reshape(-1, 3),
+        )
+    )
     both = {key: _joined(fit[key], survey[key]) for key in fit}
     accuracy = {
         "standard": STANDARD,
@@ -64,16 +68,22 @@ def positional_accuracy(
 
 def _rms(values, axes):
     """Root of the mean square length of the first axes of vectors, None without any."""
-    return float(np.sqrt((values[:, :axes] ** 2).sum(axis=1).mean())) if len(values) else None
+    if len(values):
+        return float(np.sqrt((values[:, :axes] ** 2).sum(axis=1).mean()))
+    return None
 
 
 def _joined(fit, survey):
-    return None if fit is None or survey is None else math.hypot(fit, survey)
+    if fit is None or survey is None:
+        return None
+    return math.hypot(fit, survey)
 
 
 def _class(rmse):
     """The smallest class of whole centimetres that an RMSE in m meets."""
-    return None if rmse is None else max(1, math.ceil(round(100 * rmse, 6)))
+    if rmse is None:
+        return None
+    return max(1, math.ceil(round(100 * rmse, 6)))
 
 
 def _statement(accuracy):
@@ -105,8 +115,12 @@ def _test(accuracy):
 
 
 def _classes(accuracy, axis):
-    rmse, name = accuracy[f"rmse_{axis}"], f"RMSE_{axis[0].upper()}"
-    tested = "It meets" if accuracy["conformant"] else "It would meet"
+    rmse = accuracy[f"rmse_{axis}"]
+    name = f"RMSE_{axis[0].upper()}"
+    if accuracy["conformant"]:
+        tested = "It meets"
+    else:
+        tested = "It would meet"
     return (
         f"{tested} the {accuracy[f'class_{axis}_cm']}-cm {axis} accuracy class: {name} is "
         f"{100 * rmse:.1f} cm ({100 * accuracy['fit'][f'rmse_{axis}']:.1f} cm fit to the points, "

@@ -104,7 +104,8 @@ class BeamCheck:
         from the vehicle. A scanner that looks ahead has beams of many lengths, and a vehicle that
         hardly moves tells neither.
         """
-        trajectory, beam = self.survey.trajectory, np.column_stack(beam)
+        trajectory = self.survey.trajectory
+        beam = np.column_stack(beam)
         lag = utc_lag(trajectory.gps_time, times - file.time_constant)
         for later in (-lag, lag):
             way = _place(trajectory, times + later) - _place(trajectory, times)

@@ -86,17 +86,25 @@ class DatumDifference:
     def length(self) -> float:
         """The shift, or what the term makes at the extent. Units: m."""
         size = float(np.linalg.norm(self.size))
-        return size if self.term in (SHIFT, HEIGHT) else size * self.extent
+        if self.term in (SHIFT, HEIGHT):
+            return size
+        return size * self.extent
 
     def document(self) -> dict[str, object]:
         """The row of ``datum[]`` in report.json."""
         ground = None if self.ground is None else self.ground.document()
         return {
-            "term": self.term, "unit": UNITS[self.term], "size": self.size.tolist(),
-            "sigma": self.sigma.tolist(), "length_m": self.length, "extent_m": self.extent,
-            "log_evidence": self.log_evidence, "observations": self.observations,
-            "map_factor": ground, "sentence": self.sentence,
-        }  # fmt: skip
+            "term": self.term,
+            "unit": UNITS[self.term],
+            "size": self.size.tolist(),
+            "sigma": self.sigma.tolist(),
+            "length_m": self.length,
+            "extent_m": self.extent,
+            "log_evidence": self.log_evidence,
+            "observations": self.observations,
+            "map_factor": ground,
+            "sentence": self.sentence,
+        }
 
     @property
     def sentence(self) -> str:
@@ -121,13 +129,15 @@ class DatumDifference:
                 f"(E {size[0]:+.2f}, N {size[1]:+.2f} m; {self._evidence()})."
             )
         if self.term == SCALE:
-            ppm, sigma = 1e6 * size[0], 1e6 * self.sigma[0]
+            ppm = 1e6 * size[0]
+            sigma = 1e6 * self.sigma[0]
             words = f"larger than in the cloud by {ppm:+.0f} +/- {sigma:.0f} ppm"
         elif self.term == TURN:
             turn, sigma = np.degrees([size[0], self.sigma[0]])
             words = f"turned to the left against the cloud by {turn:+.4f} +/- {sigma:.4f} deg"
         else:
-            rise, sigma = 1e3 * size, 1e3 * self.sigma
+            rise = 1e3 * size
+            sigma = 1e3 * self.sigma
             words = (
                 f"tilted against the cloud: it rises by {rise[0]:+.2f} +/- {sigma[0]:.2f} mm/m "
                 f"towards east and {rise[1]:+.2f} +/- {sigma[1]:.2f} mm/m towards north"
@@ -292,7 +302,8 @@ class _Evidence:
         rows = np.zeros((len(equations.gps_time), *columns.shape[1:]))
         rows[: len(columns)] = columns
         matrix = rows.reshape(-1, columns.shape[2])
-        objective, complete = Objective.of(equations), Objective.of(everything)
+        objective = Objective.of(equations)
+        complete = Objective.of(everything)
         self.modes = []  # (family, log posterior without terms, N, r)
         for family in (*FAMILIES, INTEGRATED):
             plain, _ = objective.maximum(family, objective.initial)
@@ -409,4 +420,6 @@ def _extent(place):
 def _rounded(log_evidence):
     """A Bayes factor in words: its power of ten where it is large."""
     power = log_evidence / np.log(10)
-    return f"{np.exp(log_evidence):.0f}" if power < 3 else f"1e{power:.0f}"
+    if power < 3:
+        return f"{np.exp(log_evidence):.0f}"
+    return f"1e{power:.0f}"

@@ -71,7 +71,9 @@ def _observations(estimate):
     """What the parameters were chosen by."""
     if estimate.ties is None or not estimate.ties.used.any():
         return "the control points"
-    return "control points and ties" if len(estimate.equations.names) else "ties"
+    if len(estimate.equations.names):
+        return "control points and ties"
+    return "ties"
 
 
 def _covariance(parameters):

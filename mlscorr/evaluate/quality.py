@@ -133,13 +133,20 @@ def _value(quantity, report):
         return len(report["model"]["outliers"])
     if quantity in WEAK:
         rows = report["weak"]
-        return len(rows) if name == "n" else max((row[name] for row in rows), default=0.0)
+        if name == "n":
+            return len(rows)
+        return max((row[name] for row in rows), default=0.0)
     if quantity in COUNTS:
         return report[group][name]
     left_out = group == "leave_one_out"
-    values = report["control"]["leave_one_out"] if left_out else report[group]["after"]
+    if left_out:
+        values = report["control"]["leave_one_out"]
+    else:
+        values = report[group]["after"]
     statistic, _, axis = name.partition("_")
     if axis not in AXES:
         return values.get(name)
     vector = values.get(statistic)
-    return None if vector is None else vector[list(AXES).index(axis)]
+    if vector is None:
+        return None
+    return vector[list(AXES).index(axis)]

@@ -43,12 +43,14 @@ class Statistics:
         >>> statistics.rmse[:3].round(4).tolist(), float(statistics.maximum[3])
         ([0.3536, 0.0, 0.1], 0.4)
         """
-        n, unknown = len(residuals), np.full(5, np.nan)
+        n = len(residuals)
+        unknown = np.full(5, np.nan)
         if n == 0:
             return cls(n, *[unknown] * len(NAMES))
         lengths = [np.linalg.norm(residuals[:, :axes], axis=1) for axes in (2, 3)]
         values = np.column_stack([residuals, *lengths])
-        rmse, mean = np.sqrt(np.mean(values**2, axis=0)), values.mean(axis=0)
+        rmse = np.sqrt(np.mean(values**2, axis=0))
+        mean = values.mean(axis=0)
         std = values.std(axis=0, ddof=1) if n > 1 else unknown
         return cls(n, rmse, mean, std, values.min(axis=0), values.max(axis=0))
 
@@ -140,9 +142,15 @@ class TargetRow:
 
     @classmethod
     def unobserved(
-        cls, name: str, pass_number: int | None, role: str, surveyed: np.ndarray, reason: str,
-        scanned: bool = True, gps_time: float | None = None,
-    ) -> TargetRow:  # fmt: skip
+        cls,
+        name: str,
+        pass_number: int | None,
+        role: str,
+        surveyed: np.ndarray,
+        reason: str,
+        scanned: bool = True,
+        gps_time: float | None = None,
+    ) -> TargetRow:
         """The row of a surveyed point that was not observed, or has an observation refused then."""
         nan = np.full(3, np.nan)
         vectors = {"observed": nan, "sigma": nan, "before": nan, "after": nan, "left_out": nan}
@@ -249,4 +257,6 @@ class PointCounts:
 def _numbers(values):
     """A list of floats, None for each that is not known; None where none is."""
     numbers = [value if np.isfinite(value) else None for value in values.tolist()]
-    return None if all(value is None for value in numbers) else numbers
+    if all(value is None for value in numbers):
+        return None
+    return numbers

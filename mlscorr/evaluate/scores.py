@@ -60,8 +60,12 @@ def accuracy(
         that isn't known. Units: m.
     """
     if len(check):
-        residuals, kind, matched = misclosures(check, correction), "check", check
+        residuals = misclosures(check, correction)
+        kind = "check"
+        matched = check
     else:
         known = np.isfinite(left_out).all(axis=1)
-        residuals, kind, matched = left_out[known], "leave_one_out", control[known]
+        residuals = left_out[known]
+        kind = "leave_one_out"
+        matched = control[known]
     return positional_accuracy(residuals, matched.surveyed.sigma, len(set(matched.name)), kind)

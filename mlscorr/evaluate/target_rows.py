@@ -13,9 +13,12 @@ from mlscorr.targets import Candidates, search_radius
 
 
 def surveyed_rows(
-    control: Matched, check: Matched, correction: Correcting, outliers: Iterable[TargetTest],
+    control: Matched,
+    check: Matched,
+    correction: Correcting,
+    outliers: Iterable[TargetTest],
     left_out: np.ndarray | None = None,
-) -> list[TargetRow]:  # fmt: skip
+) -> list[TargetRow]:
     """Rows of all observed points, control before check.
 
     Parameters
@@ -37,9 +40,12 @@ def surveyed_rows(
 
 
 def target_rows(
-    matched: Matched, correction: Correcting, role: str, reasons: Sequence[str | None],
+    matched: Matched,
+    correction: Correcting,
+    role: str,
+    reasons: Sequence[str | None],
     left_out: np.ndarray | None = None,
-) -> list[TargetRow]:  # fmt: skip
+) -> list[TargetRow]:
     """One row for each observation of some surveyed points.
 
     Parameters
@@ -54,9 +60,13 @@ def target_rows(
         What remains once the other points alone have corrected it; NaN where that isn't known.
         Units: m.
     """
-    observations, before = matched.observations, matched.misclosure
-    after, sigma = misclosures(matched, correction), np.sqrt(matched.variance)  # Eq. 19
-    left_out = np.full_like(before, np.nan) if left_out is None else left_out
+    observations = matched.observations
+    before = matched.misclosure
+    # Eq. 19
+    after = misclosures(matched, correction)
+    sigma = np.sqrt(matched.variance)
+    if left_out is None:
+        left_out = np.full_like(before, np.nan)
     vectors = matched.surveyed.position, observations.position, sigma, before, after, left_out
     origins = matched.name, observations.pass_number.tolist(), observations.gps_time.tolist()
     return [
@@ -82,7 +92,10 @@ def unseen_rows(
     """
     rows = []
     for refusal in refusals:
-        role = "control" if refusal.name in survey.control.name else "check"
+        if refusal.name in survey.control.name:
+            role = "control"
+        else:
+            role = "check"
         point = survey.surveyed[survey.surveyed.rows([refusal.name])]
         no_pose = _no_pose(point, survey, candidates)
         named = refusal.name, refusal.pass_number, role, point.position[0]

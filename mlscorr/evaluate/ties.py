@@ -19,7 +19,9 @@ def tie_section(estimate: Estimate) -> dict[str, object] | None:
     """
     residuals = estimate.ties
     if residuals is None:
-        return {"n": 0, "used": 0, "reason": estimate.untied} if estimate.untied else None
+        if estimate.untied:
+            return {"n": 0, "used": 0, "reason": estimate.untied}
+        return None
     value = tie_value(estimate)
     return {
         **misfit_section(residuals),
@@ -37,7 +39,8 @@ def misfit_section(residuals: TieResiduals | None) -> dict[str, object] | None:
     """
     if residuals is None:
         return None
-    ties, used = residuals.ties, residuals.used
+    ties = residuals.ties
+    used = residuals.used
     return {
         "n": len(ties),
         "used": int(used.sum()),
@@ -57,7 +60,8 @@ def pair_rows(residuals: TieResiduals) -> list[dict[str, object]]:
     ----------
     residuals : TieResiduals
     """
-    ties, rows = residuals.ties, []
+    ties = residuals.ties
+    rows = []
     for passes in np.unique(ties.pass_number, axis=0):
         inside = (ties.pass_number == passes).all(axis=1)
         both = inside & residuals.used

@@ -81,7 +81,8 @@ def headline(where: Where, label: str, lead: str, start: float) -> str:
         The gps_time from which the covariate time counts. Units: s.
     """
     low, high = where.null_band
-    is_measurable, chance = where.before > high, f"{low:.1f} to {high:.1f} mm when nothing is wrong"
+    is_measurable = where.before > high
+    chance = f"{low:.1f} to {high:.1f} mm when nothing is wrong"
     size = f"All residuals together differ by {where.before:.1f} mm more than simulated ({chance})"
     if not is_measurable:
         size = f"All residuals together differ by no more than chance makes them ({chance})"

@@ -41,7 +41,9 @@ def excess_of(
     if is_stated and (worse or closure.over_sigma.beyond):
         return "stated"
     gaps = closure.gap, inference.where
-    return "chance" if any(gap.before > gap.null_band[1] for gap in gaps) else ""
+    if any(gap.before > gap.null_band[1] for gap in gaps):
+        return "chance"
+    return ""
 
 
 def no_cause(labels: Sequence[str], excess: str) -> str:
@@ -90,7 +92,8 @@ def sentence_of(inference: Inference, excess: str) -> str:
     excess : str
         As ``excess_of`` gives it.
     """
-    verdict, cause = inference.verdict, inference.cause
+    verdict = inference.verdict
+    cause = inference.cause
     chance = f"probability {verdict.probability:.2f}"
     if verdict.label == "none":
         return f"{no_cause(verdict.set, excess)} ({chance} that nothing is wrong)."
@@ -127,7 +130,8 @@ def advice_of(
     is_stated : bool
         Whether somebody stated the sigmas of the POS.
     """
-    verdict, sentences = inference.verdict, []
+    verdict = inference.verdict
+    sentences = []
     if verdict.label == "none":
         sentences.append(ADVICE[excess] if is_stated or excess else ONLY_DRIFT)
     elif verdict.is_hidden:

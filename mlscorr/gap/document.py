@@ -22,10 +22,16 @@ LISTED = 1e-4  # probability from which on a pair is listed in the evidence
 
 
 def gap_document(
-    survey: Survey, rows: Rows, inference: Inference, closure: Closure,
-    next_data: Sequence[NextData], effects: Iterable[Effect], left_out: Mapping[str, str],
-    warnings: Iterable[str], absence: Absence,
-) -> dict:  # fmt: skip
+    survey: Survey,
+    rows: Rows,
+    inference: Inference,
+    closure: Closure,
+    next_data: Sequence[NextData],
+    effects: Iterable[Effect],
+    left_out: Mapping[str, str],
+    warnings: Iterable[str],
+    absence: Absence,
+) -> dict:
     """Content of gap.json.
 
     Parameters
@@ -44,7 +50,8 @@ def gap_document(
     absence : Absence
         Of surveyed targets that have no row.
     """
-    verdict, where = inference.verdict, inference.where
+    verdict = inference.verdict
+    where = inference.where
     agreement = agreements(rows, background(rows, survey))
     is_stated = not open_sigmas(survey)
     excess = excess_of(inference, closure, agreement, is_stated)
@@ -98,7 +105,8 @@ def assumed_document(survey: Survey, inference: Inference, scale: float) -> list
     scaled = [f"pos.{name}" for name in open_sigmas(survey)]
     rows = []
     for row in (*survey.assumed_pos, *survey.assumed_scanner):
-        value, estimate = row.value, None
+        value = row.value
+        estimate = None
         if row.key in scaled:
             value = (np.array(value) / scale).round(9).tolist()
         if row.key == "pos.position_sigma":
@@ -109,7 +117,10 @@ def assumed_document(survey: Survey, inference: Inference, scale: float) -> list
 
 def _split(split):
     name, unit = NAMES.get(split.by, (split.by, ""))
-    place = {"bins": list(split.bins)} if split.edges is None else {"edges": split.edges.tolist()}
+    if split.edges is None:
+        place = {"bins": list(split.bins)}
+    else:
+        place = {"edges": split.edges.tolist()}
     columns = {key: getattr(split, key).tolist() for key in ("count", "before", "after", "share")}
     named = {"by": split.by, "name": name, "unit": unit}
     extent = None if split.extent is None else asdict(split.extent)
@@ -142,7 +153,8 @@ def separability_document(compared: Separability) -> dict:
     ----------
     compared : Separability
     """
-    detectable, names = defaultdict(list), compared.names
+    detectable = defaultdict(list)
+    names = compared.names
     columns = zip(names, compared.effects, compared.units, compared.detectable, strict=True)
     for name, effect, unit, limit in columns:
         detectable[effect].append({"name": name, "unit": unit, "detectable": float(limit)})
@@ -171,7 +183,8 @@ def _closure(closure):
 
 def _evidence(inference):
     """The ladder."""
-    chance, score = inference.probability, inference.joint.score
+    chance = inference.probability
+    score = inference.joint.score
     return [
         {
             "label": name,

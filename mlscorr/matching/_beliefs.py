@@ -84,7 +84,8 @@ def transition(chain: Chain, start: int, end: int) -> np.ndarray:
     matrix : (m + 1, 3, 3) array
         Of each belief, and at last of a drift that starts anew.
     """
-    forward, settings = chain.forward, chain.settings
+    forward = chain.forward
+    settings = chain.settings
     turned = 1.0 - forward[start, 0] * forward[end, 0] - forward[start, 1] * forward[end, 1]
     share = (settings.turning_sigma / settings.constant_sigma) ** 2
     matrix = np.zeros((len(chain.rate) + 1, 3, 3))
@@ -94,15 +95,20 @@ def transition(chain: Chain, start: int, end: int) -> np.ndarray:
         for m, rate in enumerate(chain.rate):
             step = rate * (chain.gps_time[end] - chain.gps_time[start])
             decay = np.exp(-abs(step))
-            matrix[m, 1, 1], matrix[m, 1, 2] = (1.0 + abs(step)) * decay, step * decay
+            matrix[m, 1, 1] = (1.0 + abs(step)) * decay
+            matrix[m, 1, 2] = step * decay
             matrix[m, 2, 1], matrix[m, 2, 2] = -step * decay, (1.0 - abs(step)) * decay
     return matrix
 
 
 def build_chain(
-    observations: TargetObservations, control: ControlPoints, pose: Trajectory, stated: StatedSigma,
-    pairs: CandidatePairs, pos: Pos,
-) -> Chain:  # fmt: skip
+    observations: TargetObservations,
+    control: ControlPoints,
+    pose: Trajectory,
+    stated: StatedSigma,
+    pairs: CandidatePairs,
+    pos: Pos,
+) -> Chain:
     """Chain of observations in order of time.
 
     Parameters
@@ -125,15 +131,19 @@ def build_chain(
     ahead = pose.attitude.apply([0.0, 1.0, 0.0])[:, :2]
     odds = (1.0 - SETTINGS.visible_share) / SETTINGS.visible_share
     return Chain(
-        gps_time=observations.gps_time, pass_number=observations.pass_number,
-        forward=ahead / np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-12), gain=gain,
+        gps_time=observations.gps_time,
+        pass_number=observations.pass_number,
+        forward=ahead / np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-12),
+        gain=gain,
         noise=known + (SETTINGS.rough_share * gain) ** 2 + (unstated / 2) ** 2,
         otherwise=np.log(_lookalikes(observations, pose) * odds),
         rate=np.sqrt(3.0) / (share[:, 0, 0] * pos.correlation_time),
-        segment=stated.history.segment(stated.gps_time), pairs=pairs,
+        segment=stated.history.segment(stated.gps_time),
+        pairs=pairs,
         pair_variance=control.sigma[pairs.control] ** 2,
-        moved_share=np.full(len(pairs.control), SETTINGS.moved_share), settings=settings_tuple(),
-    )  # fmt: skip
+        moved_share=np.full(len(pairs.control), SETTINGS.moved_share),
+        settings=settings_tuple(),
+    )
 
 
 def _beliefs():

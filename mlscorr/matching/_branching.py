@@ -20,17 +20,25 @@ def use(now: Hypotheses, chain: Chain, row: int) -> Hypotheses:
     row : int
         Of the observation.
     """
-    first, k = chain.pairs.first[row], chain.pairs.first[row + 1] - chain.pairs.first[row]
-    count, smallest = 3 * chain.settings.joined_hypotheses, chain.settings.smallest_weight
-    weight, w = log_likelihoods(now, chain, row).reshape(-1), len(now.window)
-    belief, choices = np.empty(len(weight), np.int64), 2 * k + 1
+    first = chain.pairs.first[row]
+    k = chain.pairs.first[row + 1] - chain.pairs.first[row]
+    count = 3 * chain.settings.joined_hypotheses
+    smallest = chain.settings.smallest_weight
+    weight = log_likelihoods(now, chain, row).reshape(-1)
+    w = len(now.window)
+    belief = np.empty(len(weight), np.int64)
+    choices = 2 * k + 1
     for branch in range(len(weight)):
         belief[branch] = now.belief[branch // choices]
     kept = best_of_each(belief, weight, 4 * count, smallest)
-    after, choice = select(now, kept // choices, w, w + 1), kept % choices
+    after = select(now, kept // choices, w, w + 1)
+    choice = kept % choices
     after.window[w] = row
     for place, branch in enumerate(kept):
-        pair = first + choice[place] % k if choice[place] < 2 * k else -1
+        if choice[place] < 2 * k:
+            pair = first + choice[place] % k
+        else:
+            pair = -1
         after.weight[place] = weight[branch]
         after.used[place, w] = chain.pairs.control[pair] if pair >= 0 else -1
         if choice[place] < k:  # takes up the sound pairs only
@@ -53,7 +61,8 @@ def _update(after, chain, row, choice):
 
     K = P H^T / S, x = x + K v, P = P - K H P with H = (sigma, g, 0) per axis.
     """
-    first, k = chain.pairs.first[row], chain.pairs.first[row + 1] - chain.pairs.first[row]
+    first = chain.pairs.first[row]
+    k = chain.pairs.first[row + 1] - chain.pairs.first[row]
     sigma = chain.settings.constant_sigma
     value, variance = displacement(after, chain, row)
     cross = np.empty(3)  # P H^T
@@ -61,10 +70,14 @@ def _update(after, chain, row, choice):
         if choice[hypothesis] == 2 * k:
             continue
         pair = first + choice[hypothesis] % k
-        extra = chain.settings.moved_sigma**2 if choice[hypothesis] >= k else 0.0
+        if choice[hypothesis] >= k:
+            extra = chain.settings.moved_sigma**2
+        else:
+            extra = 0.0
         for axis in range(3):
             gain = chain.gain[after.belief[hypothesis], row, axis]
-            x, p = after.mean[hypothesis, axis], after.covariance[hypothesis, axis]
+            x = after.mean[hypothesis, axis]
+            p = after.covariance[hypothesis, axis]
             away = chain.pairs.misclosure[pair, axis] - value[hypothesis, axis]
             spread = variance[hypothesis, axis] + chain.pair_variance[pair, axis] + extra
             for i in range(3):
@@ -84,8 +97,10 @@ def heaviest(now: Hypotheses, chain: Chain) -> Hypotheses:
     now : Hypotheses
     chain : Chain
     """
-    count, smallest = chain.settings.joined_hypotheses, chain.settings.smallest_weight
-    rows, w = best_of_each(now.belief, now.weight, count, smallest), len(now.window)
+    count = chain.settings.joined_hypotheses
+    smallest = chain.settings.smallest_weight
+    rows = best_of_each(now.belief, now.weight, count, smallest)
+    w = len(now.window)
     return select(now, rows, w, w)
 
 
@@ -103,10 +118,14 @@ def best_of_each(
     smallest_weight : float
         Logarithm, against the best of all.
     """
-    largest, beliefs, size = -np.inf, 0, 0
+    largest = -np.inf
+    beliefs = 0
+    size = 0
     for row in range(len(weight)):
-        largest, beliefs = max(largest, weight[row]), max(beliefs, belief[row] + 1)
-    rows, rank = np.empty(len(weight), np.int64), np.zeros(beliefs, np.int64)
+        largest = max(largest, weight[row])
+        beliefs = max(beliefs, belief[row] + 1)
+    rows = np.empty(len(weight), np.int64)
+    rank = np.zeros(beliefs, np.int64)
     for row in range(len(weight)):
         if weight[row] - largest >= smallest_weight:
             rows[size] = row
@@ -128,7 +147,8 @@ def _sort(rows, weight):
     while gap > 1:
         gap = max(1, 5 * gap // 11)  # Gonnet and Baeza-Yates 1991
         for end in range(gap, len(rows)):
-            row, place = rows[end], end
+            row = rows[end]
+            place = end
             while place >= gap:
                 other = rows[place - gap]
                 if weight[other] > weight[row] or (weight[other] == weight[row] and other < row):
@@ -157,8 +177,11 @@ def merge(
     weight : (u,) array
         Logarithm of the sum over its group.
     """
-    n, groups = len(weight), 0
-    keys, rows, total = np.empty(n, np.int64), np.empty(n, np.int64), np.empty(n)
+    n = len(weight)
+    groups = 0
+    keys = np.empty(n, np.int64)
+    rows = np.empty(n, np.int64)
+    total = np.empty(n)
     table = np.full(2 * n, -1)  # of the groups, by key (Knuth 1997, 6.4)
     for row in range(n):
         keys[row] = _key(belief[row], history[row], used[row])
@@ -166,7 +189,9 @@ def merge(
         while table[slot] >= 0 and keys[rows[table[slot]]] != keys[row]:
             slot = (slot + 1) % len(table)
         if table[slot] < 0:
-            table[slot], rows[groups], total[groups] = groups, row, 0.0
+            table[slot] = groups
+            rows[groups] = row
+            total[groups] = 0.0
             groups += 1
         group = table[slot]
         total[group] += np.exp(weight[row] - weight[rows[group]])

@@ -46,9 +46,12 @@ class Hypotheses(NamedTuple):
 @njit(inline="always", error_model="numpy")
 def _empty(b, window, h):
     """B hypotheses to be filled in, with histories of h pairs."""
-    belief, weight = np.empty(b, np.int64), np.empty(b)
-    mean, covariance = np.empty((b, 3, 3)), np.empty((b, 3, 3, 3))
-    used, history = np.empty((b, len(window)), np.int64), np.empty((b, h), np.int64)
+    belief = np.empty(b, np.int64)
+    weight = np.empty(b)
+    mean = np.empty((b, 3, 3))
+    covariance = np.empty((b, 3, 3, 3))
+    used = np.empty((b, len(window)), np.int64)
+    history = np.empty((b, h), np.int64)
     return Hypotheses(belief, weight, mean, covariance, used, window, history)
 
 
@@ -63,12 +66,14 @@ def select(now: Hypotheses, rows: np.ndarray, kept: int, w: int) -> Hypotheses:
     kept, w : int
         So many observations, the last ones, stay in the window of w; others are to be filled in.
     """
-    old, h = len(now.window) - kept, now.history.shape[1]
+    old = len(now.window) - kept
+    h = now.history.shape[1]
     after = _empty(len(rows), np.empty(w, np.int64), h)
     for column in range(kept):
         after.window[column] = now.window[old + column]
     for hypothesis, row in enumerate(rows):
-        after.belief[hypothesis], after.weight[hypothesis] = now.belief[row], now.weight[row]
+        after.belief[hypothesis] = now.belief[row]
+        after.weight[hypothesis] = now.weight[row]
         for axis in range(3):
             for i in range(3):
                 after.mean[hypothesis, axis, i] = now.mean[row, axis, i]
@@ -91,7 +96,8 @@ def start(chain: Chain) -> Hypotheses:
     """
     now = _empty(len(chain.rate), np.empty(0, np.int64), chain.settings.memory)
     for belief in range(len(chain.rate)):
-        now.belief[belief], now.weight[belief] = belief, 0.0
+        now.belief[belief] = belief
+        now.weight[belief] = 0.0
         for axis in range(3):
             for i in range(3):
                 now.mean[belief, axis, i] = 0.0
@@ -114,10 +120,12 @@ def predict(now: Hypotheses, chain: Chain, last: int, row: int) -> Hypotheses:
     last, row : int
         Rows of the last observation and the next one, later or earlier.
     """
-    time, settings = chain.gps_time, chain.settings
+    time = chain.gps_time
+    settings = chain.settings
     gap = abs(time[row] - time[last]) / settings.restart_time
     stays = np.exp(-max(gap, np.exp(settings.smallest_weight)))
-    b, m = len(now.weight), len(chain.rate)
+    b = len(now.weight)
+    m = len(chain.rate)
     parent = np.empty(b + min(b, settings.joined_hypotheses // 4) * m, np.int64)
     for hypothesis in range(len(parent)):
         parent[hypothesis] = hypothesis if hypothesis < b else (hypothesis - b) // m
@@ -144,7 +152,8 @@ def _carry(f, now, hypothesis):
     """Kalman prediction, in place: x = F x, P = I + F (P - I) F^T per axis."""
     half = np.empty((3, 3))  # F (P - I)
     for axis in range(3):
-        x, p = now.mean[hypothesis, axis], now.covariance[hypothesis, axis]
+        x = now.mean[hypothesis, axis]
+        p = now.covariance[hypothesis, axis]
         x[0] *= f[0, 0]
         x[1], x[2] = f[1, 1] * x[1] + f[1, 2] * x[2], f[2, 1] * x[1] + f[2, 2] * x[2]
         for i in range(3):
@@ -172,11 +181,14 @@ def log_likelihoods(now: Hypotheses, chain: Chain, row: int) -> np.ndarray:
     chain : Chain
     row : int
     """
-    pairs, exchanged = chain.pairs, chain.settings.exchanged_share
-    first, k = pairs.first[row], pairs.first[row + 1] - pairs.first[row]
+    pairs = chain.pairs
+    exchanged = chain.settings.exchanged_share
+    first = pairs.first[row]
+    k = pairs.first[row + 1] - pairs.first[row]
     density = np.full((len(now.weight), 2 * k + 1), -np.inf)
     value, variance = displacement(now, chain, row)
-    square, spread = np.empty(3), np.empty(3)
+    square = np.empty(3)
+    spread = np.empty(3)
     for hypothesis in range(len(now.weight)):
         density[hypothesis, 2 * k] = now.weight[hypothesis] + chain.otherwise[row]
         for choice in range(k):
@@ -186,7 +198,8 @@ def log_likelihoods(now: Hypotheses, chain: Chain, row: int) -> np.ndarray:
             for axis in range(3):
                 spread[axis] = variance[hypothesis, axis] + chain.pair_variance[pair, axis]
                 square[axis] = (pairs.misclosure[pair, axis] - value[hypothesis, axis]) ** 2
-            moved, same = chain.moved_share[pair], pairs.same[pair]
+            moved = chain.moved_share[pair]
+            same = pairs.same[pair]
             share = (1.0 - moved) * (1.0 - exchanged) if same else exchanged
             normal = _log_normal(square, spread, 0.0)
             density[hypothesis, choice] = now.weight[hypothesis] + normal + np.log(share)
@@ -206,13 +219,17 @@ def displacement(now: Hypotheses, chain: Chain, row: int) -> tuple[np.ndarray, n
     chain : Chain
     row : int
     """
-    b, sigma = len(now.weight), chain.settings.constant_sigma
-    value, variance = np.empty((b, 3)), np.empty((b, 3))
+    b = len(now.weight)
+    sigma = chain.settings.constant_sigma
+    value = np.empty((b, 3))
+    variance = np.empty((b, 3))
     for hypothesis in range(b):
         belief = now.belief[hypothesis]
         for axis in range(3):
-            gain, noise = chain.gain[belief, row, axis], chain.noise[belief, row, axis]
-            x, p = now.mean[hypothesis, axis], now.covariance[hypothesis, axis]
+            gain = chain.gain[belief, row, axis]
+            noise = chain.noise[belief, row, axis]
+            x = now.mean[hypothesis, axis]
+            p = now.covariance[hypothesis, axis]
             value[hypothesis, axis] = sigma * x[0] + gain * x[1]
             state = sigma**2 * p[0, 0] + 2.0 * sigma * gain * p[0, 1] + gain**2 * p[1, 1]
             variance[hypothesis, axis] = state + noise
@@ -231,7 +248,8 @@ def _in_use(now, hypothesis, chain, row, pair):
 
 @njit(inline="always", error_model="numpy")
 def _log_normal(square, variance, extra):
-    total, size = 0.0, 1.0
+    total = 0.0
+    size = 1.0
     for axis in range(3):
         total += square[axis] / (variance[axis] + extra)
         size *= 2.0 * np.pi * (variance[axis] + extra)

@@ -44,7 +44,8 @@ def marginals(chain: Chain) -> Marginals:
     ----------
     chain : Chain
     """
-    n, p = len(chain.gps_time), len(chain.pairs.control)
+    n = len(chain.gps_time)
+    p = len(chain.pairs.control)
     result = Marginals(np.zeros(p), np.zeros(p), np.zeros((n, 3)), np.zeros((n, 3)))
     if p > 0:
         _smooth(chain, result)
@@ -68,7 +69,8 @@ def _smooth(chain, result):
             begins.append(now)
     future = hypotheses.start(chain)
     for part in range(len(begins) - 1, -1, -1):
-        first, last = part * length, min((part + 1) * length, n) - 1
+        first = part * length
+        last = min((part + 1) * length, n) - 1
         past = [heaviest(begins[part], chain)]
         now = begins[part]
         for row in range(first + 1, last + 1):
@@ -86,7 +88,8 @@ def _fill(both, chain, row, result):
     if len(both.weight) == 0:
         return  # past and future agree in no belief: nothing is said
     density = hypotheses.log_likelihoods(both, chain, row)
-    k, first = density.shape[1] // 2, chain.pairs.first[row]
+    k = density.shape[1] // 2
+    first = chain.pairs.first[row]
     _normalize(density.reshape(-1))
     for hypothesis in range(len(density)):
         for choice in range(k):
@@ -96,7 +99,8 @@ def _fill(both, chain, row, result):
     _normalize(share)
     value, variance = hypotheses.displacement(both, chain, row)
     for axis in range(3):
-        expected, square = 0.0, 0.0
+        expected = 0.0
+        square = 0.0
         for hypothesis in range(len(share)):
             expected += share[hypothesis] * value[hypothesis, axis]
         for hypothesis in range(len(share)):
@@ -108,7 +112,8 @@ def _fill(both, chain, row, result):
 @njit(**INNER)
 def _normalize(weight):
     """Make probabilities of logarithmic weights, in place."""
-    largest, total = -np.inf, 0.0
+    largest = -np.inf
+    total = 0.0
     for row in range(len(weight)):
         largest = max(largest, weight[row])
     for row in range(len(weight)):
@@ -138,7 +143,8 @@ def join(
     both = hypotheses.select(before, rows, w, w + len(after.window))
     precisions, vectors, weights = _information(before)
     later_precisions, later_vectors, later_weights = _information(after)
-    precision, vector = np.empty((3, 3)), np.empty(3)
+    precision = np.empty((3, 3))
+    vector = np.empty(3)
     for column, row in enumerate(after.window):
         both.window[w + column] = row
     for pair, (i, j) in enumerate(zip(rows, others)):  # noqa: B905 - numba knows no strict
@@ -154,8 +160,10 @@ def join(
                         precisions[i, axis, row, column] + later_precisions[j, axis, row, column]
                     )
                     precision[row, column] = known - (row == column)
-            x, p = both.mean[pair, axis], both.covariance[pair, axis]
-            determinant, square = _invert(precision, p), 0.0
+            x = both.mean[pair, axis]
+            p = both.covariance[pair, axis]
+            determinant = _invert(precision, p)
+            square = 0.0
             for row in range(3):
                 x[row] = p[row, 0] * vector[0] + p[row, 1] * vector[1] + p[row, 2] * vector[2]
                 square += vector[row] * x[row]
@@ -171,11 +179,14 @@ def _of_one_belief(before, after):
     for belief in before.belief:
         for other in after.belief:
             size += belief == other
-    rows, others, pair = np.empty(size, np.int64), np.empty(size, np.int64), 0
+    rows = np.empty(size, np.int64)
+    others = np.empty(size, np.int64)
+    pair = 0
     for i, belief in enumerate(before.belief):
         for j, other in enumerate(after.belief):
             if belief == other:
-                rows[pair], others[pair] = i, j
+                rows[pair] = i
+                others[pair] = j
                 pair += 1
     return rows, others
 
@@ -184,11 +195,13 @@ def _of_one_belief(before, after):
 def _information(now):
     """Precisions L, vectors L m and weights (log |L| - m L m) / 2, over all axes."""
     b = len(now.weight)
-    precision, vector = np.empty((b, 3, 3, 3)), np.zeros((b, 3, 3))
+    precision = np.empty((b, 3, 3, 3))
+    vector = np.zeros((b, 3, 3))
     weight = np.zeros(b)
     for hypothesis in range(len(weight)):
         for axis in range(3):
-            matrix, x = precision[hypothesis, axis], now.mean[hypothesis, axis]
+            matrix = precision[hypothesis, axis]
+            x = now.mean[hypothesis, axis]
             square = np.log(_invert(now.covariance[hypothesis, axis], matrix))
             for i in range(3):
                 for j in range(3):
@@ -201,9 +214,15 @@ def _information(now):
 @njit(**INNER)
 def _invert(matrix, out):
     """Inverse of a symmetric 3 x 3 matrix by its cofactors, and its determinant."""
-    a, b, c = matrix[0, 0], matrix[0, 1], matrix[0, 2]
-    d, e, f = matrix[1, 1], matrix[1, 2], matrix[2, 2]
-    out[0, 0], out[1, 1], out[2, 2] = d * f - e * e, a * f - c * c, a * d - b * b
+    a = matrix[0, 0]
+    b = matrix[0, 1]
+    c = matrix[0, 2]
+    d = matrix[1, 1]
+    e = matrix[1, 2]
+    f = matrix[2, 2]
+    out[0, 0] = d * f - e * e
+    out[1, 1] = a * f - c * c
+    out[2, 2] = a * d - b * b
     out[0, 1] = out[1, 0] = c * e - b * f
     out[0, 2] = out[2, 0] = b * e - c * d
     out[1, 2] = out[2, 1] = b * c - a * e

@@ -78,7 +78,8 @@ def find_pairs(
     tree = cKDTree(control.position)
     near = tree.query_ball_point(observations.position, search_radius, return_sorted=True)
     count = [len(columns) for columns in near]
-    column, row = np.concatenate(near).astype(int), np.repeat(range(n), count)
+    column = np.concatenate(near).astype(int)
+    row = np.repeat(range(n), count)
     return CandidatePairs(
         first=np.append(0, np.cumsum(count)),
         control=column,

@@ -61,9 +61,12 @@ class Matches:
 
 
 def match(
-    observations: TargetObservations, control: ControlPoints, trajectory: Trajectory,
-    pos: Pos | None = None, search_radius: float = SEARCH_RADIUS,
-) -> Matches:  # fmt: skip
+    observations: TargetObservations,
+    control: ControlPoints,
+    trajectory: Trajectory,
+    pos: Pos | None = None,
+    search_radius: float = SEARCH_RADIUS,
+) -> Matches:
     """Assign observations to control points, at most one per control point and visit.
 
     Kind and size must agree and the distance lie within the search radius. Misclosures change

@@ -64,7 +64,8 @@ def decide(pairs: CandidatePairs, marginals: Marginals, count: int, share: np.nd
     share : (p,) array
         Probabilities that the surveyed points lie elsewhere which the marginals hold already.
     """
-    sound, moved = marginals.sound, marginals.moved
+    sound = marginals.sound
+    moved = marginals.moved
     rest = np.clip(1.0 - sound - moved, np.finfo(float).eps, None)
     probable = pairs.same & (sound + moved >= 0.5)
     odds = _odds(marginals, share)
@@ -78,8 +79,10 @@ def decide(pairs: CandidatePairs, marginals: Marginals, count: int, share: np.nd
     used = np.flatnonzero(used & (drifts | ~is_wrong[pairs.control]))
     n = len(pairs.first) - 1
     row = np.repeat(np.arange(n), np.diff(pairs.first))[used]
-    column, probability = np.full(n, -1), np.zeros(n)
-    column[row], probability[row] = pairs.control[used], certainty[used]
+    column = np.full(n, -1)
+    probability = np.zeros(n)
+    column[row] = pairs.control[used]
+    probability[row] = certainty[used]
     return Decision(column, probability, wrong, passes, marginals)
 
 
@@ -89,7 +92,8 @@ def _in_drift(is_wrong, passes):
     Where one pass tells it, a short drift of the POS looks alike. A single point tells of no habit.
     """
     lone = is_wrong & (passes == 1)
-    number, total = np.sum(lone), np.sum(passes > 0)
+    number = np.sum(lone)
+    total = np.sum(passes > 0)
     wrong = log_share(number, total, SETTINGS.moved_share)
     return lone & (number > 1) & (log_share(number, total, 0.5) > wrong)
 
@@ -128,6 +132,7 @@ def moved_share_by_others(
 
 def _odds(marginals, share):
     """Log likelihood ratios (p,) of a surveyed point's lying elsewhere."""
-    sound, moved = marginals.sound, marginals.moved
+    sound = marginals.sound
+    moved = marginals.moved
     rest = np.clip(1.0 - sound - moved, np.finfo(float).eps, None)
     return np.log(moved / share + rest) - np.log(sound / (1.0 - share) + rest)

@@ -83,7 +83,8 @@ class _Case:
 
     def of_pairs(self, row):
         """Control points (k,) of an observation's pairs, most probable first, and probabilities."""
-        pairs, marginals = self.pairs.of(row), self.decision.marginals
+        pairs = self.pairs.of(row)
+        marginals = self.decision.marginals
         probability = marginals.sound[pairs] + marginals.moved[pairs]
         order = np.argsort(-probability)
         return self.pairs.control[pairs][order], probability[order], self.pairs.same[pairs][order]
@@ -98,7 +99,9 @@ class _Case:
 
     def corrected(self, row):
         """By which neighbours an observation was corrected, and how well, in words."""
-        time, column, matched = self.observations.gps_time, self.decision.column, self.matched
+        time = self.observations.gps_time
+        column = self.decision.column
+        matched = self.matched
         at = np.searchsorted(matched, row)
         near = [matched[i] for i in (at - 1, at) if 0 <= i < len(matched)]
         sigma = np.linalg.norm(self.decision.marginals.sigma[row])
@@ -109,9 +112,12 @@ class _Case:
 
 
 def explain(
-    observations: TargetObservations, control: ControlPoints, pairs: CandidatePairs,
-    decision: Decision, search_radius: float,
-) -> tuple[tuple[Refusal, ...], list[str | None]]:  # fmt: skip
+    observations: TargetObservations,
+    control: ControlPoints,
+    pairs: CandidatePairs,
+    decision: Decision,
+    search_radius: float,
+) -> tuple[tuple[Refusal, ...], list[str | None]]:
     """Say why control points have no observation, and observations no name.
 
     Parameters
@@ -139,7 +145,8 @@ def explain(
     other_kind = {row: column for row, column in kinds.items() if column is not None}
     for row in unnamed:
         if row in other_kind:
-            columns, reasons[row] = [other_kind[row]], _exchanged(case, row, other_kind)
+            columns = [other_kind[row]]
+            reasons[row] = _exchanged(case, row, other_kind)
         else:
             columns, reasons[row] = (
                 _wrong_place(case, row)
@@ -166,8 +173,11 @@ def _of_another_kind(case, row):
 
 def _exchanged(case, row, other_kind):
     """The sentence for a position that fits and a kind or size that doesn't."""
-    observed, surveyed, column = case.observations, case.control, other_kind[row]
-    kind, size = observed.kind[row], observed.size[row]
+    observed = case.observations
+    surveyed = case.control
+    column = other_kind[row]
+    kind = observed.kind[row]
+    size = observed.size[row]
     sentence = (
         f"The observation at {case.when(row)} is a {kind} of {size:.2f} m and "
         f"{case.name(column)} a {surveyed.kind[column]} of {surveyed.size[column]:.2f} m, but they "
@@ -189,7 +199,8 @@ def _wrong_place(case, row):
     if len(column) == 0 or probability[0] < 0.5 or wrong[column[0]] <= 0.5:
         return None
     point = column[0]
-    misclosure, passes = np.linalg.norm(case.misclosure(row, point)), case.decision.passes[point]
+    misclosure = np.linalg.norm(case.misclosure(row, point))
+    passes = case.decision.passes[point]
     return [point], (
         f"{case.name(point)} lies {case.off(row, point):.2f} m from where the observation at "
         f"{case.when(row)} says once corrected; {case.corrected(row)}. Its surveyed point is "
@@ -204,7 +215,8 @@ def _doubt(case, row):
     column, probability, _ = case.of_pairs(row)
     if probability.max(initial=0.0) < 2 * (1.0 - SETTINGS.smallest_probability):
         return None
-    point, chance = column[0], probability[0]
+    point = column[0]
+    chance = probability[0]
     end = f"({case.limit}, probability {chance:.3f}"
     if len(column) > 1 and probability[1] >= SETTINGS.smallest_rival:
         apart = np.linalg.norm(case.control.position[point] - case.control.position[column[1]])
@@ -220,7 +232,8 @@ def _doubt(case, row):
             f"Two observations {apart:.2f} m apart, at {case.when(row)} and {case.when(rival)}, "
             f"both claim {case.name(point)} {end} of the first); {case.corrected(row)}."
         )
-    misclosure, wrong = np.linalg.norm(case.misclosure(row, point)), case.decision.wrong[point]
+    misclosure = np.linalg.norm(case.misclosure(row, point))
+    wrong = case.decision.wrong[point]
     return [point], (
         f"{case.name(point)}, {misclosure:.2f} m from the observation at {case.when(row)}, isn't "
         f"surely its target {end}, and {wrong:.3f} that the surveyed point is wrong); "
@@ -230,11 +243,14 @@ def _doubt(case, row):
 
 def _rival(case, row, column):
     """The other observation of the pass that most probably is this control point, or None."""
-    number, marginals = case.observations.pass_number, case.decision.marginals
+    number = case.observations.pass_number
+    marginals = case.decision.marginals
     others, rows = case.pairs_of(column)
     chance = marginals.sound[others] + marginals.moved[others]
     near = (rows != row) & (number[rows] == number[row]) & (chance >= SETTINGS.smallest_rival)
-    return int(rows[near][np.argmax(chance[near])]) if near.any() else None
+    if near.any():
+        return int(rows[near][np.argmax(chance[near])])
+    return None
 
 
 def _not_there(case, row):
@@ -247,7 +263,10 @@ def _not_there(case, row):
     if len(free) == 0:
         return None
     point = min(free, key=lambda c: case.off(row, c))
-    claimed = [point] if case.off(row, point) <= 3 * SETTINGS.moved_sigma else []
+    if case.off(row, point) <= 3 * SETTINGS.moved_sigma:
+        claimed = [point]
+    else:
+        claimed = []
     return claimed, (
         f"{case.name(point)} lies {case.off(row, point):.2f} m from where the observation at "
         f"{case.when(row)} says once corrected; {case.corrected(row)}. This is another object "
@@ -263,7 +282,10 @@ def _without_point(case, row, tree):
     if tree is None:
         return f"There is no surveyed point for the {what}."
     distance, nearest = tree.query(observed.position[row])
-    role = "" if case.free(row, [nearest])[0] else ", another observation of this pass,"
+    if case.free(row, [nearest])[0]:
+        role = ""
+    else:
+        role = ", another observation of this pass,"
     return (
         f"No surveyed point is left for the {what} ({case.limit}); the nearest, "
         f"{case.name(nearest)}{role} a {case.control.kind[nearest]} of "

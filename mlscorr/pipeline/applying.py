@@ -115,7 +115,10 @@ def _effects_together(given) -> list[FoundEffects]:
 
 def _correction(survey, effects):
     """From the survey with the effects to that without."""
-    recorded, late, shift, lacks = survey.trajectory, 0.0, np.zeros(3), np.zeros(6)
+    recorded = survey.trajectory
+    late = 0.0
+    shift = np.zeros(3)
+    lacks = np.zeros(6)
     for effect in effects:
         size = np.atleast_1d(effect.magnitude)
         if effect.name == CLOCK:
@@ -130,7 +133,8 @@ def _correction(survey, effects):
             shift[2] += size[0]
     times = recorded.gps_time  # a stamp t of the scanner was t - late by the clock of the POS
     known = recorded.segment(times - late) == recorded.segment(times)
-    here, there = recorded.at(times[known]), recorded.at(times[known] - late)
+    here = recorded.at(times[known])
+    there = recorded.at(times[known] - late)
     moved = replace(there, gps_time=here.gps_time, position=there.position + shift)
     if not lacks.any():
         return Correction(here, moved, datum=shift)
@@ -181,8 +185,11 @@ class AppliedSurvey(Summary):
         ValueError, OSError
             As ``CorrectedSurvey.write`` does.
         """
-        survey, correction = self.survey, self.correction
-        mounting, files, left = correction.corrected_mounting, [], []
+        survey = self.survey
+        correction = self.correction
+        mounting = correction.corrected_mounting
+        files = []
+        left = []
         by_time = [effect.name for effect in self.effects if effect.name not in DATUM]
         with output_folder(out, survey.inputs, overwrite) as folder:
             done = (progress or silent)("Writing the cloud", survey.points)
@@ -195,10 +202,15 @@ class AppliedSurvey(Summary):
                 write_trajectory_csv(folder / trajectory, correction.corrected)
             parts = survey.by_scanner.values()
             write_survey_copy(
-                survey.path, folder / FILE_NAME, out, [] if mounting is None else [mounting],
-                [[written_name(file.path) for file in part.clouds] for part in parts], trajectory,
-                survey.corrected_by, [] if mounting is None else [self.note],
-            )  # fmt: skip
+                survey.path,
+                folder / FILE_NAME,
+                out,
+                [] if mounting is None else [mounting],
+                [[written_name(file.path) for file in part.clouds] for part in parts],
+                trajectory,
+                survey.corrected_by,
+                [] if mounting is None else [self.note],
+            )
             effects = [effect.document() for effect in self.effects]
             content = document("applied", {"name": survey.name, "effects": effects, "files": files})
             write_json(folder / "applied.json", content)

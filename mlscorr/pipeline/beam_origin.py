@@ -75,7 +75,9 @@ def _origin(time, place):
     if rate is None:
         return None
     middle = _meeting_point(time, in_plane, 2 * np.pi * rate)
-    return None if middle is None else middle @ axes[:2] + offset * axes[2]
+    if middle is None:
+        return None
+    return middle @ axes[:2] + offset * axes[2]
 
 
 def _meeting_point(time, place, rate):
@@ -102,4 +104,6 @@ def _meeting_point(time, place, rate):
         state += step
     sigma = scatter * np.sqrt(np.linalg.inv(normal)[[0, 1], [0, 1]].max())
     is_found = max(scatter, sigma, np.abs(step[:2]).max()) < SETTINGS.beam_scatter
-    return state[:2] if is_found else None
+    if is_found:
+        return state[:2]
+    return None

@@ -27,9 +27,14 @@ SECRET = ("truth*", "key*")  # names of files that no diagnosis may see
 
 
 def make_blind(
-    out: Path, cases: int, seed: int, workers: int, mechanisms: Path | None = None,
-    progress: Callable | None = None, effects: Path | None = None,
-) -> int:  # fmt: skip
+    out: Path,
+    cases: int,
+    seed: int,
+    workers: int,
+    mechanisms: Path | None = None,
+    progress: Callable | None = None,
+    effects: Path | None = None,
+) -> int:
     """Make the surveys of a blind check: OUT/cases, seals.json (public) and key.json (labels).
 
     What was interrupted goes on where it stopped. Returns the number of cases that are there.
@@ -53,7 +58,8 @@ def make_blind(
     ValueError
         When OUT holds another check, or a case can't be made.
     """
-    out, names = Path(out), tuple(outside_mechanisms(mechanisms))
+    out = Path(out)
+    names = tuple(outside_mechanisms(mechanisms))
     own = [kind.name for kind in known_effects()[len(EFFECTS) :]]
     key = _opened(out, {"cases": cases, "seed": seed, "mechanisms": list(names), "effects": own})
     drawn = enumerate(mix(cases, np.random.default_rng([seed]), names), start=1)
@@ -126,7 +132,8 @@ def score_blind(out: Path) -> dict:
         When a label or its key was changed after it was sealed, or nothing is answered yet.
     """
     out = Path(out)
-    key, seals = _read(out / "key.json")["labels"], _read(out / "seals.json")["seals"]
+    key = _read(out / "key.json")["labels"]
+    seals = _read(out / "seals.json")["seals"]
     broken = sorted(n for n in {*key, *seals} if n not in key or _seal(key[n]) != seals.get(n))
     if broken:
         raise ValueError(

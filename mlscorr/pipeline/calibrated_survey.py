@@ -44,9 +44,13 @@ class CalibrationResult(Summary):
         raise NotImplementedError
 
     def write(
-        self, out: str | Path, with_drift: bool = False, clouds: bool = False,
-        overwrite: bool = False, progress: Callable | None = None,
-    ) -> dict:  # fmt: skip
+        self,
+        out: str | Path,
+        with_drift: bool = False,
+        clouds: bool = False,
+        overwrite: bool = False,
+        progress: Callable | None = None,
+    ) -> dict:
         """Write calibration.json, its page, and survey.toml with the calibrated mountings.
 
         Parameters
@@ -73,7 +77,8 @@ class CalibrationResult(Summary):
         """
         from mlscorr.report import calibration_page
 
-        survey, parts = self.survey, self.parts
+        survey = self.survey
+        parts = self.parts
         read = {"clouds": cloud_rows(survey), "files": []}
         content = document("calibration", self.report(with_drift) | read)
         calibrations = {name: part.calibration for name, part in parts.items()}
@@ -158,7 +163,10 @@ class CalibratedSurvey(CalibrationResult):
         rows = [("", "correction", "1 sigma", "", "")]
         for row in self.components:
             numbers = (f"{row[f'lsc_{name}']:.4f}" for name in ("correction", "sigma"))
-            doubt = "" if row["determined"] else "not determined by this site: as the POS states"
+            if row["determined"]:
+                doubt = ""
+            else:
+                doubt = "not determined by this site: as the POS states"
             rows.append((row["component"], *numbers, row["unit"], doubt))
         return [(f"{self.survey.name}: what the recorded mounting lacks",), *rows]
 
@@ -172,7 +180,8 @@ class CalibratedSurvey(CalibrationResult):
         """
         from mlscorr.report import calibration_screen
 
-        calibration, rows = self.calibration, self._rows(self.calibration.correction())
+        calibration = self.calibration
+        rows = self._rows(self.calibration.correction())
         content = {
             "name": self.survey.name,
             "mounting": {

@@ -92,12 +92,15 @@ def calibrate(
 
 def _title(name):
     """What stands before a sentence on a scanner, where there are several."""
-    return f"Scanner {name}: " if name else ""
+    if name:
+        return f"Scanner {name}: "
+    return ""
 
 
 def _parts(survey, control, check, finding, calibration):
     """CalibratedSurvey of each scanner by its name, with the sentences on it alone."""
-    parts, of_pass = {}, finding.scanners(survey)
+    parts = {}
+    of_pass = finding.scanners(survey)
     for number, (name, part) in enumerate(survey.by_scanner.items()):
         matched = [points[points.scanner == number] for points in (control, check)]
         refusals = [

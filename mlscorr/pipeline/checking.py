@@ -178,7 +178,8 @@ def _crs_hints(survey, layouts) -> Iterator[str]:
 
 def _placed_times(survey) -> tuple[int, list[str]]:
     """Number of passes that times spread over the files lie in; sentences on those outside."""
-    placed, outside = [], []
+    placed = []
+    outside = []
     for file in survey.clouds:
         records = timed_records(read_layout(file.path))
         times = file.trajectory_time(records["gps_time"][file.rows(records["point_source_id"])])
@@ -228,7 +229,8 @@ def _looked(
         reasons = tuple(f"Targets in the cloud: {fault.sentence}" for fault in problems.faults)
         return None, None, False, [], reasons
     faults.warn(*problems.warnings)
-    points, matched = probe.points, probe.matched
+    points = probe.points
+    matched = probe.matched
     if probe.fault:
         faults.add("data", probe.fault)
     elif needs_control and len(survey.control) and probe.refusal:
@@ -237,7 +239,8 @@ def _looked(
         else:
             parts = faults.of("data", find_control, survey)
             if parts is not None:
-                points, matched = survey.surveyed, parts[0] + parts[1]
+                points = survey.surveyed
+                matched = parts[0] + parts[1]
     elif probe.doubt:
         faults.warn(probe.doubt)
     control = matched[np.isin(matched.name, survey.control.name)]

@@ -39,7 +39,9 @@ def choose_control(
     ValueError
         Where several may be meant, or the one can't be used as it is, or none is known to be one.
     """
-    points, problems, apart = {}, {}, {}
+    points = {}
+    problems = {}
+    apart = {}
     for path in [role.path for role in roles if role.role == "control" and holds_points(role.path)]:
         section = ControlSection.model_validate({**given, "file": path.name})
         try:
@@ -93,12 +95,15 @@ def choose_crs(clouds: list[Cloud], drive: Drive, given: str | None) -> tuple[st
     stated = [(cloud, stated_crs(cloud.layout)) for cloud in clouds]
     stated = [(cloud, crs) for cloud, crs in stated if crs is not None]
     if given is not None:
-        crs, reason = given, "as given"
+        crs = given
+        reason = "as given"
     elif stated:
         cloud, own = stated[0]
-        crs, reason = crs_code(own) or own.to_wkt(), f"by the VLRs of {cloud.name}"
+        crs = crs_code(own) or own.to_wkt()
+        reason = f"by the VLRs of {cloud.name}"
     elif drive.is_geographic:
-        crs, reason = drive.zone, f"UTM zone of {drive.name}; no cloud states a CRS"
+        crs = drive.zone
+        reason = f"UTM zone of {drive.name}; no cloud states a CRS"
     elif drive.lack:
         raise OpenQuestion(drive.lack, [PLACE_OF_CRS])
     else:

@@ -37,7 +37,10 @@ def write_clouds(
     """
     parts: dict[Path, list[CorrectedPart]] = {}
     for name, part in survey.by_scanner.items():
-        moved = correction[name] if isinstance(correction, Mapping) else correction
+        if isinstance(correction, Mapping):
+            moved = correction[name]
+        else:
+            moved = correction
         for file in part.clouds:
             corrected = CorrectedPart(file, moved, watch=lambda times, _: done(len(times)))
             parts.setdefault(file.path, []).append(corrected)

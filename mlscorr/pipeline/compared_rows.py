@@ -65,9 +65,13 @@ class ComparedRows:
 
 
 def compare_with_belief(
-    survey: Survey, believed: Survey, effects: tuple[Effect, ...], library: Iterable[type[Effect]],
-    rng: np.random.Generator, progress: Callable,
-) -> ComparedRows:  # fmt: skip
+    survey: Survey,
+    believed: Survey,
+    effects: tuple[Effect, ...],
+    library: Iterable[type[Effect]],
+    rng: np.random.Generator,
+    progress: Callable,
+) -> ComparedRows:
     """ComparedRows against what is believed; the simulator runs again on the survey's own pulses.
 
     Parameters
@@ -102,13 +106,19 @@ def compare_with_belief(
 def _loss(effects):
     """Share of returns that a simulator with these effects loses; None where it has no dropout."""
     lost = [effect.magnitude for effect in effects if effect.name == "dropout"]
-    return 1.0 - float(np.prod(1.0 - np.array(lost))) if lost else None
+    if lost:
+        return 1.0 - float(np.prod(1.0 - np.array(lost)))
+    return None
 
 
 def compare_with_clouds(
-    survey: Survey, believed: Survey, folders: Sequence[Path], library: Iterable[type[Effect]],
-    rng: np.random.Generator, progress: Callable,
-) -> ComparedRows:  # fmt: skip
+    survey: Survey,
+    believed: Survey,
+    folders: Sequence[Path],
+    library: Iterable[type[Effect]],
+    rng: np.random.Generator,
+    progress: Callable,
+) -> ComparedRows:
     """ComparedRows against simulated clouds: those of the first folder.
 
     What a second folder's differ by is what the simulator's next run changed.
@@ -132,7 +142,10 @@ def compare_with_clouds(
     absence = residuals.find_absence(believed, finding.matches)
     correction = _by_control(believed, finding.matches.matched)
     matched = _with_moved(finding, believed).matches.matched
-    patches = None if patches is None else residuals.spread_patches(patches)
+    if patches is None:
+        patches = None
+    else:
+        patches = residuals.spread_patches(patches)
     compared = []
     for folder, simulated in zip(folders, opened, strict=True):
         clouds, sample = _simulated_clouds(simulated, patches, correction, progress)
@@ -175,8 +188,12 @@ def _check_simulated(rows, folder):
 
 def _simulated_clouds(simulated, patches, correction, progress):
     """SimulatedClouds and ChannelSample of a simulated survey, read once."""
-    collector, sampler = residuals.PatchCollector(simulated), contrast.SampleCollector(simulated)
-    beams = None if patches is None else residuals.SimulatedBeams(patches, correction)
+    collector = residuals.PatchCollector(simulated)
+    sampler = contrast.SampleCollector(simulated)
+    if patches is None:
+        beams = None
+    else:
+        beams = residuals.SimulatedBeams(patches, correction)
     others = [sampler] if beams is None else [sampler, beams]
     read = read_into(collector.add, *map(_chunks_alone, others))
     with warnings.catch_warnings(action="ignore"):  # of beams, which refuse the clouds
@@ -186,7 +203,8 @@ def _simulated_clouds(simulated, patches, correction, progress):
             f"{simulated.path} was simulated with other beams than the survey's. "
             f"{finding.warnings[0]}"
         )
-    flat, matched = collector.patches(), finding.matches.matched
+    flat = collector.patches()
+    matched = finding.matches.matched
     given = matched, flat, beams, _by_control(simulated, matched)
     return residuals.SimulatedClouds(simulated.name, *given), sampler.sample(flat)
 
@@ -216,8 +234,12 @@ def _read(
     The clouds are read once: targets, patches, what lies about targets and, where there is a
     SampleCollector, its sample are taken from each chunk as it comes.
     """
-    collector, surroundings = residuals.PatchCollector(believed), Surroundings(believed)
-    others = [surroundings] if sampler is None else [surroundings, sampler]
+    collector = residuals.PatchCollector(believed)
+    surroundings = Surroundings(believed)
+    if sampler is None:
+        others = [surroundings]
+    else:
+        others = [surroundings, sampler]
     read = read_into(collector.add, *map(_chunks_alone, others))
     finding, notes = find_or_compare_surfaces(believed, read, surroundings.settle, progress)
     return finding, collector.patches(), surroundings, notes

@@ -58,7 +58,9 @@ class ComparedSurvey(Summary):
         """What the methods are ranked by: check, cross_validated, or the mere fit to control."""
         if "cross_validated" in self.rows[0] and self.groups:
             return "cross_validated"
-        return "check" if len(self.matched_check) else "control"
+        if len(self.matched_check):
+            return "check"
+        return "control"
 
     @property
     def document(self) -> dict:
@@ -101,9 +103,12 @@ class ComparedSurvey(Summary):
         return [(title,), ("method", "east", "north", "height", ""), *rows]
 
     def write(
-        self, out: str | Path, clouds: Sequence[str] = (), overwrite: bool = False,
+        self,
+        out: str | Path,
+        clouds: Sequence[str] = (),
+        overwrite: bool = False,
         progress: Callable | None = None,
-    ) -> dict:  # fmt: skip
+    ) -> dict:
         """Write compare.json and compare.html, and the clouds as some methods correct them.
 
         Parameters
@@ -142,7 +147,10 @@ class ComparedSurvey(Summary):
 
     def _write_clouds(self, folder, names, progress):
         """Rows on the files that were written."""
-        done = progress("Writing the clouds", self.survey.points * len(names)) if names else None
+        if names:
+            done = progress("Writing the clouds", self.survey.points * len(names))
+        else:
+            done = None
         files = []
         for name in names:
             (folder / name).mkdir()

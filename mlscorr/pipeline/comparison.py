@@ -64,7 +64,8 @@ def compare(
     is_few = len(set(check.name)) < SETTINGS.check_points
     groups = _groups(control) if is_few else []
     done = (progress or silent)("Fitting", len(METHODS) * (1 + len(groups)))
-    rows, corrections = [], {}
+    rows = []
+    corrections = {}
     for method in METHODS:
         row, correction = _row(method, observed, control, check)
         done(1)
@@ -79,10 +80,14 @@ def compare(
     for sentence in method_warnings(rows):
         warnings.warn(sentence, stacklevel=2)
     return ComparedSurvey(
-        survey=survey, matched_control=control, matched_check=check, rows=tuple(rows),
-        corrections=corrections, groups=len(groups),
+        survey=survey,
+        matched_control=control,
+        matched_check=check,
+        rows=tuple(rows),
+        corrections=corrections,
+        groups=len(groups),
         missing=unseen_rows(survey, finding.matches.refusals, finding.candidates, finding.scanned),
-    )  # fmt: skip
+    )
 
 
 def _row(method, observed, control, check):
@@ -128,15 +133,21 @@ def _statistics(residuals, determined):
 def _groups(control):
     """Names of control points to leave out together: one by one, or five groups spread in time."""
     names = list(dict.fromkeys(control.name[i] for i in np.argsort(control.gps_time)))
-    number = len(names) if len(names) <= SETTINGS.single_points else SETTINGS.groups
-    return [set(names[i::number]) for i in range(number)] if len(names) > 1 else []
+    if len(names) <= SETTINGS.single_points:
+        number = len(names)
+    else:
+        number = SETTINGS.groups
+    if len(names) > 1:
+        return [set(names[i::number]) for i in range(number)]
+    return []
 
 
 def _cross_validated(method, observed, control, groups, of_check, done):
     """N and the statistics over all points: each control point as the others correct it, each
     check point as all control points do. Without any group there is nothing to validate.
     """
-    parts, why = [of_check], None
+    parts = [of_check]
+    why = None
     for group in groups:
         left_out = np.array([name in group for name in control.name])
         with warnings.catch_warnings(action="ignore"):  # told of the fit to all control points

@@ -90,9 +90,12 @@ class CorrectedSurvey(Summary):
 
     @property
     def _control(self) -> Score:
-        estimate, used = self.estimate, self.estimate.used  # a refused point scores nowhere
+        # a refused point scores nowhere
+        estimate = self.estimate
+        used = self.estimate.used
         sigma = np.vstack([np.empty((0, 3)), *(test.sigma for test in estimate.tests)])
-        control, left_out = self.matched_control[used], estimate.left_out[used]
+        control = self.matched_control[used]
+        left_out = estimate.left_out[used]
         return score(control, estimate.correction, left_out, sigma)
 
     @property
@@ -159,9 +162,14 @@ class CorrectedSurvey(Summary):
         return [(self.survey.name,), ("RMSE of the misclosures",), *rows]
 
     def write(
-        self, out: str | Path, overwrite: bool = False, progress: Callable | None = None,
-        sigma: bool = False, page: bool = True, trajectories: Sequence[str] = (),
-    ) -> dict:  # fmt: skip
+        self,
+        out: str | Path,
+        overwrite: bool = False,
+        progress: Callable | None = None,
+        sigma: bool = False,
+        page: bool = True,
+        trajectories: Sequence[str] = (),
+    ) -> dict:
         """Write corrected clouds, trajectory, targets and report into a folder.
 
         Parameters
@@ -202,13 +210,20 @@ class CorrectedSurvey(Summary):
     @property
     def held(self) -> tuple[tuple[float, float], Support]:
         """First and last control epoch (s), and what holds the correction along the drive."""
-        span = self.estimate.span if self.estimate.used.any() else (np.inf, -np.inf)
+        if self.estimate.used.any():
+            span = self.estimate.span
+        else:
+            span = (np.inf, -np.inf)
         return span, self.estimate.support
 
     def write_beside(
-        self, folder: Path, written: WrittenClouds, progress: Callable | None = None,
-        page: bool = True, trajectories: Sequence[str] = (),
-    ) -> dict:  # fmt: skip
+        self,
+        folder: Path,
+        written: WrittenClouds,
+        progress: Callable | None = None,
+        page: bool = True,
+        trajectories: Sequence[str] = (),
+    ) -> dict:
         """Write all but the clouds into a folder that is there, as ``write`` does."""
         from mlscorr.report import first_screen
 
@@ -232,7 +247,8 @@ class CorrectedSurvey(Summary):
         """Write report.html and the pictures."""
         from mlscorr.report import view_cloud, write_pictures, write_report
 
-        correction, ties = self.estimate.correction, self.estimate.ties
+        correction = self.estimate.correction
+        ties = self.estimate.ties
         views = view_cloud(self.survey, correction, report.targets, progress, ties)
         shown = self.survey, correction, report, views, self.fitted, ties
         write_report(folder / "report.html", *shown)
@@ -293,13 +309,19 @@ class CorrectedSurvey(Summary):
 
         start, end = self.estimate.guards.longest_gap
         return CorrectionReport(
-            name=self.survey.name, crs=self.survey.crs,
-            notes=(*self.survey.notes, *filter(None, [self.estimate.untied])), targets=self.targets,
-            control=self._control, check=self._check, accuracy=self.accuracy,
+            name=self.survey.name,
+            crs=self.survey.crs,
+            notes=(*self.survey.notes, *filter(None, [self.estimate.untied])),
+            targets=self.targets,
+            control=self._control,
+            check=self._check,
+            accuracy=self.accuracy,
             model=model_section(self.estimate, self.warnings),
             coverage=Coverage(self.estimate.span, end - start),
-            support=self.estimate.support, jumps=find_jumps(self.estimate.correction),
+            support=self.estimate.support,
+            jumps=find_jumps(self.estimate.correction),
             ties=self.tie_section,
-            position_sigma=largest_sigma(self.trajectory, self.survey), datum=self.datum,
+            position_sigma=largest_sigma(self.trajectory, self.survey),
+            datum=self.datum,
             assumed=self.survey.assumed_pos if self.survey.has_assumed_position else (),
-        )  # fmt: skip
+        )

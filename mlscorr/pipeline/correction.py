@@ -16,9 +16,12 @@ from mlscorr.survey import Matched, Survey, check_survey
 
 
 def correct(
-    survey: Survey, order: int = SETTINGS.order, rng: np.random.Generator | None = None,
-    progress: Callable | None = None, ties: TieUse | None = None,
-) -> CorrectedSurvey:  # fmt: skip
+    survey: Survey,
+    order: int = SETTINGS.order,
+    rng: np.random.Generator | None = None,
+    progress: Callable | None = None,
+    ties: TieUse | None = None,
+) -> CorrectedSurvey:
     """Find the targets of a survey and estimate the POS error from its control points.
 
     Planes, poles and paint that two passes both saw hold the passes together, where there are any.

@@ -41,10 +41,14 @@ STEPS = 6  # of the progress beside reading: the inference, closure, plan
 
 
 def diagnose(
-    survey: Survey, simulator: Simulator | None = None,
-    library: Iterable[type[Effect]] | None = None, rng: np.random.Generator | None = None,
-    progress: Callable | None = None, simulated: Sequence[Path] = (), costs: Costs | None = None,
-) -> DiagnosedSurvey:  # fmt: skip
+    survey: Survey,
+    simulator: Simulator | None = None,
+    library: Iterable[type[Effect]] | None = None,
+    rng: np.random.Generator | None = None,
+    progress: Callable | None = None,
+    simulated: Sequence[Path] = (),
+    costs: Costs | None = None,
+) -> DiagnosedSurvey:
     """Find where a survey differs from its simulation, why, and how far the gap can be closed.
 
     Parameters
@@ -88,7 +92,8 @@ def diagnose(
     'time_offset'
     """
     check_survey(survey)
-    rng = np.random.default_rng(SETTINGS.seed) if rng is None else rng
+    if rng is None:
+        rng = np.random.default_rng(SETTINGS.seed)
     check_rng(rng)
     costs = Costs() if costs is None else costs
     if not all(0 <= cost < np.inf for cost in vars(costs).values()):
@@ -96,19 +101,24 @@ def diagnose(
     survey.check_one_scanner("a diagnosis")
     library = known_effects() if library is None else library
     progress = progress or silent
-    simulator = beliefs_of(survey) if simulator is None else simulator
+    if simulator is None:
+        simulator = beliefs_of(survey)
     if simulated:  # the clouds show how noisy the simulator's scanner is
         simulator = replace(simulator, scanner=replace(simulator.scanner, assumed=()))
     believed, effects = as_believed(survey, simulator)
     if simulated:
-        simulated = [simulated] if isinstance(simulated, str | Path) else simulated
+        if isinstance(simulated, str | Path):
+            simulated = [simulated]
         compared = compare_with_clouds(survey, believed, simulated, library, rng, progress)
     else:
         compared = compare_with_belief(survey, believed, effects, library, rng, progress)
-    observed, used, absence = compared.rows, compared.used, compared.absence
+    observed = compared.rows
+    used = compared.used
+    absence = compared.absence
     step = progress("Weighing the causes", STEPS)
     signs, left_out = signatures(observed, believed, library, rng)
-    part, signs_of_part = observed.select(used), select(signs, observed, used)
+    part = observed.select(used)
+    signs_of_part = select(signs, observed, used)
     # how the scale is found leaves the draws of the verdict alone
     scale = likely_scale(part, believed, signs_of_part, rng.spawn(1)[0])
     believed = replace(believed, pos=with_scale(believed.pos, scale, open_sigmas(believed)))
@@ -121,7 +131,8 @@ def diagnose(
         part = replace(part, residual=part.residual - curved)
         inference = infer(part, errors, rng=rng, costs=costs)
     step(2)
-    cause, change = cause_for_simulator(part, signs_of_part, inference), compared.simulated
+    cause = cause_for_simulator(part, signs_of_part, inference)
+    change = compared.simulated
     case = FoundCause(observed, used, believed, signs, inference.evidence, cause)
     closure = close_gap(case, change, rng, step)
     labels = [n for n in (*inference.verdict.set, *inference.same) if n != "unknown"]
@@ -129,16 +140,29 @@ def diagnose(
     plan = (*_looks_again(absence), *plan)
     step(2)
     return DiagnosedSurvey(
-        survey, simulator, effects, part, inference, closure, plan, left_out, compared.notes,
-        absence, signs_of_part, costs, compared.contrasts,
-        (*compared.distances, *_of_innovations(part, errors, inference, rng)), compared.next_run,
+        survey,
+        simulator,
+        effects,
+        part,
+        inference,
+        closure,
+        plan,
+        left_out,
+        compared.notes,
+        absence,
+        signs_of_part,
+        costs,
+        compared.contrasts,
+        (*compared.distances, *_of_innovations(part, errors, inference, rng)),
+        compared.next_run,
         scale,
-    )  # fmt: skip
+    )
 
 
 def _of_innovations(rows, errors, inference, rng):
     """DistributionDistances of innovations from those of replicas, by channel of rows."""
-    where, replicas = inference.where, contrast.replica_innovations(rows, errors, inference, rng)
+    where = inference.where
+    replicas = contrast.replica_innovations(rows, errors, inference, rng)
     return contrast.innovation_distances(rows.channel[where.row], where.innovation, replicas, rng)
 
 
@@ -193,10 +217,16 @@ class DiagnosedSurvey(Summary):
 
         believed = self._believed
         content = gap_document(
-            survey=believed, rows=self.rows, inference=self.inference, closure=self.closure,
-            next_data=self.next_data, effects=self.effects, left_out=self.left_out,
-            warnings=self.warnings, absence=self.absence,
-        )  # fmt: skip
+            survey=believed,
+            rows=self.rows,
+            inference=self.inference,
+            closure=self.closure,
+            next_data=self.next_data,
+            effects=self.effects,
+            left_out=self.left_out,
+            warnings=self.warnings,
+            absence=self.absence,
+        )
         if self.inference.verdict.label not in ("none", "unknown"):
             content["advice"].append(self._improvement[1] or self.next_run)
         if any(contrast.sentences for contrast in self.contrasts):
@@ -218,7 +248,8 @@ class DiagnosedSurvey(Summary):
         """The Simulator with the cause in it, or the same and a sentence why it can't take that."""
         if self.inference.verdict.label in ("none", "unknown"):
             return self.simulator, ""
-        pos, names = self._believed.pos, open_sigmas(self._believed)
+        pos = self._believed.pos
+        names = open_sigmas(self._believed)
         try:
             improved = with_cause(
                 replace(self.simulator, pos=pos), self.survey, self.inference.cause

@@ -78,7 +78,8 @@ class Cloud:
 
     def match(self, trajectory: Trajectory, setting: str = "auto") -> TimeMatch:
         """How its times become those of a trajectory; as match_times."""
-        offset, is_standard = self.layout.time_offset, self.layout.is_standard
+        offset = self.layout.time_offset
+        is_standard = self.layout.is_standard
         return match_times(self.name, self.times, is_standard, trajectory, setting, offset)
 
 
@@ -155,7 +156,9 @@ def choose_trajectory(
     ValueError
         Where none can be read and covers the clouds, and where several do.
     """
-    drives, readable, refusals = {}, {}, {}
+    drives = {}
+    readable = {}
+    refusals = {}
     places: list[OpenPlace] = []
     for path in [role.path for role in roles if role.role == "trajectory"]:
         try:
@@ -277,7 +280,10 @@ def ambiguous(
     clouds : sequence of Cloud
         That they cover.
     """
-    fit = f", which cover the {len(clouds)} cloud files alike" if clouds else ""
+    if clouds:
+        fit = f", which cover the {len(clouds)} cloud files alike"
+    else:
+        fit = ""
     listed = "; ".join(f"{path.name}{': ' * bool(why)}{why}" for path, why in candidates.items())
     keys = tuple(what.split(".")) if "." in what else (what, "file")
     return OpenQuestion(
@@ -302,7 +308,8 @@ def choose_accuracy(roles: Iterable[FileRole], drive: Drive, crs: str | None) ->
     ValueError
         Where several fit.
     """
-    roles, chosen = [*roles], {}
+    roles = [*roles]
+    chosen = {}
     for path in drive.paths if drive.lack and not drive.section.accuracy else ():
         fitting = {}
         for role in roles:

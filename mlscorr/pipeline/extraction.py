@@ -64,7 +64,8 @@ def extract(
     5
     """
     check_survey(survey)
-    rng = np.random.default_rng(SETTINGS.seed) if rng is None else rng
+    if rng is None:
+        rng = np.random.default_rng(SETTINGS.seed)
     check_rng(rng)
     surveyed = survey.surveyed
     kinds = dict.fromkeys(zip(surveyed.kind, surveyed.size.tolist(), strict=True))
@@ -72,7 +73,8 @@ def extract(
     if len(surveyed) == 0:
         shapes = [(kind, None) for kind in BRIGHT_KINDS]
     done = (progress or silent)("Searching the cloud", survey.points)
-    present, objects = np.zeros(1 << 16, bool), {}
+    present = np.zeros(1 << 16, bool)
+    objects = {}
 
     def searched(file):
         """The chunks of a file, each searched as it passes."""
@@ -174,7 +176,8 @@ class ExtractedSurvey(Summary):
     def _rows(self, observations: TargetObservations, reasons) -> list[dict]:
         rows = []
         for i, reason in enumerate(reasons):
-            number, time = int(observations.pass_number[i]), float(observations.gps_time[i])
+            number = int(observations.pass_number[i])
+            time = float(observations.gps_time[i])
             fitted = self.finding.fitted[number, time]
             rows.append(
                 {

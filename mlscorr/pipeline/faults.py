@@ -76,7 +76,8 @@ class Faults:
             try:
                 return function(*arguments)
             except ValueError as error:
-                where = "survey.toml" if isinstance(error, SurveyFileError) else where
+                if isinstance(error, SurveyFileError):
+                    where = "survey.toml"
                 self.add(where, str(error), error.number if isinstance(error, ListError) else 1)
             except OSError as error:  # survey.toml names a file that is not there, or ...
                 is_named = isinstance(error, FileNotFoundError) and error.errno is None

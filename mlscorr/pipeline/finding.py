@@ -93,7 +93,8 @@ def _bar(survey, progress):
 
 def _checked(survey, targets, candidates, near):
     """The Finding of what fit_while_reading gives; raises as find_targets does."""
-    uncovered, sentences = tuple(near.beams.outside()), tuple(near.warnings())
+    uncovered = tuple(near.beams.outside())
+    sentences = tuple(near.warnings())
     for sentence in sentences:
         warnings.warn(sentence, stacklevel=4)
     finding = matched_finding(survey, targets, candidates, near)
@@ -134,9 +135,12 @@ def matched_finding(
 
 
 def fit_while_reading(
-    survey: Survey, read: Callable, rng: np.random.Generator | None = None,
-    progress: Callable | None = None, settle: Callable | None = None,
-) -> tuple[list[PassTarget], Candidates, NearPoints]:  # fmt: skip
+    survey: Survey,
+    read: Callable,
+    rng: np.random.Generator | None = None,
+    progress: Callable | None = None,
+    settle: Callable | None = None,
+) -> tuple[list[PassTarget], Candidates, NearPoints]:
     """Fit targets near surveyed points while the clouds are read.
 
     Parameters
@@ -161,10 +165,13 @@ def fit_while_reading(
 
     Warns where the intensity tells nothing.
     """
-    rng = np.random.default_rng(SETTINGS.seed) if rng is None else rng
+    if rng is None:
+        rng = np.random.default_rng(SETTINGS.seed)
     check_rng(rng)
     seed = rng.integers(2**63)
-    fits, latest, near = [], [], NearPoints(survey)
+    fits = []
+    latest = []
+    near = NearPoints(survey)
 
     def fit(file, index, cloud):
         near.add_ball(index, cloud)
@@ -219,7 +226,8 @@ def unmatched(targets: list[PassTarget], candidates: Candidates, reason: str = "
         Why none has a name.
     """
     observations = as_observations(targets)
-    nothing, reasons = observations[np.zeros(len(targets), bool)], (reason,) * len(targets)
+    nothing = observations[np.zeros(len(targets), bool)]
+    reasons = (reason,) * len(targets)
     matches = Matches(nothing, observations, (), np.empty(0), reasons)
     return Finding(matches, candidates, _by_pass_and_time(targets))
 
@@ -277,9 +285,12 @@ def matched_by_role(survey: Survey, finding: Finding) -> tuple[Matched, Matched]
 
 
 def find_or_compare_surfaces(
-    survey: Survey, read: Callable = read_chunks, settle: Callable | None = None,
-    progress: Callable | None = None, rng: np.random.Generator | None = None,
-) -> tuple[Finding, tuple[str, ...]]:  # fmt: skip
+    survey: Survey,
+    read: Callable = read_chunks,
+    settle: Callable | None = None,
+    progress: Callable | None = None,
+    rng: np.random.Generator | None = None,
+) -> tuple[Finding, tuple[str, ...]]:
     """Find the targets where there are any: a diagnosis can do without.
 
     Parameters

@@ -120,7 +120,8 @@ def read_effects(source: str | Path) -> FoundEffects:
 
 def _of_gap(content):
     """The effects of the most probable cause; a ValueError where there is none."""
-    label, cause = content["verdict"]["label"], content["causes"][0] if content["causes"] else None
+    label = content["verdict"]["label"]
+    cause = content["causes"][0] if content["causes"] else None
     if label in ("none", "unknown") or cause is None or cause["effect"] != label:
         raise ValueError(f"The diagnosis names no cause but {label}: nothing can be taken out.")
     sizes = {}

@@ -60,7 +60,11 @@ class InstalledPart:
     @property
     def mark(self) -> str:
         """Its state in a word."""
-        return "ok" if self.ok else "MISSING" if self.needed else "without"
+        if self.ok:
+            return "ok"
+        if self.needed:
+            return "MISSING"
+        return "without"
 
 
 @dataclass(frozen=True, repr=False)
@@ -159,7 +163,10 @@ def _rendering():
         child = subprocess.run(
             [sys.executable, "-c", RENDER], capture_output=True, timeout=RENDER_SECONDS, check=False
         )
-        state = f"failed (exit code {child.returncode})" if child.returncode else "drawn"
+        if child.returncode:
+            state = f"failed (exit code {child.returncode})"
+        else:
+            state = "drawn"
     except subprocess.TimeoutExpired:
         state = f"no picture within {RENDER_SECONDS} s"
     except OSError as error:  # where Python itself may not be started

@@ -28,7 +28,9 @@ def line_rate(cloud: PointCloud, trajectory: Trajectory) -> float | None:
         return None
     time, place = beams
     rate = turning_rate(time, np.exp(1j * np.arctan2(place[:, 2], place[:, 0])))
-    return None if rate is None else abs(rate)
+    if rate is None:
+        return None
+    return abs(rate)
 
 
 def sampled_beams(

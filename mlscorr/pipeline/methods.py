@@ -113,7 +113,10 @@ def _lsc(observed, matched):
 def _correct(observed, matched):
     estimate = estimate_together(observed.survey, matched, observed.features, ESTIMATE.order)
     correction, details = _with_details(estimate)
-    used = 0 if estimate.ties is None else int(estimate.ties.used.sum())
+    if estimate.ties is None:
+        used = 0
+    else:
+        used = int(estimate.ties.used.sum())
     return correction, details | {"ties": used, "untied": estimate.untied or None}
 
 

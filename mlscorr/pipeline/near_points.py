@@ -34,8 +34,10 @@ class NearPoints:
     """
 
     def __init__(self, survey: Survey):
-        self.beams, self.points = BeamCheck(survey), 0
-        self.survey, self.of_file = survey, {}
+        self.beams = BeamCheck(survey)
+        self.points = 0
+        self.survey = survey
+        self.of_file = {}
         self.is_scanned = np.zeros(len(survey.surveyed), bool)
         self.is_present = np.zeros(1 << 16, bool)
 
@@ -90,7 +92,10 @@ class NearPoints:
         ----------
         survey : Survey
         """
-        reason = why_useless(np.flatnonzero(self.is_present)) if self.points else None
+        if self.points:
+            reason = why_useless(np.flatnonzero(self.is_present))
+        else:
+            reason = None
         if reason is not None and not set(survey.surveyed.kind) <= set(BY_EDGES):
             warnings.warn(
                 f"{reason} Bright targets can't be told by it: only plates that stand free are "
@@ -181,7 +186,8 @@ def no_control(survey: Survey, observations: int) -> str:
 
 def _other_heights(survey, radius):
     """A sentence where surveyed points lie farther above or below the drive than is searched."""
-    place, path = survey.surveyed.position, survey.trajectory.position
+    place = survey.surveyed.position
+    path = survey.trajectory.position
     nearest = cKDTree(path[:, :2]).query(place[:, :2])[1]
     above = float(np.median(place[:, 2] - path[nearest, 2]))
     if abs(above) < radius:

@@ -58,7 +58,8 @@ def sample_clouds(survey: Survey) -> DecodedSample:
     survey : Survey
     """
     run = max(IO.sampled_points, IO.chunk_points // len(survey.clouds))
-    points, start = 0, perf_counter()
+    points = 0
+    start = perf_counter()
     chunks = {file: list(_middle(file, run)) for file in survey.clouds}
     seconds = perf_counter() - start
     beams = BeamCheck(survey)
@@ -116,9 +117,13 @@ def amounts_written(survey: Survey) -> tuple[Amount, ...]:
     return (
         Amount("clouds", clouds, "MB", f"sizes of {_files(survey)}"),
         Amount("trajectory.csv", table, "MB", f"{epochs} epochs of {SETTINGS.epoch_bytes} bytes"),
-        Amount("report.html, report.json, targets.csv, pictures", SETTINGS.report_megabytes, "MB",
-               "surveys of 24 points; docs/results.md"),
-    )  # fmt: skip
+        Amount(
+            "report.html, report.json, targets.csv, pictures",
+            SETTINGS.report_megabytes,
+            "MB",
+            "surveys of 24 points; docs/results.md",
+        ),
+    )
 
 
 def amounts_needed(
@@ -137,23 +142,40 @@ def amounts_needed(
     tuple of Amount
     """
     decoding = sum(map(recorded_points, survey.clouds)) * sample.seconds / max(sample.points, 1)
-    fitting = 0.0 if probe is None else probe.seconds * len(survey.surveyed)
+    if probe is None:
+        fitting = 0.0
+    else:
+        fitting = probe.seconds * len(survey.surveyed)
     rate = sample.points / max(sample.seconds, 1e-9) / 1e6
     points = SETTINGS.decodings * decoding
     seconds = points + fitting + SETTINGS.report_seconds
     return (
         Amount("time", seconds, "s", "the sum of the next three, on this machine as it is now"),
-        Amount("reading and writing points", points, "s",
-               f"{SETTINGS.decodings:g} times decoding (docs/results.md) at {rate:.1f} million "
-               f"points/s, measured here on {sample.points}"),
-        Amount("fitting targets", fitting, "s",
-               "no target was fitted" if probe is None else f"{probe.seconds:.2f} s a surveyed "
-               f"point, measured here on {len(probe.points)}"),
-        Amount("report and pictures", SETTINGS.report_seconds, "s",
-               "docs/results.md; none with --no-report"),
-        Amount("memory", SETTINGS.memory, "GB",
-               "largest of 0.5 to 22 million points; docs/results.md"),
-    )  # fmt: skip
+        Amount(
+            "reading and writing points",
+            points,
+            "s",
+            f"{SETTINGS.decodings:g} times decoding (docs/results.md) at {rate:.1f} million "
+            f"points/s, measured here on {sample.points}",
+        ),
+        Amount(
+            "fitting targets",
+            fitting,
+            "s",
+            "no target was fitted"
+            if probe is None
+            else f"{probe.seconds:.2f} s a surveyed point, measured here on {len(probe.points)}",
+        ),
+        Amount(
+            "report and pictures",
+            SETTINGS.report_seconds,
+            "s",
+            "docs/results.md; none with --no-report",
+        ),
+        Amount(
+            "memory", SETTINGS.memory, "GB", "largest of 0.5 to 22 million points; docs/results.md"
+        ),
+    )
 
 
 def _files(survey):

@@ -48,15 +48,22 @@ def plan(survey: Survey, library: Iterable[type[Effect]] | None = None) -> Plann
     library = known_effects() if library is None else library
     signs, left_out = signatures(rows, survey, library)
     observed = Observations.of(rows, background(rows, survey))
-    compared, data = compare_signatures(observed, signs), []
+    compared = compare_signatures(observed, signs)
+    data = []
     for members in compared.classes:
         data += next_data(rows, survey, library, members, compared)
     noise = {sign.name: _NOISE for sign in signs if sign.is_noise}
     best = {addition.survey: addition for addition in sorted(data, key=lambda a: -(a.after or 0.0))}
     return PlannedSurvey(
-        survey, tuple(library), rows, compared, event_sizes(observed, signs), tuple(best.values()),
-        left_out | noise, _accuracy(survey, rows),
-    )  # fmt: skip
+        survey,
+        tuple(library),
+        rows,
+        compared,
+        event_sizes(observed, signs),
+        tuple(best.values()),
+        left_out | noise,
+        _accuracy(survey, rows),
+    )
 
 
 def _accuracy(survey, rows):
@@ -66,10 +73,16 @@ def _accuracy(survey, rows):
         return None
     points = survey.surveyed[rows.survey_item[first]]
     observed = TargetObservations(
-        points.name, rows.covariates["pass"][first].astype(int), rows.gps_time[first],
-        points.position, rows.noise[first, None, None] * np.eye(3), points.normal, points.kind,
-        points.size, rows.points[first],
-    )  # fmt: skip
+        points.name,
+        rows.covariates["pass"][first].astype(int),
+        rows.gps_time[first],
+        points.position,
+        rows.noise[first, None, None] * np.eye(3),
+        points.normal,
+        points.kind,
+        points.size,
+        rows.points[first],
+    )
     return predict_accuracy(survey.trajectory, Matched(observed, points), survey.pos)
 
 
@@ -102,10 +115,13 @@ class PlannedSurvey(Summary):
         content = separability_document(self.separability)
         for name, (parameters, units, sizes) in self.events.items():
             content["detectable"][name] = [
-                {"name": f"{name} {p}" if len(parameters) > 1 else name, "unit": u,
-                 "detectable": float(s)}
+                {
+                    "name": f"{name} {p}" if len(parameters) > 1 else name,
+                    "unit": u,
+                    "detectable": float(s),
+                }
                 for p, u, s in zip(parameters, units, sizes, strict=True)
-            ]  # fmt: skip
+            ]
         for kind in self.kinds:
             for part in content["detectable"].get(kind.name, ()):
                 part["typical"] = kind.quantities()["magnitude"].typical
@@ -134,7 +150,8 @@ class PlannedSurvey(Summary):
         """Sigma of the corrected position along the drive: 3D, m."""
         if self.accuracy is None:
             return None
-        sigma, rows = self.accuracy.sigma, _looks_at_control(self.survey, self.rows)
+        sigma = self.accuracy.sigma
+        rows = _looks_at_control(self.survey, self.rows)
         return {
             "gps_time": self.accuracy.gps_time.round(3).tolist(),
             "sigma": sigma.round(5).tolist(),

@@ -111,7 +111,8 @@ def spread_points(survey: Survey) -> ControlPoints:
 
 def _affordable(survey, windows):
     """As many of the points, still spread, as can be fitted in the time for a look."""
-    points, share = survey.control, SETTINGS.looked_seconds / SETTINGS.looked_points
+    points = survey.control
+    share = SETTINGS.looked_seconds / SETTINGS.looked_points
     single = replace(survey, control=points[len(points) // 2 :][:1])
     for _ in range(2):  # the first fit may have to be compiled
         start = perf_counter()
@@ -125,7 +126,8 @@ def _affordable(survey, windows):
 
 def _near(survey, file) -> Iterator[PointCloud]:
     """Points of a file beside surveyed points, whatever their heights."""
-    place, radius = survey.control.position, search_radius(survey, survey.control)
+    place = survey.control.position
+    radius = search_radius(survey, survey.control)
     for chunk in read_windows(file, _spans(survey)):
         apart = np.full(len(chunk), np.inf)
         for centre, limit in zip(place[:, :2], radius, strict=True):
@@ -136,7 +138,8 @@ def _near(survey, file) -> Iterator[PointCloud]:
 
 def _spans(survey):
     """Starts and ends (k, 2), in order, of the times when the points were passed. Units: s."""
-    trajectory, inside = survey.trajectory, np.zeros(len(survey.trajectory), bool)
+    trajectory = survey.trajectory
+    inside = np.zeros(len(survey.trajectory), bool)
     for centre in survey.control.position[:, :2]:
         apart = np.hypot(*(trajectory.position[:, :2] - centre).T)
         inside |= apart <= np.hypot(apart.min(), SETTINGS.looked_length)
@@ -197,14 +200,18 @@ def _with_other_heights(survey, windows, matched):
 def _above_cloud(points, chunks):
     """How far points lie above the middle height of the cloud about them, median. Units: m."""
     cloud = np.concatenate([np.empty((0, 3)), *(chunk.xyz for chunk in chunks)])
-    near = [np.hypot(*(cloud[:, :2] - place[:2]).T) < SETTINGS.scanned_radius
-            for place in points.position]  # fmt: skip
+    near = [
+        np.hypot(*(cloud[:, :2] - place[:2]).T) < SETTINGS.scanned_radius
+        for place in points.position
+    ]
     above = [
         place[2] - np.median(cloud[rows, 2])
         for place, rows in zip(points.position, near, strict=True)
         if rows.any()
     ]
-    return np.median(above) if above else np.nan
+    if above:
+        return np.median(above)
+    return np.nan
 
 
 def _is_better(refit, matched, points):

@@ -20,10 +20,14 @@ TIME_DIGITS = 1e-6  # s, to which a corrected trajectory is written
 
 
 def render(
-    survey: Survey, out: str | Path, corrected: str | Path | None = None,
-    size: tuple[int, int] = PAGE, overwrite: bool = False, progress: Callable | None = None,
+    survey: Survey,
+    out: str | Path,
+    corrected: str | Path | None = None,
+    size: tuple[int, int] = PAGE,
+    overwrite: bool = False,
+    progress: Callable | None = None,
     **options: Any,
-) -> dict:  # fmt: skip
+) -> dict:
     """Write before/after PNGs of a survey into a folder.
 
     Parameters
@@ -78,7 +82,8 @@ def render(
     check_pictures(asked, **drawn)
     if corrected is None:
         result = correct(survey, progress=progress)
-        correction, targets = result.estimate.correction, result.targets
+        correction = result.estimate.correction
+        targets = result.targets
     else:
         correction, targets = read_correction(survey, corrected)
     pictures = []

@@ -36,12 +36,19 @@ class DiagnosedRounds:
     @property
     def ended(self) -> str:
         """Why it ended, in a sentence."""
-        label, number = self.rounds[-1].inference.verdict.label, len(self.rounds)
+        label = self.rounds[-1].inference.verdict.label
+        number = len(self.rounds)
         named = [lowered(title(each.inference.verdict.label)) for each in self.rounds[:-1]]
         if label == "none":
-            whole = f"with {', '.join(named)} in the simulator " if named else ""
+            if named:
+                whole = f"with {', '.join(named)} in the simulator "
+            else:
+                whole = ""
             excess = self.rounds[-1].document["verdict"]["excess"]
-            left = lowered(no_cause((), excess)) if excess else "nothing is left to find"
+            if excess:
+                left = lowered(no_cause((), excess))
+            else:
+                left = "nothing is left to find"
             return f"Round {number}: {whole}{left}."
         if label == "unknown":
             return f"Round {number}: what is left no known effect explains."
@@ -79,15 +86,18 @@ class DiagnosedRounds:
         Exception
             As ``CorrectedSurvey.write`` does.
         """
-        survey, improved = self.rounds[0].survey, self.rounds[-1].improved
+        survey = self.rounds[0].survey
+        improved = self.rounds[-1].improved
         return write_diagnosis(out, self.document, survey, improved, overwrite)
 
 
 def _round_document(number, diagnosed):
     """What a round found, and the gap with it; none after what no simulator can take."""
-    cause, closure = diagnosed.inference.cause, diagnosed.closure
+    cause = diagnosed.inference.cause
+    closure = diagnosed.closure
     content = cause_document(diagnosed.rows, cause)
-    label, kept = content.pop("effect"), ("before", "after", "unit", "shrink", "kind")
+    label = content.pop("effect")
+    kept = ("before", "after", "unit", "shrink", "kind")
     gap = {name: getattr(closure, name) for name in kept}
     if closure.is_within_noise:
         gap["shrink"] = None
@@ -114,7 +124,8 @@ def diagnose_until_none(
     """
     rounds = [diagnose(survey, simulator, progress=progress, costs=costs)]
     while len(rounds) < SETTINGS.rounds:
-        last, improved = rounds[-1], rounds[-1].improved
+        last = rounds[-1]
+        improved = rounds[-1].improved
         if improved is last.simulator:  # nothing is left, or nothing that a simulator can take
             break
         rounds.append(diagnose(survey, improved, progress=progress, costs=costs))

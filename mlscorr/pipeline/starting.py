@@ -118,7 +118,8 @@ def init(
     >>> mlscorr.init(folder, f"{folder}/started.toml").write().name
     'started.toml'
     """
-    folder, given = Path(folder), given or {}
+    folder = Path(folder)
+    given = given or {}
     if not folder.is_dir():
         raise ValueError(f"{folder} is no folder; give the one that holds the clouds.")
     path = folder / FILE_NAME if out is None else Path(out)
@@ -133,7 +134,10 @@ def init(
             try:
                 _ask_of_control(folder, answers, roles)
                 text, used = _text(folder, path, answers, roles)
-                notes = () if answers.is_crs_open else _read_notes(path, text.render(False))
+                if answers.is_crs_open:
+                    notes = ()
+                else:
+                    notes = _read_notes(path, text.render(False))
                 break
             except ValueError as error:
                 answers.add(error)
@@ -240,13 +244,16 @@ def _text(folder, path, answers, roles):
     drive, late = choose_trajectory(
         _roles(folder, given, "trajectory", roles), clouds, given.get("trajectory", {})
     )
-    crs, why_crs = None, "to be given"
+    crs = None
+    why_crs = "to be given"
     if not answers.is_crs_open:
         crs, why_crs = choose_crs(clouds, drive, given.get("crs"))
     copies = find_copies(cloud.layout.cloud for cloud in sorted(clouds, key=_preference))
     clouds = [cloud for cloud in clouds if cloud.layout.cloud not in copies]
     if answers.is_crs_open:
-        accuracy, trajectory, near = {}, drive.recorded.trajectory, None
+        accuracy = {}
+        trajectory = drive.recorded.trajectory
+        near = None
     else:
         accuracy = choose_accuracy([r for r in roles if r.role == "accuracy"], drive, crs)
         trajectory = near = drive.read(crs, accuracy)
@@ -258,8 +265,10 @@ def _text(folder, path, answers, roles):
         copy: f"the same points as {first.name}, which would count twice"
         for copy, first in copies.items()
     }
-    roles = [replace(role, role="none", reason=refusals[role.path]) if role.path in refusals
-             else role for role in roles]  # fmt: skip
+    roles = [
+        replace(role, role="none", reason=refusals[role.path]) if role.path in refusals else role
+        for role in roles
+    ]
     text = SurveyText(given, answers.places)
     text.put("", "name", folder.resolve().name, "of the folder")
     if crs is not None or answers.is_crs_open:
@@ -311,14 +320,20 @@ def _clouds(folder, given, roles):
     if names is not None:
         files = [path for name in names for path in files_like(folder, name)]
         return [Cloud(read_layout(path)) for path in files] or _no_cloud(folder)
-    damaged = [role.reason for role in roles if role.role == "none"
-               and role.path.suffix.lower() in (".las", ".laz")]  # fmt: skip
+    damaged = [
+        role.reason
+        for role in roles
+        if role.role == "none" and role.path.suffix.lower() in (".las", ".laz")
+    ]
     if damaged:
         raise ValueError(" ".join(damaged))
     clouds = [Cloud(read_layout(role.path)) for role in roles if role.role == "cloud"]
     reasons = [role.reason for role in roles if role.role == "none" and is_foreign(role.path)]
-    reasons += [f"{folder} holds no cloud of its own, and {role.path} is {SIMULATED}: give that "
-                "folder." for role in roles if role.reason == SIMULATED]  # fmt: skip
+    reasons += [
+        f"{folder} holds no cloud of its own, and {role.path} is {SIMULATED}: give that folder."
+        for role in roles
+        if role.reason == SIMULATED
+    ]
     return clouds or _no_cloud(folder, reasons)
 
 
@@ -343,7 +358,9 @@ def _put_clouds(text, path, clouds, trajectory):
         there = list(path.parent.glob(next(iter(patterns))))
         names = sorted(patterns) if len(there) == len(names) else names
     points = sum(recorded_points(cloud.file()) for cloud in clouds)
-    spans, placed, systems = [], [], Counter()
+    spans = []
+    placed = []
+    systems = Counter()
     for cloud in clouds:
         match = cloud.match(trajectory, text.given.get("cloud.gps_time", "auto"))
         times = match.placed(cloud.known_times)
@@ -370,7 +387,10 @@ def _note_sources(text, clouds):
 def _put_sessions(text, path, drive, accuracy):
     """File and accuracy of the trajectory, or of each."""
     for number, (file, part) in enumerate(zip(drive.paths, drive.recorded.parts, strict=True)):
-        section = "trajectory" if len(drive.paths) == 1 else text.listed("trajectory", number)
+        if len(drive.paths) == 1:
+            section = "trajectory"
+        else:
+            section = text.listed("trajectory", number)
         length = f"{len(part)} epochs, {part.duration:.0f} s without gaps"
         text.put(section, "file", _name(path, file), length)
         if file in accuracy:
@@ -387,7 +407,8 @@ def _targets(points):
 
 def _rate(cloud: Cloud, trajectory: Trajectory) -> float | None:
     """Lines a second of a cloud, None where they are not seen."""
-    file, points = cloud.file(cloud.match(trajectory)), cloud.layout.points
+    file = cloud.file(cloud.match(trajectory))
+    points = cloud.layout.points
     first = max(0, points - SETTINGS.rated_points) // 2
     run = read_chunks(file, first=first, end=min(points, first + SETTINGS.rated_points))
     return line_rate(PointCloud.concatenate(list(run)), trajectory)

@@ -50,7 +50,8 @@ class _Line:
 
     def text(self, is_marked):
         """The line as survey.toml has it, its open places marked or with an example."""
-        value, reason = self.value, self.reason
+        value = self.value
+        reason = self.reason
         if is_marked and self.places:
             reason = "; ".join(dict.fromkeys(map(str, self.places)))
             value = MARK
@@ -114,9 +115,13 @@ class SurveyText:
         """
         dotted = f"{section}.{key}" if section else key
         if dotted in self.given:
-            value, reason = self.given.pop(dotted), "as given"
+            value = self.given.pop(dotted)
+            reason = "as given"
         self.keys.setdefault(section, set()).add(key)
-        keys = (*section.split(" ")[:1], *key.split(".")) if section else tuple(key.split("."))
+        if section:
+            keys = (*section.split(" ")[:1], *key.split("."))
+        else:
+            keys = tuple(key.split("."))
         places = tuple(place for place in self.places if place.keys[: len(keys)] == keys)
         self.lines.setdefault(section, []).append(_Line(key, value, reason, places))
 
@@ -151,7 +156,8 @@ class SurveyText:
         }
         parts = [HEAD, *[OPEN] * bool(is_marked and self.places), *texts.pop("")]
         for section, lines in texts.items():
-            keys, count = self.keys.get(section, set()), self.entries.get(section, 0)
+            keys = self.keys.get(section, set())
+            count = self.entries.get(section, 0)
             for number in range(count):
                 parts += ["", f"[[{section}]]", *texts[f"{section} {number}"]]
             if count or section.partition(" ")[0] in self.entries:

@@ -63,7 +63,8 @@ def estimate_site(
         Where a scanner saw less than 3 control points, or all of them at one time, and nothing that
         was seen twice, or ties are not wanted.
     """
-    collector, notes = TieCollector(survey), ()
+    collector = TieCollector(survey)
+    notes = ()
     if ties:
         read = read_into(collector.add)
         finding, notes = find_or_compare_surfaces(survey, read, None, progress, rng)
@@ -76,7 +77,10 @@ def estimate_site(
         for part in (control, check)
     )
     faults = [control_fault(control, number) for number in range(len(survey.mountings))]
-    estimate = believed_mounting if all(faults) else estimate_mounting
+    if all(faults):
+        estimate = believed_mounting
+    else:
+        estimate = estimate_mounting
     calibration = estimate(survey.trajectory, survey.mountings, control, survey.pos)
     if ties:
         calibration = tie_mounting(survey, calibration, control, collector.features())
@@ -114,8 +118,10 @@ def tie_mounting(
         These points.
     features : TieFeatures
     """
-    recorded, mountings = calibration.recorded, calibration.lsc.mountings
-    drift, trajectory = calibration.drift, calibration.trajectory
+    recorded = calibration.recorded
+    mountings = calibration.lsc.mountings
+    drift = calibration.drift
+    trajectory = calibration.trajectory
     sigma = placed_sigma(drift, survey.with_mountings(mountings), features)
     radius = min(widest_gate(sigma), survey.search_radius)
     moved = remounted(features, trajectory, recorded, mountings)

@@ -92,7 +92,8 @@ class TiedSurvey(Summary):
     @property
     def pairs(self) -> list[dict]:
         """Rows of every pair of passes, as ties.json has them."""
-        ties, rows = self.search.ties, []
+        ties = self.search.ties
+        rows = []
         heading = self.survey.trajectory.at(ties.gps_time[:, 0]).attitude
         axis = np.abs(heading.inv().apply(ties.direction)).argmax(axis=1)
         for passes in np.unique(ties.pass_number, axis=0):
@@ -132,7 +133,8 @@ class TiedSurvey(Summary):
     def stretches(self) -> list[dict]:
         """What the ties of each pair of passes hold least, in stretches of the earlier view."""
         ties = self.search.ties
-        group, rows = group_by_time(ties, 0, SETTINGS.pause), []
+        group = group_by_time(ties, 0, SETTINGS.pause)
+        rows = []
         for number in range(group.max(initial=-1) + 1):
             part = ties[group == number]
             time = part.gps_time[:, 0]
@@ -150,7 +152,8 @@ class TiedSurvey(Summary):
     @property
     def warnings(self) -> tuple[str, ...]:
         """What a reader of the ties must know."""
-        ties, refused = self.search.ties, self.search.refused
+        ties = self.search.ties
+        refused = self.search.refused
         if len(ties) == 0:
             return (
                 f"No tie was found: none of {len(self.features)} planes, poles and markings was "
@@ -188,7 +191,8 @@ class TiedSurvey(Summary):
         OSError
             When writing fails.
         """
-        kinds, passes = self.features.kind, self.features.pass_number
+        kinds = self.features.kind
+        passes = self.features.pass_number
         content = document(
             "ties",
             {

@@ -49,9 +49,12 @@ LEFT_OUT = (
 
 
 def estimate_survey(
-    survey: Survey, order: int, ties: TieUse | None = None, rng: np.random.Generator | None = None,
+    survey: Survey,
+    order: int,
+    ties: TieUse | None = None,
+    rng: np.random.Generator | None = None,
     progress: Callable | None = None,
-) -> tuple[Survey, Matched, Matched, Finding, Estimate]:  # fmt: skip
+) -> tuple[Survey, Matched, Matched, Finding, Estimate]:
     """Read a survey's clouds once, and estimate the POS error from all that is in them.
 
     Parameters
@@ -104,7 +107,9 @@ def tie_use(survey: Survey, ties: TieUse | None) -> TieUse:
         For another use than there is.
     """
     if ties is None:
-        return "auto" if survey.use_ties else "off"
+        if survey.use_ties:
+            return "auto"
+        return "off"
     if ties not in get_args(TieUse):
         known = ", ".join(map(repr, get_args(TieUse)))
         raise ValueError(f"ties = {ties!r} is no use of ties: give one of {known}, or None.")
@@ -112,9 +117,11 @@ def tie_use(survey: Survey, ties: TieUse | None) -> TieUse:
 
 
 def observe_survey(
-    survey: Survey, ties: TieUse, rng: np.random.Generator | None = None,
+    survey: Survey,
+    ties: TieUse,
+    rng: np.random.Generator | None = None,
     progress: Callable | None = None,
-) -> tuple[Survey, Matched, Matched, Finding, TieFeatures | None]:  # fmt: skip
+) -> tuple[Survey, Matched, Matched, Finding, TieFeatures | None]:
     """Read a survey's clouds once, for its targets and for the features that may tie its passes.
 
     Parameters
@@ -140,7 +147,10 @@ def observe_survey(
         As ``find_control``.
     """
     collector = TieCollector(survey)
-    read = read_chunks if ties == "off" else read_into(collector.add)
+    if ties == "off":
+        read = read_chunks
+    else:
+        read = read_into(collector.add)
     if ties == "only":
         finding, _ = find_or_compare_surfaces(survey, read, None, progress)
         control, check = finding.matches.by_role(survey)
@@ -179,7 +189,8 @@ def estimate_together(
 
 def _with_mounting_checked(survey, estimate, control):
     """The estimate with a note where its ties tell of a wrong mounting."""
-    mountings, warned = survey.mountings, ()
+    mountings = survey.mountings
+    warned = ()
     if estimate.equations.mounting is not None:
         warned = tuple(scanner_warnings(estimate, list(survey.by_scanner)))
     if not warned and None not in mountings:  # all of them may be wrong alike
@@ -208,8 +219,12 @@ def tie_passes(survey: Survey, estimate: Estimate, features: TieFeatures) -> Est
     radius = min(max(widest_gate(sigma), SETTINGS.least_gate), survey.search_radius)
     limit = 0.0
     moved = _moved(correction, features)
-    pause, least = SETTINGS.pause, least_pause(survey, features)
-    mountings = survey.mountings if survey.scanners and None not in survey.mountings else ()
+    pause = SETTINGS.pause
+    least = least_pause(survey, features)
+    if survey.scanners and None not in survey.mountings:
+        mountings = survey.mountings
+    else:
+        mountings = ()
     moved += coarse_correction(replace(features, centre=features.centre + moved), radius)
     while True:
         pairs = pair_features(features, moved, sigma, radius, pause=pause)
@@ -220,7 +235,8 @@ def tie_passes(survey: Survey, estimate: Estimate, features: TieFeatures) -> Est
             estimate = _untied(estimate, features, radius)
         if least < pause and (len(ties) == 0 or radius <= limit):
             # visits come first: metres apart, they had no tie within the gates of a single one
-            pause, mountings = least, (survey.assumed_mounting,)
+            pause = least
+            mountings = (survey.assumed_mounting,)
             continue
         if len(ties) == 0:
             return estimate
@@ -229,9 +245,13 @@ def tie_passes(survey: Survey, estimate: Estimate, features: TieFeatures) -> Est
             return with_ties(replace(estimate, notes=(*estimate.notes, *unheld)), ties, mountings)
         half = thinned_ties(ties, SETTINGS.ties // 2)  # shows as well how near partners are
         moved = _moved(previewed_correction(estimate, half, mountings), features)
-        before, limit = limit, narrowest_gate(ties, moved)
+        before = limit
+        limit = narrowest_gate(ties, moved)
         is_settled = 0.0 < before < 1.1 * limit
-        radius = limit if is_settled else max(min(radius / 2, np.sqrt(radius * limit)), limit)
+        if is_settled:
+            radius = limit
+        else:
+            radius = max(min(radius / 2, np.sqrt(radius * limit)), limit)
 
 
 def placed_sigma(correction: Correction, survey: Survey, features: TieFeatures) -> np.ndarray:

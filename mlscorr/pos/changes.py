@@ -37,7 +37,8 @@ def quick_changes(gps_time: np.ndarray, size: np.ndarray) -> np.ndarray:
         changed.append((large[0], large[-1] + 1))
     first, last = np.array(changed, int).reshape(-1, 2).T
     as_long = np.maximum(gps_time[last] - gps_time[first], SETTINGS.step_duration)
-    sooner, later = _beside(gps_time, first, -as_long), _beside(gps_time, last, as_long)
+    sooner = _beside(gps_time, first, -as_long)
+    later = _beside(gps_time, last, as_long)
     beside = np.abs([size[sooner] - size[first], size[later] - size[last]]).max(axis=0)
     is_quick = np.abs(size[last] - size[first]) > SETTINGS.steady_ratio * beside
     return np.column_stack([first, last])[is_quick]
@@ -72,7 +73,8 @@ def steady_sigma(trajectory: Trajectory) -> np.ndarray:
     trajectory : Trajectory
         With sigmas.
     """
-    time, sigma = trajectory.gps_time, trajectory.position_sigma
+    time = trajectory.gps_time
+    sigma = trajectory.position_sigma
     steady = np.empty_like(sigma)
     for first, last in np.searchsorted(time, trajectory.passes):
         own = slice(first, last + 1)
@@ -96,7 +98,8 @@ def timely_sigma(trajectory: Trajectory, steps: Steps) -> tuple[np.ndarray, np.n
         With sigmas.
     steps : Steps
     """
-    time, sigma = trajectory.gps_time, trajectory.position_sigma.copy()
+    time = trajectory.gps_time
+    sigma = trajectory.position_sigma.copy()
     steady = steady_sigma(trajectory)
     changes = quick_changes(time, np.linalg.norm(steady, axis=1))
     for change, step in _pairs(time[changes].mean(axis=1), steps.middle):

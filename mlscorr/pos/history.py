@@ -99,7 +99,8 @@ class DriftHistory:
         """
         if not self.is_stated:
             return np.full(len(gps_time), -1)
-        epochs, size = self.trajectory.gps_time, np.linalg.norm(self.sigma, axis=1)
+        epochs = self.trajectory.gps_time
+        size = np.linalg.norm(self.sigma, axis=1)
         is_raised = size > SETTINGS.steady_ratio * np.linalg.norm(self.held)
         number = np.cumsum(np.diff(is_raised, prepend=False) & is_raised) - 1
         number[~is_raised] = -1
@@ -111,7 +112,8 @@ class DriftHistory:
 
         At a step of the path, or where one of the two solutions is GNSS at its best.
         """
-        time, size = self.trajectory.gps_time, np.linalg.norm(self.level, axis=1)
+        time = self.trajectory.gps_time
+        size = np.linalg.norm(self.level, axis=1)
         # where the change is over: what is on the way is no larger than what was before
         rows = quick_changes(time, size)[:, 1]
         beside = np.linalg.norm([self.added[rows - 1], self.added[rows]], axis=2).min(axis=0)
@@ -142,7 +144,8 @@ class DriftHistory:
         return self._continuous(np.sqrt(np.maximum(self.sigma**2 - self.level**2, 0.0)))
 
     def _continuous(self, amplitude):
-        time, steps = self.trajectory.gps_time, self.steps
+        time = self.trajectory.gps_time
+        steps = self.steps
         starts = np.searchsorted(time, self.restarts)
         least = self.held if self.is_stated else SETTINGS.gnss
         return continuous(time, amplitude, least, np.append(starts, steps.rows(time)))
@@ -166,7 +169,8 @@ def drift_history(trajectory: Trajectory) -> DriftHistory:
 
 
 def _history(trajectory):
-    time, steps = trajectory.gps_time, find_steps(trajectory)
+    time = trajectory.gps_time
+    steps = find_steps(trajectory)
     stated = steady = np.zeros((len(time), 3))
     if trajectory.position_sigma is not None:
         steady = steady_sigma(trajectory)
@@ -244,4 +248,6 @@ def _held(sigma):
     """Sigma (3,) to which GNSS holds the POS, of (n, 3); zero where it is constant."""
     held = np.percentile(sigma, SETTINGS.held_percentile, axis=0)
     is_steady = (sigma.max(axis=0) <= SETTINGS.steady_ratio * held).all()
-    return np.zeros(3) if is_steady else held
+    if is_steady:
+        return np.zeros(3)
+    return held

@@ -63,7 +63,9 @@ class StatedSigma:
     @property
     def held(self) -> np.ndarray:
         """The part (n, 3) of the position's sigma that stays; zero where none is told. Units: m."""
-        return self.gnss if self.history.is_stated else np.zeros_like(self.gnss)
+        if self.history.is_stated:
+            return self.gnss
+        return np.zeros_like(self.gnss)
 
     @property
     def gnss(self) -> np.ndarray:
@@ -83,7 +85,8 @@ class StatedSigma:
         one of another time, (1 - t / T)^p w(t / (1 - t / T)), with p = 1 (3).
         """
         number = self.history.growth(self.gps_time)
-        start, end = self.starts[number], self.history.ends[number]
+        start = self.starts[number]
+        end = self.history.ends[number]
         is_tied = (self.since > 0) & np.isfinite(end)
         whole = np.subtract(end, start, out=np.ones(len(number)), where=is_tied)
         return np.where(is_tied, np.maximum(end - self.gps_time, SOONEST) / whole, 1.0)
@@ -165,11 +168,17 @@ def stated_sigma(
     ValueError
         Where a time lies outside the trajectory or in one of its gaps.
     """
-    pose = trajectory if gps_time is None else trajectory.at(gps_time)
+    if gps_time is None:
+        pose = trajectory
+    else:
+        pose = trajectory.at(gps_time)
     history = drift_history(trajectory)
     shape = (len(pose.gps_time), 3)
-    position, angles = np.full(shape, pos.position_sigma), pose.attitude_sigma
-    least, added, drift = np.minimum(position, SETTINGS.gnss), np.zeros(shape), position
+    position = np.full(shape, pos.position_sigma)
+    angles = pose.attitude_sigma
+    least = np.minimum(position, SETTINGS.gnss)
+    added = np.zeros(shape)
+    drift = position
     if trajectory.position_sigma is not None:
         parts = (history.sigma, history.least, history.added, history.drift)
         position, least, added, drift = (
@@ -181,10 +190,17 @@ def stated_sigma(
     if trajectory.position_sigma is not None:
         largest = history.sigma.max(axis=0)
     return StatedSigma(
-        gps_time=pose.gps_time, position=position, angles=angles, rotation=pose.attitude,
-        largest=largest, least=least, added=added, drift=drift, history=history,
+        gps_time=pose.gps_time,
+        position=position,
+        angles=angles,
+        rotation=pose.attitude,
+        largest=largest,
+        least=least,
+        added=added,
+        drift=drift,
+        history=history,
         starts=history.starts if starts is None else starts,
-    )  # fmt: skip
+    )
 
 
 def _at(times, gps_time, values):

@@ -123,8 +123,10 @@ def _differences(driven, span, changes):
     about[1] = frames[span:-span].apply(about[1])
     sizes = ways[span:-span] - times[span:-span, None] * np.array(about)
     lengths = np.linalg.norm(sizes, axis=2)
-    nearer, rows = np.argmin(lengths, axis=0), np.arange(lengths.shape[1])
-    size, length = sizes[nearer, rows], lengths[nearer, rows]
+    nearer = np.argmin(lengths, axis=0)
+    rows = np.arange(lengths.shape[1])
+    size = sizes[nearer, rows]
+    length = lengths[nearer, rows]
     start = gps_time[span : span + len(size)]
     second = np.floor(start - gps_time[0]).astype(int)
     largest = np.zeros(second[-1] + 1)

@@ -61,7 +61,8 @@ def scanners_screen(content: dict[str, Any]) -> dict[str, object]:
 def _relative(content) -> Iterator[Statement]:
     """How well it is known how each further scanner stands beside the first."""
     for name, row in content["relative"].items():
-        first, fit = row["beside"], row["fit_sigma"]
+        first = row["beside"]
+        fit = row["fit_sigma"]
         arm, turn = (row[part]["sigma"] for part in PARTS)
         both = f"No wall that scanners {first} and {name} both saw holds them."
         if fit is not None:
@@ -86,7 +87,8 @@ def component_rows(content: dict[str, Any]) -> list[dict[str, Any]]:
     content : dict
         Of one scanner. Units: m and deg.
     """
-    names, known = iter(MOUNTING_COMPONENTS), iter(content["determined"])
+    names = iter(MOUNTING_COMPONENTS)
+    known = iter(content["determined"])
     known_by = {"lsc": True, "ls": content["ls"]["control"]["n"] > 0}  # LS takes control alone
     return [
         {
@@ -184,7 +186,8 @@ def _scanner(content) -> Iterator[Statement]:
     errors = content["scanner_errors"]
     if errors is None:
         return
-    ranges, encoder = errors["range_offset"], errors["encoder_scale"]
+    ranges = errors["range_offset"]
+    encoder = errors["encoder_scale"]
     open_ranges, open_encoder = (
         " (not determined)" if row["significant"] and not row["determined"] else ""
         for row in (ranges, encoder)
@@ -208,7 +211,10 @@ def _ties(content) -> Iterator[Statement]:
     if ties is not None and ties["used"]:
         before, after = (length_in_words(ties[state]["median"]) for state in ("before", "after"))
         is_between = any(len(set(row["scanners"])) > 1 for row in ties["pairs"])
-        views = "two passes, or two scanners of one," if is_between else "two passes"
+        if is_between:
+            views = "two passes, or two scanners of one,"
+        else:
+            views = "two passes"
         sentence = (
             f"{ties['used']} of {ties['n']} places that {views} both saw are used: {before} "
             f"apart before, {after} after (median)"
@@ -234,13 +240,20 @@ def calibration_page(content: dict[str, Any]) -> Page:
         title=f"{content['name']}: calibration of the mounting",
         summary="calibration-summary.html",
         sections=SECTIONS,
-        content={"name": content["name"], "scanners": parts, "shared": shared,
-                 "components": MOUNTING_COMPONENTS, "norm3": _norm,
-                 "files": content.get("files")},
+        content={
+            "name": content["name"],
+            "scanners": parts,
+            "shared": shared,
+            "components": MOUNTING_COMPONENTS,
+            "norm3": _norm,
+            "files": content.get("files"),
+        },
         prefix="calibration-",
-    )  # fmt: skip
+    )
 
 
 def _norm(values):
     """Length of a vector of a document; NaN without one."""
-    return float(np.linalg.norm(values)) if values and None not in values else np.nan
+    if values and None not in values:
+        return float(np.linalg.norm(values))
+    return np.nan

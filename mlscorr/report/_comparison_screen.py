@@ -49,7 +49,10 @@ def _best(document):
 
 def _scored(document):
     """What the scores rest on."""
-    rating = "amber" if document["scored_by"] == "control" else "green"
+    if document["scored_by"] == "control":
+        rating = "amber"
+    else:
+        rating = "green"
     return headline.Statement("Scores", rating, basis(document))
 
 
@@ -100,7 +103,8 @@ def undetermined(document: dict) -> list[tuple[str, str]]:
     document : dict
         The content of compare.json.
     """
-    ranked, by = ranking(document), document["scored_by"]
+    ranked = ranking(document)
+    by = document["scored_by"]
     return [
         (row["name"], row["why"] or row[by].get("why") or "no point to score it by")
         for row in document["methods"]
@@ -129,16 +133,26 @@ def basis(document: dict) -> str:
     document : dict
         The content of compare.json.
     """
-    control, check = document["control_points"], document["check_points"]
+    control = document["control_points"]
+    check = document["check_points"]
     made = f"Every method was fitted to the same {counted(control, 'control point')}"
     if document["scored_by"] == "check":
         return f"{made} and scored by {counted(check, 'check point')} that took no part."
     if document["scored_by"] == "control":
         return f"{made}. Nothing independent is left to score them by: this is the mere fit."
-    too_few = f"only {counted(check, 'check point')}" if check else "no check points"
+    if check:
+        too_few = f"only {counted(check, 'check point')}"
+    else:
+        too_few = "no check points"
     groups = document["cross_validation_groups"]
-    left = "each left out in turn" if groups == control else f"left out in {groups} groups in turn"
-    others = "; each check point from all control points" if check else ""
+    if groups == control:
+        left = "each left out in turn"
+    else:
+        left = f"left out in {groups} groups in turn"
+    if check:
+        others = "; each check point from all control points"
+    else:
+        others = ""
     return (
         f"{made}. There {'is' if check == 1 else 'are'} {too_few}, so the scores are "
         f"cross-validated over all points: control points, {left}, are predicted from the "
@@ -154,7 +168,8 @@ def verdict(document: dict) -> list[str]:
     document : dict
         The content of compare.json.
     """
-    ranked, by = ranking(document), document["scored_by"]
+    ranked = ranking(document)
+    by = document["scored_by"]
     value = {row["name"]: row[by]["rmse_3d"] for row in ranked}
     best = ranked[0]["name"]
     tied = [name for name in value if value[name] - value[best] < SETTINGS.difference]

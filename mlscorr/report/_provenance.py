@@ -19,10 +19,14 @@ TIMES = {"week": "GPS seconds of week", "standard": "adjusted standard GPS time"
 
 def systems(survey: Survey) -> list[tuple[str, str]]:
     """Pairs (what, value) on systems, frames, and what was believed of the instruments."""
-    trajectory, time = survey.trajectory, survey.trajectory.gps_time
+    trajectory = survey.trajectory
+    time = survey.trajectory.gps_time
     crs = survey.crs or "not stated in survey.toml; coordinates are taken as E, N, H in m"
     pairs = [("Coordinate reference system", crs), *FRAMES.items()]
-    week_end = "" if trajectory.weeks is None else ", counted on over the end of the GPS week"
+    if trajectory.weeks is None:
+        week_end = ""
+    else:
+        week_end = ", counted on over the end of the GPS week"
     span = f"gps_time {time[0]:.3f} to {time[-1]:.3f} s{week_end}"
     pairs.append(("Time of the trajectory", span))
     pairs += dict.fromkeys((f"Time of {cloud.path.name}", _time(cloud)) for cloud in survey.clouds)
@@ -30,7 +34,10 @@ def systems(survey: Survey) -> list[tuple[str, str]]:
     pairs.append(("Epochs of the trajectory", f"{thousands(len(time))} at {rate:.4g} Hz"))
     sigma = "its own at each epoch"
     if trajectory.position_sigma is None:
-        origin = "a default" if survey.has_assumed_position else "as survey.toml states"
+        if survey.has_assumed_position:
+            origin = "a default"
+        else:
+            origin = "as survey.toml states"
         sigma = f"{survey.pos.position_sigma:g} m at all times, {origin}"
     kind = "Assumed" if survey.has_assumed_position else "Stated"
     pairs.append((f"{kind} sigma of the trajectory's position", sigma))
@@ -69,7 +76,9 @@ def files(report: CorrectionReport) -> dict[str, list[tuple[str, str, str, str]]
 def _size(row: FileRow):
     if row.points is not None:
         return f"{thousands(row.points)} points"
-    return "–" if row.bytes is None else f"{thousands(row.bytes)} bytes"
+    if row.bytes is None:
+        return "–"
+    return f"{thousands(row.bytes)} bytes"
 
 
 def coverage(correction: Correction, report: CorrectionReport) -> list[tuple[str, object]]:
@@ -80,7 +89,8 @@ def coverage(correction: Correction, report: CorrectionReport) -> list[tuple[str
     correction : Correction
     report : CorrectionReport
     """
-    covered, total = report.coverage, report.cloud_points
+    covered = report.coverage
+    total = report.cloud_points
     time = correction.recorded.gps_time
 
     def span(first, last):
@@ -89,10 +99,16 @@ def coverage(correction: Correction, report: CorrectionReport) -> list[tuple[str
     def points(n):
         return thousands(n) + (f" ({100 * n / total:.2f} %)" if n and total else "")
 
-    control = span(*covered.control_span) if report.control.n else "no control point takes part"
-    seconds, metres = number(report.seconds_extrapolated, 1), number(report.metres_extrapolated, 0)
-    outside, beyond = covered.points_outside_trajectory, covered.points_outside_control
-    unheld, gaps = covered.points_extrapolated, correction.recorded.gaps
+    if report.control.n:
+        control = span(*covered.control_span)
+    else:
+        control = "no control point takes part"
+    seconds = number(report.seconds_extrapolated, 1)
+    metres = number(report.metres_extrapolated, 0)
+    outside = covered.points_outside_trajectory
+    beyond = covered.points_outside_control
+    unheld = covered.points_extrapolated
+    gaps = correction.recorded.gaps
     noise = covered.points_noise
     values = {
         "Trajectory": span(time[0], time[-1]),

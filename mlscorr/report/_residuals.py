@@ -53,7 +53,8 @@ def _scale(ratio):
 def _column(panels, rows, name):
     """Draw one state of all axes with one range; returns half of that range. Units: m."""
     groups = np.array([row.group for row in rows])
-    values, sigma = array(rows, name), np.nan_to_num(array(rows, "sigma"))
+    values = array(rows, name)
+    sigma = np.nan_to_num(array(rows, "sigma"))
     for axis, panel in enumerate(panels):
         panel.axhline(0.0, color=GREY, linewidth=0.8)
         for group in WORDS:

@@ -25,7 +25,8 @@ def tie_figure(correction: Correction, residuals: TieResiduals) -> Figure:
     residuals : TieResiduals
         What the correction leaves of the ties.
     """
-    way, used = track(correction.corrected), residuals.used
+    way = track(correction.corrected)
+    used = residuals.used
     places = residuals.ties.place.mean(axis=1)[:, :2]
     misfits = [1000 * np.abs(v) for v in (residuals.ties.misclosure, residuals.after)]  # mm
     low, high = corners(np.vstack([way, places]), 0.1)
@@ -38,9 +39,14 @@ def tie_figure(correction: Correction, residuals: TieResiduals) -> Figure:
         panel.plot(*places[~used].T, linestyle="none", zorder=2, rasterized=True, **MARKS["unused"])
         front = np.flatnonzero(used)[np.argsort(misfit[used], kind="stable")]  # the worst on top
         dots = panel.scatter(
-            *places[front].T, 9, np.maximum(misfit[front], 1.0), linewidths=0, zorder=3,
-            rasterized=True, **scale,
-        )  # fmt: skip
+            *places[front].T,
+            9,
+            np.maximum(misfit[front], 1.0),
+            linewidths=0,
+            zorder=3,
+            rasterized=True,
+            **scale,
+        )
         frame(panel, low, high, 4)
         panel.set_title(title)
         panel.label_outer()

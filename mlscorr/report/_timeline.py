@@ -60,7 +60,8 @@ def _figure(height, correction, report, change, sigma, rows, words):
 
     Words name what is corrected, and its three parts.
     """
-    figure, new = style.new_figure(height), correction.corrected
+    figure = style.new_figure(height)
+    new = correction.corrected
     panels = figure.subplots(3, 1, sharex=True)
     span = report.coverage.control_span
     for axis, panel in enumerate(panels):
@@ -84,7 +85,8 @@ def _start(trajectory):
 
 def _curve(panel, trajectory, change, sigma, span):
     """Draw a curve with its 1-sigma band; returns the values that the axis must show."""
-    time, gaps = trajectory.gps_time, trajectory.gaps
+    time = trajectory.gps_time
+    gaps = trajectory.gaps
     curves = np.column_stack([change - sigma, change, change + sigma])
     rows = style.thin(curves, time, gaps)
     at, broken = style.break_at_gaps(time[rows], gaps, curves[rows])
@@ -100,7 +102,8 @@ def _curve(panel, trajectory, change, sigma, span):
 def _marks(panel, trajectory, rows, axis, group):
     """Draw misclosures of a group with sigma; returns the values to show."""
     time = np.array([row.gps_time for row in rows]) - _start(trajectory)
-    value, sigma = array(rows, "before")[:, axis], np.nan_to_num(array(rows, "sigma")[:, axis])
+    value = array(rows, "before")[:, axis]
+    sigma = np.nan_to_num(array(rows, "sigma")[:, axis])
     symbol = {"linestyle": "none", "elinewidth": 0.9, "capsize": 2.0, **style.MARKS[group]}
     panel.errorbar(time, value, sigma, **symbol)
     return [*(value - sigma), *(value + sigma)]
@@ -111,22 +114,29 @@ def _unused(panel, trajectory, rows, axis):
     low, high = panel.get_ylim()
     for row in rows:
         value = row.before[axis]
-        marker = "v" if value < low else "^" if value > high else "x"
+        if value < low:
+            marker = "v"
+        else:
+            marker = "^" if value > high else "x"
         symbol = {**style.MARKS["unused"], "marker": marker, "clip_on": False, "zorder": 4}
         panel.plot(row.gps_time - _start(trajectory), np.clip(value, low, high), **symbol)
 
 
 def _set_range(panel, values, change):
     """Limits that hold the values asked for; beyond the control span only as much again."""
-    low, high = np.nanmin(values), np.nanmax(values)
+    low = np.nanmin(values)
+    high = np.nanmax(values)
     room = max(high - low, SETTINGS.difference)  # of an axis in m or in deg
-    low, high = (max(low - room, min(low, change.min())), min(high + room, max(high, change.max())))
+    low = max(low - room, min(low, change.min()))
+    high = min(high + room, max(high, change.max()))
     panel.set_ylim(low - 0.07 * room, high + 0.07 * room)
 
 
 def _shade(panels, trajectory, span, support):
     """Shade gaps, outages and what is extrapolated, mark steps and span; name the time axis."""
-    start, first, last = _start(trajectory), trajectory.gps_time[0], trajectory.gps_time[-1]
+    start = _start(trajectory)
+    first = trajectory.gps_time[0]
+    last = trajectory.gps_time[-1]
     for panel in panels:
         panel.set_xlim(first - start, last - start)
         for gap in trajectory.gaps - start:

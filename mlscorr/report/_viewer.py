@@ -83,7 +83,8 @@ def _near_rows(xyz, targets):
     for row in targets:
         rows = np.flatnonzero(np.abs(xyz[:, 0] - row.observed[0]) <= radius)
         away = np.linalg.norm(xyz[rows] - row.observed, axis=1)
-        on_it, about = rows[away <= radius / 4], rows[(away > radius / 4) & (away <= radius)]
+        on_it = rows[away <= radius / 4]
+        about = rows[(away > radius / 4) & (away <= radius)]
         rows_near.append(on_it[:: max(1, -(-len(on_it) // half))])
         if len(about):
             rows_near.append(about[thin_evenly(xyz[about], half)[0]])
@@ -92,7 +93,8 @@ def _near_rows(xyz, targets):
 
 def _lines(correction):
     """The recorded and the corrected trajectory, broken at its gaps."""
-    old, new = correction.recorded, correction.corrected
+    old = correction.recorded
+    new = correction.corrected
     rows = thin(new.position, new.gps_time, new.gaps)
     return break_at_gaps(new.gps_time[rows], new.gaps, old.position[rows], new.position[rows])[1:]
 

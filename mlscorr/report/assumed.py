@@ -49,7 +49,10 @@ def assumed_statement(
     sections = dict.fromkeys(f"[{row['key'].partition('.')[0]}]" for row in rows)
     verb = "is" if len(rows) == 1 else "are"
     is_sigma = has_assumed_sigma(rows)
-    columns = ", or give the trajectory sigma columns" if is_sigma else ""
+    if is_sigma:
+        columns = ", or give the trajectory sigma columns"
+    else:
+        columns = ""
     sentence = (
         f"{counted(len(rows), 'accuracy')} that nobody stated {verb} assumed{purpose}. State "
         f"what you know under {joined(sections)} in survey.toml{columns}."

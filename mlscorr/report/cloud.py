@@ -55,9 +55,12 @@ class CloudViews:
 
 
 def view_cloud(
-    survey: Survey, correction: Correction, targets: list[TargetRow], progress: Progress,
+    survey: Survey,
+    correction: Correction,
+    targets: list[TargetRow],
+    progress: Progress,
     ties: TieResiduals | None = None,
-) -> CloudViews:  # fmt: skip
+) -> CloudViews:
     """Draw a cloud before and after its correction, in one pass over it and flat memory.
 
     Parameters
@@ -74,7 +77,10 @@ def view_cloud(
     names = close_ups(rows)
     near = [row for row in rows if row.name in names]
     done = progress("Looking at the cloud", sum(file.points for file in survey.clouds))
-    facades = np.empty((0, 3)) if ties is None else worst_facades(ties).place.reshape(-1, 3)
+    if ties is None:
+        facades = np.empty((0, 3))
+    else:
+        facades = worst_facades(ties).place.reshape(-1, 3)
     stream = chain.from_iterable(map(read_chunks, survey.clouds))
     sample = gather(_watched(stream, done), near, facades)
     done = progress("Drawing the cloud", 4 * len(sample.cloud))  # scouted and drawn, twice
@@ -114,7 +120,10 @@ def close_ups(rows: list[TargetRow], limit: int = SETTINGS.close_ups) -> list[st
         return names
     left = dict.fromkeys(names, 0.0)  # m, what remains without the point's own help
     for row in rows:
-        rest = row.left_out if np.isfinite(row.left_out).all() else row.after
+        if np.isfinite(row.left_out).all():
+            rest = row.left_out
+        else:
+            rest = row.after
         left[row.name] = max(left[row.name], tables.norm(rest))
     worst = sorted(names, key=lambda name: -left[name])[: limit // 3]
     others = [name for name in names if name not in worst]

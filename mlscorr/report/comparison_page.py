@@ -36,7 +36,8 @@ def write_comparison(path: str | Path, document: dict) -> None:
     document : dict
         The content of compare.json.
     """
-    ranked, by = ranking(document), document["scored_by"]
+    ranked = ranking(document)
+    by = document["scored_by"]
     absent = undetermined(document)
     there = {
         "check": by == "cross_validated" and bool(document["check_points"]),
@@ -71,7 +72,8 @@ def comparison_figure(document: dict) -> Figure:
     document : dict
         The content of compare.json.
     """
-    ranked, by = ranking(document), document["scored_by"]
+    ranked = ranking(document)
+    by = document["scored_by"]
     figure = style.new_figure(1.6 + 0.27 * len(ranked))
     panels = figure.subplots(1, 3, sharey=True, sharex=True)
     values = np.maximum([row[by]["rmse"] for row in ranked], 1e-4)  # m, the left end at least
@@ -109,7 +111,10 @@ def _ticks_in_words(panel):
 
     panel.set_xscale("log")
     low, high = panel.get_xlim()
-    steps = (1, 2, 5) if high < 20 * low else (1, 3) if high < 1000 * low else (1,)
+    if high < 20 * low:
+        steps = (1, 2, 5)
+    else:
+        steps = (1, 3) if high < 1000 * low else (1,)
     panel.xaxis.set_major_locator(LogLocator(subs=steps, numticks=8))
     panel.xaxis.set_major_formatter(FuncFormatter(words))
     panel.xaxis.set_minor_formatter(NullFormatter())

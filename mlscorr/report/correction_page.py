@@ -45,10 +45,14 @@ WORDS = {
 
 
 def write_report(
-    path: str | Path, survey: Survey, correction: Correction, report: CorrectionReport,
-    views: CloudViews | None = None, fitted: dict[tuple[int, float], FittedTarget] | None = None,
+    path: str | Path,
+    survey: Survey,
+    correction: Correction,
+    report: CorrectionReport,
+    views: CloudViews | None = None,
+    fitted: dict[tuple[int, float], FittedTarget] | None = None,
     ties: TieResiduals | None = None,
-) -> None:  # fmt: skip
+) -> None:
     """Write the self-contained page of a correction.
 
     Parameters
@@ -168,7 +172,10 @@ def key_figures(correction: Correction, report: CorrectionReport) -> list[tuple[
         deed = what if points else nothing
         often = "" if n == points else f", seen {n} times"
         surveyed = report.points(role).surveyed
-        share = f"{points} of {surveyed}" if points < surveyed else str(points)
+        if points < surveyed:
+            share = f"{points} of {surveyed}"
+        else:
+            share = str(points)
         facts.append((share, f"{role} point{'s' * (points != 1)} {deed}{often}"))
     facts.append((f"{tables.number(float(change.max()))} m", "largest correction of the position"))
     sigma = report.position_sigma

@@ -34,7 +34,9 @@ def correction_figures(
     }
     if report.control.n or report.check.n:
         figures["residuals"] = partial(residual_figure, report)
-    return figures if ties is None else figures | {"ties": partial(tie_figure, correction, ties)}
+    if ties is None:
+        return figures
+    return figures | {"ties": partial(tie_figure, correction, ties)}
 
 
 def write_pictures(

@@ -68,7 +68,8 @@ def headline(report: CorrectionReport) -> str:
     ----------
     report : CorrectionReport
     """
-    check, control = check_statement(report.points("check")).sentence, _control(report).sentence
+    check = check_statement(report.points("check")).sentence
+    control = _control(report).sentence
     if report.points("control").surveyed == 0 and not report.is_held_by_others:
         return f"{control} {check}"
     return f"{check} Control: {control} {_extrapolated(report).sentence}"
@@ -80,7 +81,10 @@ def _result(report):
     before, after, kind = report.judgement
     is_tested = kind == "check" and after.rmse[4] <= before.rmse[4] + SETTINGS.difference
     is_tested &= not report.datum  # which check points of the same survey share
-    rating = "red" if is_worse else "green" if is_tested else "amber"
+    if is_worse:
+        rating = "red"
+    else:
+        rating = "green" if is_tested else "amber"
     return Statement("Result", rating, sentences[0], tuple(("", text) for text in sentences[1:]))
 
 
@@ -111,7 +115,10 @@ def check_statement(points: PointCounts) -> Statement:
     if points.surveyed == 0:
         sentence = "No check point was surveyed, so nothing independent tests this result."
         return Statement("Check points", "amber", sentence)
-    rating = "red" if points.missing else "green" if points.scored else "amber"
+    if points.missing:
+        rating = "red"
+    else:
+        rating = "green" if points.scored else "amber"
     return Statement("Check points", rating, " ".join(_scored(points)), _named(points))
 
 
@@ -158,7 +165,10 @@ def control_statement(points: PointCounts) -> Statement:
     lost = {"refused": points.refused + points.misplaced, "not seen": points.hidden}
     parts += [f"{len(some)} {words} ({_names(some)})" for words, some in lost.items() if some]
     parts += [f"{number} where {where}" for where, number in _away(points)]
-    rating = "amber" if points.refused or points.missing else "green"
+    if points.refused or points.missing:
+        rating = "amber"
+    else:
+        rating = "green"
     return Statement("Control points", rating, ", ".join(parts) + ".", _named(points))
 
 
@@ -196,7 +206,8 @@ def _extrapolated(report):
         return Statement("Extrapolated", "amber", sentence)
     if not weak:
         return Statement("Extrapolated", "green", "Control points hold the whole drive.")
-    largest, after = max(stretch.sigma for stretch in weak), report.judgement[1]
+    largest = max(stretch.sigma for stretch in weak)
+    after = report.judgement[1]
     sentence = (
         f"No control holds {report.seconds_extrapolated:.1f} s "
         f"({report.metres_extrapolated:.0f} m) of the drive, "
@@ -208,7 +219,10 @@ def _extrapolated(report):
     if sigma is not None and not report.support.contains(np.array(sigma["time"])):
         sentence += f" Between control points it is up to {length_in_words(sigma['largest'])}."
     is_small = after is not None and largest <= after.maximum[4]
-    rating = "green" if is_small and report.coverage.share_extrapolated < 1 else "amber"
+    if is_small and report.coverage.share_extrapolated < 1:
+        rating = "green"
+    else:
+        rating = "amber"
     return Statement("Extrapolated", rating, sentence, capped(_stretches(weak)))
 
 
@@ -281,7 +295,9 @@ def capped(items: Iterable[tuple[str, str]]) -> tuple[tuple[str, str], ...]:
     """
     items = tuple(items)
     more = len(items) - NAMED
-    return items if more <= 0 else (*items[:NAMED], ("", f"and {more} more"))
+    if more <= 0:
+        return items
+    return (*items[:NAMED], ("", f"and {more} more"))
 
 
 def _names(points):

@@ -21,7 +21,9 @@ def map_panels(count: int, share: float) -> tuple[Figure, np.ndarray]:
         Of its height in its width.
     """
     columns = 2 if share > 0.7 and count > 1 else 1
-    lines, beside = count // columns, 1.8  # inch: labels and colours
+    # inch: labels and colours
+    lines = count // columns
+    beside = 1.8
     width = SETTINGS.figure_width / columns - beside
     figure = new_figure(0.8 + lines * (0.35 + width * share))
     return figure, figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False).ravel()
@@ -49,9 +51,11 @@ def corners(points: np.ndarray, thinnest: float) -> tuple[np.ndarray, np.ndarray
     thinnest : float
         Least half width of the map over its length: none is a thin line.
     """
-    low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
+    low = np.nanmin(points, axis=0)
+    high = np.nanmax(points, axis=0)
     extent = max(float((high - low).max()), 1.0)
-    middle, half = (low + high) / 2, np.maximum((high - low) / 2, thinnest * extent) + 0.04 * extent
+    middle = (low + high) / 2
+    half = np.maximum((high - low) / 2, thinnest * extent) + 0.04 * extent
     return middle - half, middle + half
 
 

@@ -94,10 +94,14 @@ def show(value: object) -> str:
     if value is None or (isinstance(value, float) and not np.isfinite(value)):
         return "not determined"
     if isinstance(value, bool):
-        return "yes" if value else "no"
+        if value:
+            return "yes"
+        return "no"
     if isinstance(value, int | float):
         is_time = abs(value) >= 1e5  # of a week: four figures of it tell no day
-        return f"{value:d}" if isinstance(value, int) else f"{value:{'.1f' if is_time else '.4g'}}"
+        if isinstance(value, int):
+            return f"{value:d}"
+        return f"{value:{'.1f' if is_time else '.4g'}}"
     if isinstance(value, dict):
         return "; ".join(f"{key}: {show(item)}" for key, item in value.items())
     if isinstance(value, list | tuple):

@@ -29,7 +29,10 @@ def write_project(path: str | Path, document: dict, tracks: dict[str, np.ndarray
     tracks : dict
         Easting, northing (m) and expected error (m) along each drive (k, 3), by its name.
     """
-    figures = {"map": data_uri(svg(project_map(tracks)))} if tracks else {}
+    if tracks:
+        figures = {"map": data_uri(svg(project_map(tracks)))}
+    else:
+        figures = {}
     Page(
         title=f"{document['name']}: correction of {counted(len(document['drives']), 'drive')}",
         summary="project-summary.html",

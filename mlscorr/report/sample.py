@@ -21,7 +21,10 @@ class EvenSample:
     """
 
     def __init__(self, limit: int):
-        self.limit, self.step, self.count, self.parts = limit, 1, 0, []
+        self.limit = limit
+        self.step = 1
+        self.count = 0
+        self.parts = []
 
     def add(self, cloud: PointCloud) -> None:
         """Take the step-th points of a further part."""
@@ -65,7 +68,8 @@ def gather(
         Of the points spread over the cloud, near targets and near walls: at most twice as many.
     """
     regions = _cells(targets), _about(walls, SETTINGS.plan_cell)
-    spread, near = EvenSample(limit), [EvenSample(limit) for _ in regions]
+    spread = EvenSample(limit)
+    near = [EvenSample(limit) for _ in regions]
     for chunk in chunks:
         spread.add(chunk)
         for cells, sample in zip(regions, near, strict=True):

@@ -16,9 +16,15 @@ from matplotlib.lines import Line2D
 from mlscorr.report.settings import SETTINGS
 
 # Okabe and Ito (2008), Color Universal Design: colour-blind readers can tell them apart
-BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
-BLUE, VERMILLION, GREY = "#0072B2", "#D55E00", "#767676"
-BEFORE, AFTER = ORANGE, BLUE
+BLACK = "#000000"
+ORANGE = "#E69F00"
+SKY = "#56B4E9"
+GREEN = "#009E73"
+BLUE = "#0072B2"
+VERMILLION = "#D55E00"
+GREY = "#767676"
+BEFORE = ORANGE
+AFTER = BLUE
 BAND: dict[str, Any] = {"facecolor": f"{SKY}59", "edgecolor": "none"}  # of one sigma
 OUTSIDE = {"facecolor": "#f3e9c9", "edgecolor": "none"}  # of what control points hold
 OUTAGE = {"facecolor": "#8fb0dd", "edgecolor": "none"}
@@ -76,7 +82,9 @@ def label(name: str | None, longest: int = 14) -> str:
     """
     name = "".join(c if c.isprintable() else " " for c in name or "no name")
     name = "".join(c if _font().get_char_index(ord(c)) else "?" for c in name)
-    return name if len(name) <= longest else name[: longest - 1] + "…"
+    if len(name) <= longest:
+        return name
+    return name[: longest - 1] + "…"
 
 
 def nice(value: float) -> float:
@@ -218,6 +226,9 @@ def break_at_gaps(gps_time: np.ndarray, gaps: np.ndarray, *values: np.ndarray) -
     -------
     list of (n + g, ...) arrays
     """
-    where = np.searchsorted(gps_time, gaps[:, 1]) if len(gaps) else np.array([], int)
+    if len(gaps):
+        where = np.searchsorted(gps_time, gaps[:, 1])
+    else:
+        where = np.array([], int)
     broken = [np.insert(gps_time, where, gaps.mean(axis=1))]
     return broken + [np.insert(np.asarray(v, float), where, np.nan, axis=0) for v in values]

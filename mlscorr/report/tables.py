@@ -57,7 +57,9 @@ def number(value: float | None, decimals: int = 3) -> str:
     if value is None or not np.isfinite(value):
         return "–"
     text = f"{value:.{decimals}f}"
-    return text.lstrip("-") if float(text) == 0 else text
+    if float(text) == 0:
+        return text.lstrip("-")
+    return text
 
 
 def millimetres(value: float | None) -> str:
@@ -66,7 +68,9 @@ def millimetres(value: float | None) -> str:
     >>> millimetres(0.00288), millimetres(0.42302), millimetres(None)
     ('2.9', '423', '–')
     """
-    return "–" if value is None else number(1000 * value, int(abs(value) < 0.01))
+    if value is None:
+        return "–"
+    return number(1000 * value, int(abs(value) < 0.01))
 
 
 def thousands(value: int) -> str:
@@ -91,7 +95,9 @@ def percent(share: float) -> str:
     """
     if 0 < share < 0.01:
         return "less than 1 %"
-    return "more than 99 %" if 0.99 < share < 1 else f"{100 * share:.0f} %"
+    if 0.99 < share < 1:
+        return "more than 99 %"
+    return f"{100 * share:.0f} %"
 
 
 def rmse_rows(report: CorrectionReport) -> list[RmseRow]:
@@ -101,7 +107,8 @@ def rmse_rows(report: CorrectionReport) -> list[RmseRow]:
     ----------
     report : CorrectionReport
     """
-    check, control = report.check, report.control
+    check = report.check
+    control = report.control
     rows = [
         ("Check points, before", False, check.before),
         ("Check points, after", True, check.after),
@@ -132,7 +139,8 @@ def statistics_rows(
         before and after are mean, std, RMSE, least and largest (5,), NaN where not determined.
         Units: m.
     """
-    check, control = report.check, report.control
+    check = report.check
+    control = report.control
     blocks = [
         ("Check points", check.before, check.after),
         ("Control points, after: left out in turn", control.before, control.left_out),
@@ -160,7 +168,9 @@ def count(report: CorrectionReport, role: str) -> str:
     """
     points, n = report.count(role)
     words = counted(points, "point")
-    return words if points == n else f"{n} observations of {words}"
+    if points == n:
+        return words
+    return f"{n} observations of {words}"
 
 
 def verdict(report: CorrectionReport) -> tuple[list[str], bool]:
@@ -179,7 +189,10 @@ def verdict(report: CorrectionReport) -> tuple[list[str], bool]:
     """
     before, after, kind = report.judgement
     if before is None or after is None:
-        none = "No target was found" if report.targets else "There is no surveyed point"
+        if report.targets:
+            none = "No target was found"
+        else:
+            none = "There is no surveyed point"
         return [f"{none} that could tell how good the correction is."], True
     sigma = (report.check if kind == "check" else report.control).sigma
     # as large as this the RMS of n is by chance, as it is known no better there than by its sigma
@@ -218,9 +231,15 @@ def _plainly(before, after, kind, holds_everywhere, is_worse):
         return f"The correction made the cloud worse, {by}: {pair}. Don't use it."
     closer = before / max(after, 1e-4)
     if not holds_everywhere:
-        where = "at the points that were seen" if kind == "check" else "where control holds it"
+        if kind == "check":
+            where = "at the points that were seen"
+        else:
+            where = "where control holds it"
         return f"The correction brought the cloud {pair} {where}, {by}."
-    times = f" ({closer:.0f} times closer)" if closer >= 1.5 and kind != "fit" else ""
+    if closer >= 1.5 and kind != "fit":
+        times = f" ({closer:.0f} times closer)"
+    else:
+        times = ""
     return f"The correction brought the cloud {pair}{times}, {by}."
 
 
@@ -237,13 +256,18 @@ def length_in_words(value: float) -> str:
     """
     if value < 0.0095:
         return f"{1000 * value:.0f} mm"
-    return f"{100 * value:.1f} cm" if value < 0.995 else f"{value:.2f} m"
+    if value < 0.995:
+        return f"{100 * value:.1f} cm"
+    return f"{value:.2f} m"
 
 
 def _result(report, before, after, kind):
     """RMSE before and after in one sentence that says what it rests on."""
     low = min(*before, *after)
-    decimals = 2 if low >= 0.03 else 3 if low >= 0.003 else 4
+    if low >= 0.03:
+        decimals = 2
+    else:
+        decimals = 3 if low >= 0.003 else 4
     pair = ["/".join(number(value, decimals) for value in values) for values in (before, after)]
     figures = f"RMSE {pair[0]} m before, {pair[1]} m after (E/N/H)"
     if kind == "check":
@@ -252,7 +276,10 @@ def _result(report, before, after, kind):
     points = count(report, "control")
     if kind == "leave-one-out":
         is_surveyed = report.points("check").surveyed > 0
-        none = "No check point was seen." if is_surveyed else "There are no check points."
+        if is_surveyed:
+            none = "No check point was seen."
+        else:
+            none = "There are no check points."
         return (
             f"{none} Control points, each left out in turn and predicted from "
             f"the others: {figures}, {points}."

@@ -65,7 +65,9 @@ def _doubt(row, target):
         return ""
     if not row.used:
         return "not used"
-    return f"score {target.score:.2f}" if target.score < SETTINGS.low_score else ""
+    if target.score < SETTINGS.low_score:
+        return f"score {target.score:.2f}"
+    return ""
 
 
 def write_contact_sheet(
@@ -89,7 +91,10 @@ def write_contact_sheet(
     with matplotlib.rc_context(STYLE):
         width, height = SETTINGS.target_figure
         figure = Figure(figsize=(columns * width, lines * height + 0.7), layout="constrained")
-        title = f"{len(rows)} target-like objects" if rows else "No target-like object was found"
+        if rows:
+            title = f"{len(rows)} target-like objects"
+        else:
+            title = "No target-like object was found"
         title += f" (the {len(best)} with the highest scores)" if len(best) < len(rows) else ""
         figure.suptitle(title, x=0.01, ha="left", fontsize=11, fontweight="bold")
         if best:
@@ -120,7 +125,8 @@ def _legend():
 
 def _draw(axes, target):
     """Points in the plane, outline, centre and its covariance; up is up, seen by the scanner."""
-    view, outline = target.view, target.view.outline
+    view = target.view
+    outline = target.view.outline
     turn = _upright(target) * 100.0  # cm
     points = (view.points - outline.centre) @ turn.T
     is_round = target.kind in ("circle", "hole")
@@ -145,7 +151,10 @@ def _draw(axes, target):
 def _upright(target):
     """Plane axes (2, 2) to right and up as the scanner sees them; of a flat one, up is north."""
     normal = target.normal
-    up = np.array([0.0, 0.0, 1.0]) if normal[2] ** 2 < 0.5 else np.array([0.0, 1.0, 0.0])
+    if normal[2] ** 2 < 0.5:
+        up = np.array([0.0, 0.0, 1.0])
+    else:
+        up = np.array([0.0, 1.0, 0.0])
     up = up - (up @ normal) * normal
     up /= np.linalg.norm(up)
     return np.stack([np.cross(up, normal), up]) @ target.view.axes.T
@@ -153,12 +162,17 @@ def _upright(target):
 
 def _outline(target, turn):
     """Patches of the fitted outline, (0, 0) its centre."""
-    outline, style = target.view.outline, {"fill": False, "edgecolor": BLUE, "linewidth": 1.1}
+    outline = target.view.outline
+    style = {"fill": False, "edgecolor": BLUE, "linewidth": 1.1}
     radius = 50.0 * outline.size  # cm
     if target.kind in ("circle", "hole"):
-        inner = [Circle((0, 0), radius * outline.inner, **style)] if outline.inner > 0 else []
+        if outline.inner > 0:
+            inner = [Circle((0, 0), radius * outline.inner, **style)]
+        else:
+            inner = []
         return [Circle((0, 0), radius, **style), *inner]
-    cos, sin = np.cos(outline.turn), np.sin(outline.turn)
+    cos = np.cos(outline.turn)
+    sin = np.sin(outline.turn)
     edges = outline.size / 2 * np.array([[cos, sin], [-sin, cos]]) @ turn.T  # cm, half edges
     corners = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]]) @ edges
     crossing = [Polygon([-edge, edge], closed=False, **style) for edge in edges]

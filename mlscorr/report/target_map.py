@@ -32,7 +32,8 @@ def map_figure(correction: Correction, report: CorrectionReport) -> Figure:
     way = track(correction.corrected)
     driven = way[np.isfinite(way).all(axis=1)]
     margin = max(float(np.ptp(driven, axis=0).max()), 200.0) / 4  # m
-    low, high = driven.min(axis=0) - margin, driven.max(axis=0) + margin
+    low = driven.min(axis=0) - margin
+    high = driven.max(axis=0) + margin
     rows = [
         row
         for row in ordered(report.targets)
@@ -49,7 +50,11 @@ def map_figure(correction: Correction, report: CorrectionReport) -> Figure:
     figure = style.new_figure(1.25 + (SETTINGS.figure_width - 1.1) * height / width)
     axes = figure.add_subplot()
     axes.plot(*way.T, **style.TRACK)
-    short = _arrows(axes, arrows, times, 0.008 * width) if times else 0  # hides under its mark
+    # hides under its mark
+    if times:
+        short = _arrows(axes, arrows, times, 0.008 * width)
+    else:
+        short = 0
     for group in GROUPS[::-1]:
         places = array(ordered(rows, group), "surveyed")
         axes.plot(*places[:, :2].T, linestyle="none", **style.MARKS[group])
@@ -58,7 +63,10 @@ def map_figure(correction: Correction, report: CorrectionReport) -> Figure:
     write_names(axes, names, width)
     frame(axes, low, high)
     far = f" (far outside: {outside})" if outside else ""
-    title = "Where the targets lie" if report.targets else "The trajectory"
+    if report.targets:
+        title = "Where the targets lie"
+    else:
+        title = "The trajectory"
     axes.set_title(f"{title}{', and their horizontal residuals' * bool(times)}{far}")
     _key(axes, low, high, strip, times)
     handles = _legend(rows, len(arrows), times, short)
@@ -80,15 +88,23 @@ def mark_places(axes: Axes, places: Sequence[tuple[float, float]]) -> None:
     for number, place in enumerate(places, start=1):
         axes.plot(*place, **NEXT)
         axes.annotate(
-            str(number), place, xytext=(6, 5), textcoords="offset points",
-            color=NEXT["color"], fontsize=9, fontweight="bold", zorder=6,
-        )  # fmt: skip
+            str(number),
+            place,
+            xytext=(6, 5),
+            textcoords="offset points",
+            color=NEXT["color"],
+            fontsize=9,
+            fontweight="bold",
+            zorder=6,
+        )
 
 
 def _enlargement(residuals, extent):
     """How many times the arrows are larger than the map: 1, 2, 5, 10, ...; 0 without arrows."""
     longest = np.hypot(*residuals.T).max(initial=0.0)
-    return style.nice(SETTINGS.longest_arrow * extent / longest) if longest > 0 else 0.0
+    if longest > 0:
+        return style.nice(SETTINGS.longest_arrow * extent / longest)
+    return 0.0
 
 
 def _bounds(points, extent):
@@ -96,10 +112,12 @@ def _bounds(points, extent):
 
     The strip is kept free of data for the scale bar and the north arrow.
     """
-    low, high = points.min(axis=0) - 0.06 * extent, points.max(axis=0) + 0.06 * extent
+    low = points.min(axis=0) - 0.06 * extent
+    high = points.max(axis=0) + 0.06 * extent
     size = high - low
     extent_drawn = np.maximum(size, [size[1], 0.4 * size[0]])
-    low, high = low - (extent_drawn - size) / 2, high + (extent_drawn - size) / 2
+    low = low - (extent_drawn - size) / 2
+    high = high + (extent_drawn - size) / 2
     strip = 0.11 * extent_drawn[0]
     return low - [0.0, strip], high, strip
 
@@ -135,7 +153,9 @@ def write_names(axes: Axes, names: Mapping[str, tuple[Any, int]], width: float) 
     width : float
         Of a figure's whole width on the map. Units: m.
     """
-    taken, letter = [], np.array([0.0105, 0.018]) * width  # m on the map
+    # m on the map
+    taken = []
+    letter = np.array([0.0105, 0.018]) * width
     places = [line.get_xydata() for line in axes.lines if line.get_marker() == NEXT["marker"]]
     stars = [[*np.ravel(place) + letter[1] / 4, *letter[[1, 1]]] for place in places]
     for name, (place, side) in names.items():
@@ -149,10 +169,16 @@ def write_names(axes: Axes, names: Mapping[str, tuple[Any, int]], width: float) 
             continue
         taken.append(boxes[free[0]])
         axes.annotate(
-            text, place, xytext=(6 * free[0], 0), textcoords="offset points",
-            horizontalalignment="left" if free[0] > 0 else "right", verticalalignment="center",
-            fontsize=7, parse_math=False, zorder=5,
-        )  # fmt: skip
+            text,
+            place,
+            xytext=(6 * free[0], 0),
+            textcoords="offset points",
+            horizontalalignment="left" if free[0] > 0 else "right",
+            verticalalignment="center",
+            fontsize=7,
+            parse_math=False,
+            zorder=5,
+        )
 
 
 def _covers(box, others):
@@ -166,9 +192,11 @@ def _key(axes, low, high, strip, times):
     width = high[0] - low[0]
     axes.axhspan(low[1], low[1] + strip, color="white", zorder=2.5)
     axes.axhline(low[1] + strip, color="#bbbbbb", linewidth=0.6, zorder=2.6)
-    middle, top = low[1] + 0.35 * strip, low[1] + 0.62 * strip
+    middle = low[1] + 0.35 * strip
+    top = low[1] + 0.62 * strip
     text = {"horizontalalignment": "left", "verticalalignment": "center", "fontsize": 8.5}
-    bar, west = style.nice(0.22 * width), low[0] + 0.03 * width
+    bar = style.nice(0.22 * width)
+    west = low[0] + 0.03 * width
     axes.plot([west, west + bar], [middle] * 2, color="black", linewidth=3, zorder=3)
     axes.text(west, top, f"{bar:g} m on the map", **text)
     if times:
@@ -180,10 +208,15 @@ def _key(axes, low, high, strip, times):
         )
     east = low[0] + 0.95 * width
     axes.annotate(
-        "N", (east, low[1] + 0.9 * strip), xytext=(east, low[1] + 0.22 * strip),
+        "N",
+        (east, low[1] + 0.9 * strip),
+        xytext=(east, low[1] + 0.22 * strip),
         arrowprops={"arrowstyle": "-|>", "color": "black", "linewidth": 1.4},
-        horizontalalignment="center", verticalalignment="center", fontweight="bold", zorder=4,
-    )  # fmt: skip
+        horizontalalignment="center",
+        verticalalignment="center",
+        fontweight="bold",
+        zorder=4,
+    )
 
 
 def _legend(rows, arrows, times, short):
@@ -191,7 +224,10 @@ def _legend(rows, arrows, times, short):
     handles = [Line2D([], [], label="Trajectory (corrected)", **style.TRACK)]
     handles += style.mark_handles(WORDS, {row.group for row in rows})
     if times:
-        hidden = f" ({short} of {arrows} too short to show)" if short else ""
+        if short:
+            hidden = f" ({short} of {arrows} too short to show)"
+        else:
+            hidden = ""
         colours = {"Residual before": style.BEFORE, f"Residual after{hidden}": style.AFTER}
         for text, color in colours.items():
             handles.append(Line2D([], [], color=color, linewidth=2.5, label=text))

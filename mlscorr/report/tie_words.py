@@ -69,7 +69,10 @@ def _share(section, control):
     if sufficient is None or control < 2:
         return
     if sufficient < control:
-        points = "1 of them" if sufficient == 1 else f"{sufficient} of them, evenly spread,"
+        if sufficient == 1:
+            points = "1 of them"
+        else:
+            points = f"{sufficient} of them, evenly spread,"
         yield (
             f"{control} control points took part; {points} would have sufficed to know the drive "
             "about as well (to a tenth of its sigma)."

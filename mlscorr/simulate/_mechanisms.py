@@ -204,7 +204,9 @@ def _covariate(name, points):
         return np.arctan2(points.scanner_xyz[:, 1], points.scanner_xyz[:, 0]) / np.pi
     if name in ("side", "height of the point"):
         body = pose.attitude.inv().apply(points.xyz - pose.position)
-        return body[:, 0] / 15.0 if name == "side" else body[:, 2] / 5.0
+        if name == "side":
+            return body[:, 0] / 15.0
+        return body[:, 2] / 5.0
     if name == "heading":
         return pose.attitude.apply([0.0, 1.0, 0.0])[:, 0]  # the same for angles a turn apart
     if name == "elapsed":
@@ -216,7 +218,8 @@ def _covariate(name, points):
         centred = trajectory.position[:, :2] - trajectory.position[:, :2].mean(axis=0)
         along = np.linalg.svd(centred, full_matrices=False)[2][int(name == "place")]
         return _spread(points.xyz[:, :2] @ along, trajectory.position[:, :2] @ along)
-    motion, whole = _motion(points), _motion_table(trajectory)
+    motion = _motion(points)
+    whole = _motion_table(trajectory)
     return _spread(motion[name], whole[name])
 
 
@@ -248,11 +251,17 @@ def _motion_table(trajectory):
         right, forward, _ = np.moveaxis(trajectory.at(time).attitude.as_matrix(), 2, 0)
         speed = np.linalg.norm(velocity, axis=1)
         values = {
-            "time": time, "velocity": velocity, "turn": turn, "speed": speed,
-            "turn rate": turn[:, 2], "acceleration": np.gradient(speed, time),
-            "climb": velocity[:, 2], "roll": right[:, 2], "pitch": forward[:, 2],
+            "time": time,
+            "velocity": velocity,
+            "turn": turn,
+            "speed": speed,
+            "turn rate": turn[:, 2],
+            "acceleration": np.gradient(speed, time),
+            "climb": velocity[:, 2],
+            "roll": right[:, 2],
+            "pitch": forward[:, 2],
             "roll rate": np.einsum("ni,ni->n", turn, forward),
-        }  # fmt: skip
+        }
         for name, columns in values.items():
             parts.setdefault(name, []).append(columns)
     return {name: np.concatenate(columns) for name, columns in parts.items()}

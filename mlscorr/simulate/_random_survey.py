@@ -94,10 +94,15 @@ def random_scenario(rng: Generator, name: str = "survey") -> Scenario:
     rng : Generator
     name : str
     """
-    river, two = rng.random() < MIX.rivers, rng.random() < MIX.two_passes
+    river = rng.random() < MIX.rivers
+    two = rng.random() < MIX.two_passes
     budget = MIX.pulses / (1 + two)  # pulses of a pass
-    scanner = _river_scanner(rng) if river else _street_scanner(rng, budget / MIX.duration[0])
-    duration, speed = rng.uniform(*MIX.duration), rng.uniform(4.0, 6.0)
+    if river:
+        scanner = _river_scanner(rng)
+    else:
+        scanner = _street_scanner(rng, budget / MIX.duration[0])
+    duration = rng.uniform(*MIX.duration)
+    speed = rng.uniform(4.0, 6.0)
     rate = scanner["lines_per_second"] * scanner["points_per_line"]
     rate *= len(scanner.get("rings", (0.0,)))
     if not river:
@@ -136,7 +141,10 @@ def random_scenario(rng: Generator, name: str = "survey") -> Scenario:
 
 def _targets(rng, river, control, check):
     sigma = rng.choice([0.002, 0.003, 0.005])
-    more = {"size": 0.9, "supports": ("post", "wall"), "kinds": ("circle",)} if river else {}
+    if river:
+        more = {"size": 0.9, "supports": ("post", "wall"), "kinds": ("circle",)}
+    else:
+        more = {}
     return {"control": control, "check": check, "survey_sigma": (sigma, sigma), **more}
 
 
@@ -144,7 +152,8 @@ def _passes(rng, river, two):
     """One pass, or a second one: back on the other lane, or a boat's along the same bank."""
     if not two:
         return ({},)
-    lateral, pause = rng.uniform(0.9, 1.4), rng.uniform(20.0, 60.0)
+    lateral = rng.uniform(0.9, 1.4)
+    pause = rng.uniform(20.0, 60.0)
     way = "forward" if river else "back"
     return ({"lateral": lateral}, {"direction": way, "lateral": -lateral, "pause": pause})
 
@@ -189,14 +198,19 @@ def _river_scanner(rng):
 
 def _spans(rng, share, end, shortest, longest):
     """One span (start, duration) within a drive, or none. Units: s."""
-    happens, start, length = rng.random() < share, rng.random(), rng.uniform(shortest, longest)
-    return (((end - length) * start, length),) if happens else ()
+    happens = rng.random() < share
+    start = rng.random()
+    length = rng.uniform(shortest, longest)
+    if happens:
+        return (((end - length) * start, length),)
+    return ()
 
 
 def _heavier(survey, rng):
     """What is to be added to the surveyed targets (n, 3) of a survey without effects, so that
     their errors have the tails of Student's t and the same variance. Units: m.
     """
-    happens, n = rng.random() < MIX.heavy_tails, len(survey.targets)
+    happens = rng.random() < MIX.heavy_tails
+    n = len(survey.targets)
     stretch = np.sqrt((MIX.freedom - 2.0) / rng.chisquare(MIX.freedom, (n, 1)))
     return happens * (stretch - 1.0) * (survey.targets.position - survey.true_centre)

@@ -59,6 +59,7 @@ class DisplacedSurvey(SimulatedSurvey):
     def blocks(self, **size: int) -> Iterator[PulseBlock]:
         """Blocks as of the survey, their points moved."""
         for block in super().blocks(**size):
-            cloud, poses = block.cloud, (self.trajectory, self.mounting)
+            cloud = block.cloud
+            poses = (self.trajectory, self.mounting)
             points = RecordedPoints(cloud.gps_time, cloud.xyz, block.pulses.scanner_xyz, *poses)
             yield replace(block, cloud=replace(cloud, xyz=cloud.xyz + self.move(points)))

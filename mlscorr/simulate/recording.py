@@ -94,7 +94,10 @@ def streams_by_file(passes: int, scanners: int, scan_rng: Generator, effect_rng:
     ):
         pairs = zip(noise.spawn(scanners), effect.spawn(scanners), strict=True)
         for k, (noise_rng, file_rng) in enumerate(pairs, start=1):
-            name = f"pass-{number}.laz" if k == 1 else f"pass-{number}-scanner-{k}.laz"
+            if k == 1:
+                name = f"pass-{number}.laz"
+            else:
+                name = f"pass-{number}-scanner-{k}.laz"
             echoes = (effect_streams(echo_rng) for echo_rng in file_rng.spawn(2))
             streams[name] = (noise_streams(noise_rng), *echoes)
     return streams
@@ -143,9 +146,13 @@ def surveyed_targets(
     horizontal, vertical = scenario.survey_sigma
     sigma = np.tile([horizontal, horizontal, vertical], (n, 1))
     return ControlPoints(
-        tuple(f"T{i + 1:02d}" for i in range(n)), centre + sigma * rng.standard_normal((n, 3)),
-        sigma, targets.kind, np.full(n, scenario.size), targets.normal,
-    )  # fmt: skip
+        tuple(f"T{i + 1:02d}" for i in range(n)),
+        centre + sigma * rng.standard_normal((n, 3)),
+        sigma,
+        targets.kind,
+        np.full(n, scenario.size),
+        targets.normal,
+    )
 
 
 def spread_checks(count: int, scenario: TargetScenario) -> np.ndarray:

@@ -159,10 +159,12 @@ class Scenario(_Part):
             raise ValueError(f"the drive of {self.end:g} s is longer than a week of {WEEK:g} s")
         spans = [("drive.stops", self.drive.stops)]
         spans += [("pos.outages", self.pos.outages), ("pos.canyons", self.pos.canyons)]
-        events = [(f"{key} of {length:g} s from", start, start + length)
-                  for key, spans_of_key in spans for start, length in spans_of_key]  # fmt: skip
-        events += [(f"{e.name} at", e.time, e.time) for e in self.imperfections
-                   if e.moment()]  # fmt: skip
+        events = [
+            (f"{key} of {length:g} s from", start, start + length)
+            for key, spans_of_key in spans
+            for start, length in spans_of_key
+        ]
+        events += [(f"{e.name} at", e.time, e.time) for e in self.imperfections if e.moment()]
         for what, start, end in events:
             if self.end is not None and end > self.end:
                 raise ValueError(f"{what} {start:g} s lies outside the drive of {self.end:g} s")

@@ -105,7 +105,10 @@ def read_simulator(path: Path | str) -> Simulator:
     path : path
     """
     file = read_toml(path, SimulatorFile, "a simulator")
-    mounting = None if file.mounting is None else file.mounting.mounting()
+    if file.mounting is None:
+        mounting = None
+    else:
+        mounting = file.mounting.mounting()
     return Simulator(mounting, file.scanner.scanner(), file.pos.pos(), file.imperfections)
 
 
@@ -120,7 +123,9 @@ def write_simulator(simulator: Simulator, path: Path | str) -> None:
     simulator : Simulator
     path : path
     """
-    scanner, pos, mounting = simulator.scanner, simulator.pos, simulator.mounting
+    scanner = simulator.scanner
+    pos = simulator.pos
+    mounting = simulator.mounting
     sections: dict[str, Any] = {
         "scanner": {
             "range_noise": float(scanner.range_noise),

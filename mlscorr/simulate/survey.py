@@ -130,7 +130,8 @@ class SimulatedSurvey(Summary):
 
     def _blocks_of(self, file, number, k, **size):
         """Blocks of a pass and scanner, both counted from 0."""
-        scanner, origin = self.scenario.scanner[k], np.array(self.scenario.origin)
+        scanner = self.scenario.scanner[k]
+        origin = np.array(self.scenario.origin)
         noise, *streams = self.streams[file]
         used = {effect.name for effect in self.effects}
         streams = [{name: deepcopy(echo[name]) for name in used} for echo in streams]
@@ -229,7 +230,8 @@ def simulate(scenario: Scenario, rng: Generator) -> SimulatedSurvey:
     check_crs(scenario.crs)
     drive_rng, scene_rng, scan_rng, pos_rng, control_rng, *more = rng.spawn(STREAMS)
     effect_rng, static_rng = more
-    effects, streams = scenario.imperfections, effect_streams(effect_rng)
+    effects = scenario.imperfections
+    streams = effect_streams(effect_rng)
     seed = getattr(rng.bit_generator.seed_seq, "entropy", None)
 
     # The way, what stands along it, and the drive.
@@ -249,17 +251,22 @@ def simulate(scenario: Scenario, rng: Generator) -> SimulatedSurvey:
     mountings = tuple(recording.true_mounting(scanner) for scanner in scenario.scanner)
     targets = recording.surveyed_targets(scene.targets, centre, scenario.targets, control_rng)
     return SimulatedSurvey(
-        scenario=scenario, scene=scene, true_passes=true_passes,
+        scenario=scenario,
+        scene=scene,
+        true_passes=true_passes,
         passes=recording.split_passes(with_effects("pos", recorded), map(len, true_passes)),
         true_mountings=mountings,
         mountings=tuple(with_effects("mounting", mounting) for mounting in mountings),
         targets=with_effects("control", targets),
-        is_check=recording.spread_checks(len(targets), scenario.targets), true_centre=centre,
-        effects=effects, reference=reference,
+        is_check=recording.spread_checks(len(targets), scenario.targets),
+        true_centre=centre,
+        effects=effects,
+        reference=reference,
         streams=recording.streams_by_file(len(true_passes), len(mountings), scan_rng, effect_rng),
-        beam_streams=streams, seed=seed if isinstance(seed, int) else None,
+        beam_streams=streams,
+        seed=seed if isinstance(seed, int) else None,
         static_scan=static_scan(scene, static_rng) if scenario.scene.reference else None,
-    )  # fmt: skip
+    )
 
 
 REFERENCE = "reference.ply"
@@ -319,7 +326,8 @@ def _disk_errors(folder):
 
 def _write_cloud(path, survey, blocks, truth, done):
     """One cloud file and the truth of its points; returns their number."""
-    origin, scenario = np.array(survey.scenario.origin), survey.scenario
+    origin = np.array(survey.scenario.origin)
+    scenario = survey.scenario
     with cloud_writer(path, origin, scenario.crs, created=CREATED) as writer:
         for block in blocks:
             pulses = block.pulses
@@ -413,7 +421,8 @@ def _survey_toml(survey):
 
 def _scanner_sections(survey):
     """The scanner and its mounting, or each of several with its files and mounting."""
-    scanners, mountings = survey.scenario.scanner, [_mounting(m) for m in survey.mountings]
+    scanners = survey.scenario.scanner
+    mountings = [_mounting(m) for m in survey.mountings]
     beliefs = []
     for scanner in scanners:
         noise = {"range_noise": scanner.range_noise, "angle_noise": scanner.angle_noise}

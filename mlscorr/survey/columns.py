@@ -76,7 +76,9 @@ def check_lengths(record: Any) -> None:
 def _selected(column, rows):
     if isinstance(column, tuple):
         return tuple(np.array(column, object)[rows])
-    return column[rows] if isinstance(column, np.ndarray | Columns) else column
+    if isinstance(column, np.ndarray | Columns):
+        return column[rows]
+    return column
 
 
 def _named_columns(record):
@@ -84,6 +86,9 @@ def _named_columns(record):
     columns = {}
     for field in fields(record):
         value = getattr(record, field.name)
-        nested = _named_columns(value) if isinstance(value, Columns) else {"": value}
+        if isinstance(value, Columns):
+            nested = _named_columns(value)
+        else:
+            nested = {"": value}
         columns |= {f"{field.name}_{name}".rstrip("_"): part for name, part in nested.items()}
     return columns

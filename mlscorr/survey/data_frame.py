@@ -62,7 +62,10 @@ def _cells(row: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]
     """Names and values of the columns of a row."""
     for key, value in row.items():
         is_vector = isinstance(value, list | tuple) and len(value) == len(AXES)
-        parts = dict(zip(AXES, value, strict=True)) if is_vector else value
+        if is_vector:
+            parts = dict(zip(AXES, value, strict=True))
+        else:
+            parts = value
         if isinstance(parts, Mapping):
             yield from _cells(parts, f"{before}{key}_")
         else:

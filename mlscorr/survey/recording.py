@@ -153,7 +153,8 @@ class Survey(Summary):
     @property
     def assumed_pos(self) -> tuple[Assumption, ...]:
         """Accuracies of the POS that neither the trajectory nor survey.toml states."""
-        trajectory, pos = self.trajectory, self.pos
+        trajectory = self.trajectory
+        pos = self.pos
         angles = tuple(np.degrees(pos.attitude_sigma).round(9).tolist())
         defaults: dict[str, tuple[np.ndarray | None, float | tuple[float, ...], str]] = {
             "position_sigma": (trajectory.position_sigma, pos.position_sigma, "m"),
@@ -188,7 +189,10 @@ class Survey(Summary):
         """The mounting; where none is known, beams are in body axes from where they show it, or
         else from the navigation centre.
         """
-        origin = np.zeros(3) if self.beam_origin is None else self.beam_origin
+        if self.beam_origin is None:
+            origin = np.zeros(3)
+        else:
+            origin = self.beam_origin
         return self.mounting or Mounting(origin, Rotation.identity())
 
     @cached_property

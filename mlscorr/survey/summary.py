@@ -58,13 +58,17 @@ def counted(number: int, noun: str) -> str:
 def _short(value):
     """A field's value in a few words."""
     if isinstance(value, np.ndarray):
-        return f"array {value.shape}" if value.size > 3 else repr(value)
+        if value.size > 3:
+            return f"array {value.shape}"
+        return repr(value)
     if is_dataclass(value) and hasattr(value, "__len__"):
         return f"{type(value).__name__}({len(value)} rows)"
     if isinstance(value, tuple | list | dict) and len(repr(value)) > LONGEST:
         return f"{type(value).__name__} of {len(value)}"
     text = repr(value)
-    return text if len(text) <= LONGEST else type(value).__name__
+    if len(text) <= LONGEST:
+        return text
+    return type(value).__name__
 
 
 def html_table(caption: str, rows: Iterable[Sequence[object]]) -> str:

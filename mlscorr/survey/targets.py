@@ -129,7 +129,8 @@ class Matched(Columns):
     @classmethod
     def none(cls) -> Matched:
         """No observation at all."""
-        empty, vectors = np.empty(0), np.empty((0, 3))
+        empty = np.empty(0)
+        vectors = np.empty((0, 3))
         points = ControlPoints((), vectors, vectors, (), empty, vectors)
         none = empty.astype(int)
         matrices = np.empty((0, 3, 3))

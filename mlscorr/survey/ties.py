@@ -117,9 +117,13 @@ class Ties(Columns):
 
     @classmethod
     def between(
-        cls, features: TieFeatures, pairs: np.ndarray, direction: np.ndarray, variance: np.ndarray,
+        cls,
+        features: TieFeatures,
+        pairs: np.ndarray,
+        direction: np.ndarray,
+        variance: np.ndarray,
         correction: np.ndarray | None = None,
-    ) -> Ties:  # fmt: skip
+    ) -> Ties:
         """The ties of pairs of features along directions.
 
         Parameters
@@ -142,17 +146,23 @@ class Ties(Columns):
         """
         late = features.gps_time[pairs[:, 0]] > features.gps_time[pairs[:, 1]]
         pairs = np.where(late[:, None], pairs[:, ::-1], pairs)
-        place, gps_time = features.centre[pairs], features.gps_time[pairs]
+        place = features.centre[pairs]
+        gps_time = features.gps_time[pairs]
         if correction is not None:
             way = _midway(features, pairs, place + correction[pairs])
             place = place + way
             gps_time = features.time_beside(pairs, way)
         return cls(
-            gps_time=gps_time, place=place, direction=direction,
+            gps_time=gps_time,
+            place=place,
+            direction=direction,
             misclosure=np.einsum("ni,ni->n", direction, place[:, 1] - place[:, 0]),
-            variance=variance, kind=features.kind[pairs[:, 0]],
-            pass_number=features.pass_number[pairs], scanner=features.scanner[pairs], feature=pairs,
-        )  # fmt: skip
+            variance=variance,
+            kind=features.kind[pairs[:, 0]],
+            pass_number=features.pass_number[pairs],
+            scanner=features.scanner[pairs],
+            feature=pairs,
+        )
 
     @property
     def sigma(self) -> np.ndarray:
@@ -168,7 +178,8 @@ class Ties(Columns):
 
 def _midway(features, pairs, place):
     """Ways (n, 2, 3) from both places, along their planes or poles, to the middle between them."""
-    way, axis = place.mean(axis=1, keepdims=True) - place, features.direction[pairs]
+    way = place.mean(axis=1, keepdims=True) - place
+    axis = features.direction[pairs]
     along = np.einsum("nvi,nvi->nv", axis, way)[:, :, None] * axis
     return np.where((features.kind[pairs[:, :1]] == "pole")[:, :, None], along, way - along)
 

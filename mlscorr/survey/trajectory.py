@@ -81,7 +81,9 @@ class Trajectory(Summary):
     @property
     def file_time(self) -> np.ndarray:
         """Times (n,) as a file has them, whose seconds of week start again. Units: s."""
-        return self.gps_time if self.weeks is None else self.gps_time - WEEK * self.weeks
+        if self.weeks is None:
+            return self.gps_time
+        return self.gps_time - WEEK * self.weeks
 
     @cached_property
     def gaps(self) -> np.ndarray:
@@ -90,7 +92,10 @@ class Trajectory(Summary):
         With sessions it is the median of each, and from one to the next is a gap, however short.
         """
         steps = np.diff(self.gps_time)
-        session = np.zeros(len(self), int) if self.session is None else self.session
+        if self.session is None:
+            session = np.zeros(len(self), int)
+        else:
+            session = self.session
         is_gap = np.diff(session) != 0
         for number in np.unique(session[:-1][~is_gap]):
             inside = (session[:-1] == number) & ~is_gap
@@ -121,7 +126,9 @@ class Trajectory(Summary):
     def scanned_rows(self) -> np.ndarray:
         """Numbers (k,) of the epochs with points of the clouds; of all where none is known."""
         known = self.scanned is not None and self.scanned.any()
-        return np.flatnonzero(self.scanned) if known else np.arange(len(self))
+        if known:
+            return np.flatnonzero(self.scanned)
+        return np.arange(len(self))
 
     @property
     def scanned_passes(self) -> np.ndarray:
@@ -138,8 +145,10 @@ class Trajectory(Summary):
         seconds : (k,) int array
             Whole seconds of gps_time.
         """
-        inside, segment = np.isin(np.floor(self.gps_time), seconds), self.segment(self.gps_time)
-        scanned, is_step = inside.copy(), np.diff(segment) == 0
+        inside = np.isin(np.floor(self.gps_time), seconds)
+        segment = self.segment(self.gps_time)
+        scanned = inside.copy()
+        is_step = np.diff(segment) == 0
         scanned[1:] |= inside[:-1] & is_step  # points lie up to the next epoch
         scanned[:-1] |= inside[1:] & is_step
         return replace(self, scanned=scanned)
@@ -200,7 +209,9 @@ class Trajectory(Summary):
         """
         epochs = control_epochs(gps_time)
         interval = self.recorded_time(epochs[0], epochs[-1]) / max(len(epochs) - 1, 1)
-        return interval if interval >= SAME_EPOCH else self.recorded_time(*self.gps_time[[0, -1]])
+        if interval >= SAME_EPOCH:
+            return interval
+        return self.recorded_time(*self.gps_time[[0, -1]])
 
     def select(self, rows: slice | ArrayLike) -> Trajectory:
         """Some of its epochs, in any order.

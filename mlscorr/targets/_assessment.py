@@ -43,9 +43,14 @@ class Assessment:
 
 
 def assess(
-    beams: tuple[np.ndarray, np.ndarray, np.ndarray], outline: Outline, kind: str, seed: Seed,
-    echoes: Echoes, blur: float, hidden: bool = False,
-) -> Assessment:  # fmt: skip
+    beams: tuple[np.ndarray, np.ndarray, np.ndarray],
+    outline: Outline,
+    kind: str,
+    seed: Seed,
+    echoes: Echoes,
+    blur: float,
+    hidden: bool = False,
+) -> Assessment:
     """Assess an outline.
 
     Parameters
@@ -66,11 +71,15 @@ def assess(
     Assessment
     """
     points, state, rows = beams
-    form, side = form_of(kind, seed.by_edges), sides(state, kind, seed.by_edges)
+    form = form_of(kind, seed.by_edges)
+    side = sides(state, kind, seed.by_edges)
     marked = side >= 0 if kind == "checkerboard" else side == 1
     inside = distance_inside(points, outline.row, form) > 0
     support = _support(points, marked, outline, form, kind, blur)
-    smallest = SETTINGS.hole_support if kind == "hole" else SETTINGS.smallest_support
+    if kind == "hole":
+        smallest = SETTINGS.hole_support
+    else:
+        smallest = SETTINGS.smallest_support
     overlap = outline.overlap
     if kind == "hole" and marked.sum() < 5:  # nothing behind it: all that counts is the board
         overlap = 1.0 - (inside & ~marked).sum() / max(len(points), 1)
@@ -85,7 +94,10 @@ def assess(
     quality = flat * min(1.0, support / SETTINGS.good_support)
     quality *= min(1.0, contrast / SETTINGS.good_contrast)
     sigma = np.sqrt(np.linalg.eigvalsh(outline.covariance)[-1]) / outline.size
-    count = (inside & marked).sum() if kind != "hole" else SETTINGS.rim_places * support
+    if kind != "hole":
+        count = (inside & marked).sum()
+    else:
+        count = SETTINGS.rim_places * support
     play = SETTINGS.rough_play
     return Assessment(
         score=float(overlap * quality),
@@ -103,12 +115,14 @@ def assess(
 
 def _support(points, marked, outline, form, kind, blur):
     """Share of the outline with beams on either side of it near by; of a hole's, on the board."""
-    within, beyond = points[marked], points[~marked]
+    within = points[marked]
+    beyond = points[~marked]
     if kind == "hole":
         within = beyond
     if len(within) < 3 or len(beyond) == 0:
         return 0.0
-    rim, near = _rim(outline, form), max(6 * _spacing(within, outline, form, kind), 4 * blur)
+    rim = _rim(outline, form)
+    near = max(6 * _spacing(within, outline, form, kind), 4 * blur)
     supported = cKDTree(within).query(rim)[0] < near
     if kind != "hole":
         supported &= cKDTree(beyond).query(rim)[0] < near
@@ -122,7 +136,8 @@ def _rim(outline, form):
     if form == ROUND:
         return outline.centre + outline.size / 2 * ring
     square = ring / np.abs(ring).max(axis=1, keepdims=True)
-    cos, sin = np.cos(outline.turn), np.sin(outline.turn)
+    cos = np.cos(outline.turn)
+    sin = np.sin(outline.turn)
     return outline.centre + outline.size / 2 * square @ np.array([[cos, sin], [-sin, cos]])
 
 
@@ -149,5 +164,6 @@ def _contrast(intensity, bright):
     """Difference over sum of typical intensities, bright and dark; 1 where nothing is dark."""
     if not bright.any() or (~bright).sum() < 5:
         return float(bright.any())
-    light, dark = np.median(intensity[bright]), np.median(intensity[~bright])
+    light = np.median(intensity[bright])
+    dark = np.median(intensity[~bright])
     return float((light - dark) / max(light + dark, 1e-9))

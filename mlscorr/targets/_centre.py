@@ -75,8 +75,10 @@ def _correlation_factor(residual):
 
     Source: 1 + 2 sum of the autocorrelation up to where it is lost in its own noise.
     """
-    n, centred = len(residual), residual - residual.mean()
-    total, factor = centred @ centred, 1.0
+    n = len(residual)
+    centred = residual - residual.mean()
+    total = centred @ centred
+    factor = 1.0
     for lag in range(1, n // 4):
         correlation = centred[lag:] @ centred[:-lag] / max(total, 1e-30)
         if correlation < 2 / np.sqrt(n):

@@ -83,14 +83,18 @@ def _grow(xyz, level, brightest_first, voxel, keys_of, keys, number, limits):
     box = np.full((3, count), np.inf), np.full((3, count), -np.inf)
     touched = np.full(count, -1)
     entries = np.empty((len(xyz), 3), np.int64)  # each has a point that none before it has
-    length, start, n = 0, 0, len(brightest_first)
+    length = 0
+    start = 0
+    n = len(brightest_first)
     while start < n:
-        now, end = level[brightest_first[start]], start
+        now = level[brightest_first[start]]
+        end = start
         while end < n and level[brightest_first[end]] == now:
             row = brightest_first[end]
             new = voxel[row]
             if parent[new] < 0:
-                parent[new], sums[0, new] = new, 1
+                parent[new] = new
+                sums[0, new] = 1
                 for near in neighbours(keys_of[new], keys, number):
                     if parent[near] >= 0:
                         _join(parent, chain, sums, box, new, near)
@@ -119,7 +123,8 @@ def _grow(xyz, level, brightest_first, voxel, keys_of, keys, number, limits):
 @njit(cache=True)
 def _join(parent, chain, sums, box, voxel, beside):
     """Join the components of two voxels, the smaller's voxels behind the larger's."""
-    a, b = root_of(parent, voxel), root_of(parent, beside)
+    a = root_of(parent, voxel)
+    b = root_of(parent, beside)
     if a == b:
         return
     if sums[0, a] < sums[0, b]:
@@ -137,7 +142,8 @@ def _join(parent, chain, sums, box, voxel, beside):
 @njit(cache=True)
 def _places(parent, behind):
     """Place (v,) of each voxel when all components follow each other."""
-    place_of, place = np.empty(len(parent), np.int64), 0
+    place_of = np.empty(len(parent), np.int64)
+    place = 0
     for root in range(len(parent)):
         member = root if parent[root] == root else -1
         while member >= 0:
@@ -163,8 +169,10 @@ def components(points: np.ndarray, link: float) -> list[np.ndarray]:
         Rows of each, in order.
     """
     label = connected(points, link)
-    order, counts = np.argsort(label, kind="stable"), np.bincount(label)
-    ends, large = np.cumsum(counts), np.flatnonzero(counts >= SETTINGS.smallest_count)
+    order = np.argsort(label, kind="stable")
+    counts = np.bincount(label)
+    ends = np.cumsum(counts)
+    large = np.flatnonzero(counts >= SETTINGS.smallest_count)
     return [order[ends[number] - counts[number] : ends[number]] for number in large]
 
 
@@ -184,7 +192,8 @@ def connected(points: np.ndarray, link: float) -> np.ndarray:
     """
     if len(points) == 0:
         return np.empty(0, int)
-    keys, shape = np.zeros(len(points), np.int64), []
+    keys = np.zeros(len(points), np.int64)
+    shape = []
     for column in points.T:  # one by one, as they are large where a street is dense
         cells = np.floor(column / (link / 3)).astype(np.int64)
         cells -= cells.min()
@@ -211,7 +220,9 @@ def _offsets(dimensions):
 @njit(cache=True)
 def _labels(keys, steps):
     """Component number (n,) of keys in increasing order, which these steps connect."""
-    voxel, occupied, count = np.empty(len(keys), np.int32), np.empty_like(keys), 0
+    voxel = np.empty(len(keys), np.int32)
+    occupied = np.empty_like(keys)
+    count = 0
     for i in range(len(keys)):
         if count == 0 or keys[i] != occupied[count - 1]:
             occupied[count] = keys[i]
@@ -227,9 +238,11 @@ def _labels(keys, steps):
             if above == count:
                 break
             if occupied[above] == key:
-                a, b = root_of(parent, low), root_of(parent, above)
+                a = root_of(parent, low)
+                b = root_of(parent, above)
                 parent[max(a, b)] = min(a, b)
-    number, components = np.empty(count, np.int32), 0
+    number = np.empty(count, np.int32)
+    components = 0
     for i in range(count):  # the root of each is the lowest of its voxels
         is_root = parent[i] == i
         number[i] = components if is_root else number[root_of(parent, i)]

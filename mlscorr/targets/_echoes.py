@@ -80,8 +80,12 @@ def beams_at_plane(
 def _beams_near(xyz, gps_time, path, tolerance, place):
     """Rows (k,) of these beams, and which of them ended on the plane: thousands of calls look."""
     (origin, axes, middle, radius), (epochs, scanner) = place, path
-    rows, on_plane, count = np.empty(len(xyz), np.int64), np.empty(len(xyz), np.bool_), 0
-    above, epoch = np.zeros(len(epochs)), 0  # the plane, where the scanner was
+    rows = np.empty(len(xyz), np.int64)
+    on_plane = np.empty(len(xyz), np.bool_)
+    count = 0
+    # the plane, where the scanner was
+    above = np.zeros(len(epochs))
+    epoch = 0
     for i in range(3):
         above += (scanner[:, i] - origin[i]) * axes[2, i]
     for row in range(len(xyz)):
@@ -92,10 +96,13 @@ def _beams_near(xyz, gps_time, path, tolerance, place):
         for i in range(3):
             height += (xyz[row, i] - origin[i]) * axes[2, i]
         steep = height - above[epoch] - share * (above[epoch + 1] - above[epoch])
-        is_on, is_behind = abs(height) <= tolerance, height * steep > 0.0
+        is_on = abs(height) <= tolerance
+        is_behind = height * steep > 0.0
         if not (abs(height) < abs(steep) and (is_on or is_behind)):
             continue
-        beyond, away = height / steep, 0.0  # behind the plane, in units of the range
+        # behind the plane, in units of the range
+        beyond = height / steep
+        away = 0.0
         for axis in range(2):
             across = -middle[axis]
             for i in range(3):
@@ -104,7 +111,8 @@ def _beams_near(xyz, gps_time, path, tolerance, place):
                 across += (met - origin[i]) * axes[axis, i]
             away += across**2
         if away < radius**2:
-            rows[count], on_plane[count] = row, is_on
+            rows[count] = row
+            on_plane[count] = is_on
             count += 1
     return rows[:count].copy(), on_plane[:count].copy()
 
@@ -166,14 +174,16 @@ def _scan_lines(gps_time):
 def _line_advance(gps_time, uv, lines, step):
     """Time (s) and move (2,) in m from a point to its like on the next scan line."""
     along = step / max(np.linalg.norm(step), 1e-9)
-    times, moves = [], []
+    times = []
+    moves = []
     for line, following in pairwise(lines):
         nearest = np.abs(uv[following] @ along - (uv[line] @ along)[:, None]).argmin(axis=1)
         like = following[nearest]
         near = np.abs((uv[like] - uv[line]) @ along) <= np.linalg.norm(step)
         times.append(gps_time[like[near]] - gps_time[line[near]])
         moves.append(uv[like[near]] - uv[line[near]])
-    times, moves = np.concatenate(times), np.concatenate(moves)
+    times = np.concatenate(times)
+    moves = np.concatenate(moves)
     if len(times) == 0:
         return 0.0, np.zeros(2)
     period = np.median(times)

@@ -23,27 +23,34 @@ def jaccard_index(
         In which it is measured.
     """
     spanned = bright & (uv[:, 0] ** 2 + uv[:, 1] ** 2 <= longest**2)
-    best_area, turn, diameter = np.inf, 0.0, 0.0
+    best_area = np.inf
+    turn = 0.0
+    diameter = 0.0
     for step in range(directions):
         angle = np.pi / 2 * step / directions
         low_x, high_x, low_y, high_y = _extent(uv, spanned, angle)
         diameter += (high_x - low_x + high_y - low_y) / (2 * directions)
         if (high_x - low_x) * (high_y - low_y) < best_area:
-            best_area, turn = (high_x - low_x) * (high_y - low_y), angle
+            best_area = (high_x - low_x) * (high_y - low_y)
+            turn = angle
     low_x, high_x, low_y, high_y = _extent(uv, spanned, turn)
-    width, height = high_x - low_x, high_y - low_y
+    width = high_x - low_x
+    height = high_y - low_y
     first = 0
     if max(width, height) > largest_ratio * min(width, height):
         # the white quadrants of a checkerboard fill the rectangle along their diagonal, which is
         # as small as their own; what fills a rectangle needs twice of it when turned by 45 deg
-        turn, first = turn + np.pi / 4, 2
+        turn = turn + np.pi / 4
+        first = 2
         low_x, high_x, low_y, high_y = _extent(uv, spanned, turn)
-        width, height = high_x - low_x, high_y - low_y
+        width = high_x - low_x
+        height = high_y - low_y
         if not width * height < np.sqrt(2.0) * best_area:
             return 0.0
     if not 0.0 < max(width, height) <= largest_ratio * min(width, height):
         return 0.0
-    both, either = np.zeros(4), np.zeros(4)
+    both = np.zeros(4)
+    either = np.zeros(4)
     inside = np.zeros(4, np.bool_)
     for i in range(len(uv)):
         x = np.cos(turn) * uv[i, 0] + np.sin(turn) * uv[i, 1] - (low_x + high_x) / 2
@@ -61,11 +68,18 @@ def jaccard_index(
 @njit(cache=True)
 def _extent(uv, bright, angle):
     """Bounds of the bright points along a direction and across it."""
-    low_x, high_x, low_y, high_y = np.inf, -np.inf, np.inf, -np.inf
-    cos, sin = np.cos(angle), np.sin(angle)
+    low_x = np.inf
+    high_x = -np.inf
+    low_y = np.inf
+    high_y = -np.inf
+    cos = np.cos(angle)
+    sin = np.sin(angle)
     for i in range(len(uv)):
         if bright[i]:
-            x, y = cos * uv[i, 0] + sin * uv[i, 1], cos * uv[i, 1] - sin * uv[i, 0]
-            low_x, high_x = min(low_x, x), max(high_x, x)
-            low_y, high_y = min(low_y, y), max(high_y, y)
+            x = cos * uv[i, 0] + sin * uv[i, 1]
+            y = cos * uv[i, 1] - sin * uv[i, 0]
+            low_x = min(low_x, x)
+            high_x = max(high_x, x)
+            low_y = min(low_y, y)
+            high_y = max(high_y, y)
     return low_x, high_x, low_y, high_y

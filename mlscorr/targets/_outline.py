@@ -63,9 +63,16 @@ class Outline:
 
 
 def fit_outline(
-    points: np.ndarray, state: np.ndarray, kind: str, size: Size, blur: float, start: np.ndarray,
-    by_edges: bool = False, ring: bool = False, rough: bool = False,
-) -> Outline:  # fmt: skip
+    points: np.ndarray,
+    state: np.ndarray,
+    kind: str,
+    size: Size,
+    blur: float,
+    start: np.ndarray,
+    by_edges: bool = False,
+    ring: bool = False,
+    rough: bool = False,
+) -> Outline:
     """Fit an outline to beams that crossed its plane.
 
     Parameters
@@ -90,13 +97,15 @@ def fit_outline(
     Source: population Monte Carlo (Cappe et al. 2004) on quasi-random trials; the blur starts wide
     and halves, so that the posterior's mode is not lost.
     """
-    form, side = shapes.form_of(kind, by_edges), shapes.sides(state, kind, by_edges)
+    form = shapes.form_of(kind, by_edges)
+    side = shapes.sides(state, kind, by_edges)
     period = shapes.PERIOD.get(kind, 0.0)
     count = SETTINGS.trials // (1 + rough)
     trials, free = _first_trials(start, size, period, ring, count)
     spent = np.zeros(count)  # minus log of the density they were drawn from
     width = size.mean / SETTINGS.first_blur
-    mean, spread = trials.mean(axis=0), np.ptp(trials, axis=0) / 2
+    mean = trials.mean(axis=0)
+    spread = np.ptp(trials, axis=0) / 2
     rounds = SETTINGS.rough_rounds * (1 + (form == shapes.CHECKERED) if rough else 5)
     for number in range(1, rounds + 1):
         near = _informative(points, mean, spread, form, max(width, blur))
@@ -113,7 +122,8 @@ def fit_outline(
             width /= 2
         drawn = SETTINGS.proposal_width**2 * covariance[np.ix_(free, free)]
         trials, spent = _next_trials(mean, drawn, free, number, count)
-    inside, marked = shapes.distance_inside(points, mean, form) > 0, side == 1
+    inside = shapes.distance_inside(points, mean, form) > 0
+    marked = side == 1
     if form == shapes.CHECKERED:
         marked &= inside
         inside &= shapes.distance_inside(points, mean, shapes.WHITE) > 0
@@ -133,7 +143,8 @@ def _ring_limits():
 
 def _first_trials(middle, size, period, ring, count):
     """Outlines (c, 5) all about the middle, and which of their columns are free."""
-    play, inner = SETTINGS.hidden_share * size.mean, _ring_limits() * ring
+    play = SETTINGS.hidden_share * size.mean
+    inner = _ring_limits() * ring
     low = np.array([*(middle - play), 0.0, size.low, inner[0]])
     high = np.array([*(middle + play), period, size.high, inner[1]])
     return low + (high - low) * quasi_random(count, 5), np.flatnonzero(high > low)

@@ -47,7 +47,8 @@ class Plane:
         xyz, sight : (n, 3) array
             Points of the beams, and scanner to point. Units: m.
         """
-        local, beam = self.coordinates(xyz), sight @ self.axes.T
+        local = self.coordinates(xyz)
+        beam = sight @ self.axes.T
         with np.errstate(divide="ignore", invalid="ignore"):  # a beam along the plane never does
             return local[:, :2] - local[:, 2:] / beam[:, 2:] * beam[:, :2]
 
@@ -85,7 +86,9 @@ def most_common(xyz: np.ndarray, triples: np.ndarray, tolerance: float) -> np.nd
 
     Source: MSAC (Torr and Zisserman 2000).
     """
-    origin, best, largest = xyz[0], np.zeros(3), -1.0
+    origin = xyz[0]
+    best = np.zeros(3)
+    largest = -1.0
     for i, j, k in triples:
         normal = np.cross(xyz[j] - xyz[i], xyz[k] - xyz[i])
         length = np.sqrt(np.sum(normal**2))
@@ -93,11 +96,14 @@ def most_common(xyz: np.ndarray, triples: np.ndarray, tolerance: float) -> np.nd
             continue
         normal /= length
         a, b, c = normal
-        offset, support = np.sum(normal * xyz[i]), 0.0
+        offset = np.sum(normal * xyz[i])
+        support = 0.0
         for x, y, z in xyz:
             support += max(1.0 - ((a * x + b * y + c * z - offset) / tolerance) ** 2, 0.0)
         if support > largest:
-            origin, best, largest = xyz[i], normal, support
+            origin = xyz[i]
+            best = normal
+            largest = support
     return (np.abs(np.sum((xyz - origin) * best, axis=1)) <= tolerance) & (largest >= 0.0)
 
 
@@ -129,7 +135,8 @@ def fit_plane(xyz: np.ndarray, tolerance: float) -> Plane:
 def _fit_plane(xyz, triples, tolerance):
     """Origin (3,), axes (3, 3), sigma and inliers (n,): a piece of cloud asks for hundreds."""
     middle = xyz.sum(axis=0) / len(xyz)
-    local, square = xyz - middle, np.empty((3, 3))
+    local = xyz - middle
+    square = np.empty((3, 3))
     inside = most_common(local, triples, tolerance)
     inside |= not inside.any()  # all on a line
     for _ in range(2):

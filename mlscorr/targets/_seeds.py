@@ -189,10 +189,14 @@ def _flat_parts(echoes, rows, size):
         if longest + 2 * echoes.tolerance < size / 2:  # too small on whatever plane
             return
         plane = fit_plane(xyz, echoes.tolerance)
-        flat, whole = rows[plane.inliers], plane.inliers.mean() >= 0.7
+        flat = rows[plane.inliers]
+        whole = plane.inliers.mean() >= 0.7
         points = plane.crossing(xyz[plane.inliers], echoes.sight(flat))
         link = SETTINGS.link_shares[-1] * size
-        parts = [np.arange(len(flat))] if whole else components(points, link)
+        if whole:
+            parts = [np.arange(len(flat))]
+        else:
+            parts = components(points, link)
         for part in parts:
             if len(part) >= SETTINGS.smallest_count and np.isfinite(points[part]).all():
                 yield flat[part], plane, points[part]  # no beam runs along the plane
@@ -203,7 +207,8 @@ def _flat_parts(echoes, rows, size):
 
 def _extent(points, kind, size, guess, bloom=1.0):
     """Longest extent and middle (2,) of points (n, 2) if a shape may have it, else None."""
-    low, high = points.min(axis=0), points.max(axis=0)
+    low = points.min(axis=0)
+    high = points.max(axis=0)
     shortest, longest = np.sort(high - low)
     if size is None:
         fits = guess / 2 <= longest <= 2 * guess and shortest >= 0.4 * longest
@@ -211,7 +216,9 @@ def _extent(points, kind, size, guess, bloom=1.0):
         fits = longest <= (2 - SETTINGS.smallest_length) * bloom * diameter(kind, size)
         fits &= longest >= SETTINGS.smallest_length * size
         fits &= shortest >= SETTINGS.smallest_width * size
-    return (float(longest), (low + high) / 2) if fits else None
+    if fits:
+        return (float(longest), (low + high) / 2)
+    return None
 
 
 def _gaps(echoes, plane, points, size):
@@ -219,7 +226,8 @@ def _gaps(echoes, plane, points, size):
 
     They are circumcircles of the Delaunay triangles (their centres are Voronoi's corners).
     """
-    height, beam = plane.coordinates(echoes.xyz)[:, 2], echoes.sight(slice(None)) @ plane.axes[2]
+    height = plane.coordinates(echoes.xyz)[:, 2]
+    beam = echoes.sight(slice(None)) @ plane.axes[2]
     blocked = (height * beam < 0) & (np.abs(height) > echoes.tolerance)
     blocked &= _steep(echoes, plane)
     known = np.vstack([points, plane.crossing(echoes.xyz[blocked], echoes.sight(blocked))])
@@ -255,9 +263,11 @@ def _surrounded(points, middle):
 
 def _circumcircles(a, b, c):
     """Centre (n, 2) and radius (n,) of the circles through three points each."""
-    b, c = b - a, c - a
+    b = b - a
+    c = c - a
     twice = 2 * (b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0])
-    square_b, square_c = np.sum(b * b, axis=1), np.sum(c * c, axis=1)
+    square_b = np.sum(b * b, axis=1)
+    square_c = np.sum(c * c, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         x = (c[:, 1] * square_b - b[:, 1] * square_c) / twice
         y = (b[:, 0] * square_c - c[:, 0] * square_b) / twice

@@ -27,10 +27,13 @@ def quasi_random(count: int, dimensions: int, block: int = 0) -> np.ndarray:
     """
     points = np.zeros((count, dimensions))
     for k, base in enumerate((2, 3, 5, 7, 11)[:dimensions]):
-        left, weight = np.arange(count) + block * count + 1, 1 / base  # that of zero is a corner
+        # that of zero is a corner
+        left = np.arange(count) + block * count + 1
+        weight = 1 / base
         while left.any():
             points[:, k] += weight * (left % base)
-            left, weight = left // base, weight / base
+            left = left // base
+            weight = weight / base
     return points
 
 

@@ -81,7 +81,9 @@ def rough_fit(echoes: Echoes, seed: Seed, kind: str, size: float | None) -> Shap
     if kind == "circle" and not seed.by_edges and _dark_inside(points, state, outline):
         outline = fit_outline(points, state, kind, known, blur, start, ring=True, rough=True)
     assessment = assess(beams, outline, kind, seed, echoes, blur)
-    return ShapeFit(seed, kind, size, beams, outline, assessment) if assessment.plausible else None
+    if assessment.plausible:
+        return ShapeFit(seed, kind, size, beams, outline, assessment)
+    return None
 
 
 def _beams(echoes, seed, kind, size):
@@ -110,20 +112,27 @@ def exact_fit(echoes: Echoes, fit: ShapeFit, scanner: Scanner) -> ShapeFit | Non
     fit = _refined(echoes, fit)
     if not fit.on_target.any() or _sight(echoes, fit)[1] < SETTINGS.grazing:
         return None  # or a line of points alone, whose plane may hold the beams
-    seed, kind, ring = fit.seed, fit.kind, fit.outline.inner > 0
+    seed = fit.seed
+    kind = fit.kind
+    ring = fit.outline.inner > 0
     points, state, rows = fit.beams
     blur, footprint = _blur(echoes, fit, scanner)
-    known, start = _size(seed, fit.size, footprint), seed.middle
+    known = _size(seed, fit.size, footprint)
+    start = seed.middle
     outline = fit_outline(points, state, kind, known, blur, start, seed.by_edges, ring)
     hidden = _contradicted(points[rows < 0], outline, form_of(kind, seed.by_edges), blur)
     if hidden:
-        points, state, rows = points[rows >= 0], state[rows >= 0], rows[rows >= 0]
+        points = points[rows >= 0]
+        state = state[rows >= 0]
+        rows = rows[rows >= 0]
         outline = fit_outline(points, state, kind, known, blur, start, seed.by_edges, ring)
     beams = points, state, rows
     assessment = assess(beams, outline, kind, seed, echoes, blur, hidden)
     fit = replace(fit, beams=beams, outline=outline, assessment=assessment)
     kept = 2 * fit.on_target.sum() >= SETTINGS.smallest_count
-    return fit if assessment.accepted and kept else None
+    if assessment.accepted and kept:
+        return fit
+    return None
 
 
 def _refined(echoes, fit):
@@ -184,7 +193,10 @@ def _with_threshold(intensity, beams, bright, outside, seed):
     points, state, rows = beams
     dark = intensity[rows[outside & (state != MISS)]]
     # the brighter of what lies outside: beside a dark board, the wall that it hangs on
-    dark = np.percentile(dark, 90) if len(dark) >= SETTINGS.smallest_count / 4 else 0.0
+    if len(dark) >= SETTINGS.smallest_count / 4:
+        dark = np.percentile(dark, 90)
+    else:
+        dark = 0.0
     bright = np.median(bright)
     is_apart = dark < SETTINGS.same_surface * bright
     threshold = (bright + dark) / 2 if is_apart else seed.threshold

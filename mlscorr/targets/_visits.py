@@ -57,10 +57,12 @@ def _turns(gps_time, survey):
     path = scanner.position
     marks = _each_step(path, SETTINGS.turn_step)
     steps = np.diff(path[marks, :2], axis=0)
-    cuts, forward = [], steps[0] if len(steps) else None
+    cuts = []
+    forward = steps[0] if len(steps) else None
     for number in range(1, len(steps)):
         if steps[number] @ forward < 0:
-            first, last = marks[number - 1], marks[number + 1]
+            first = marks[number - 1]
+            last = marks[number + 1]
             cuts.append(first + int(np.argmax(path[first:last, :2] @ forward)))
             forward = steps[number]
     return np.searchsorted(gps_time, scanner.gps_time[cuts])
@@ -68,7 +70,8 @@ def _turns(gps_time, survey):
 
 def _each_step(path, step):
     """Rows (k,) of a path, of which each is the first farther than a step from the one before."""
-    places, marks = path[:, :2].tolist(), [0]
+    places = path[:, :2].tolist()
+    marks = [0]
     for row, place in enumerate(places):
         if dist(place, places[marks[-1]]) > step:
             marks.append(row)

@@ -58,22 +58,29 @@ def number_voxels(xyz: np.ndarray, low: np.ndarray, edge: float) -> tuple[np.nda
     number = np.empty(size, np.int64)
     of_point = np.empty(len(xyz), np.int32)
     known = np.empty(len(xyz), np.int64)
-    count, last_key, last = 0, np.int64(EMPTY), 0
+    count = 0
+    last_key = np.int64(EMPTY)
+    last = 0
     for i in range(len(xyz)):
         key = key_of(xyz[i, 0] - low[0], xyz[i, 1] - low[1], xyz[i, 2] - low[2], edge)
         if key != last_key:
             slot = _slot(keys, key)
             if keys[slot] == EMPTY:
-                keys[slot], number[slot], known[count] = key, count, key
+                keys[slot] = key
+                number[slot] = count
+                known[count] = key
                 count += 1
                 if 2 * count > size:
                     size *= 4
-                    keys, number = np.full(size, EMPTY), np.empty(size, np.int64)
+                    keys = np.full(size, EMPTY)
+                    number = np.empty(size, np.int64)
                     for k in range(count):
                         slot = _slot(keys, known[k])
-                        keys[slot], number[slot] = known[k], k
+                        keys[slot] = known[k]
+                        number[slot] = k
                     slot = _slot(keys, key)
-            last_key, last = key, number[slot]
+            last_key = key
+            last = number[slot]
         of_point[i] = last
     return of_point, known[:count].copy(), keys, number
 

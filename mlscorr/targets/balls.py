@@ -18,7 +18,8 @@ class Neighbourhoods:
     """
 
     def __init__(self, position: np.ndarray, radius: np.ndarray):
-        self.position, self.radius = np.ascontiguousarray(position, float), radius
+        self.position = np.ascontiguousarray(position, float)
+        self.radius = radius
         margin = radius[:, None] * (1 + 1e-9)  # distances alone decide, not what is rounded here
         ends = [self.position[:, :2] + sign * margin for sign in (-1, 1)]
         low = ends[0].min(axis=0, initial=np.inf)
@@ -50,12 +51,15 @@ class Neighbourhoods:
             Units: m.
         """
         balls = self._raster, self.position, self.radius**2
-        xyz, counts = np.ascontiguousarray(xyz), np.zeros(len(self.position), int)
+        xyz = np.ascontiguousarray(xyz)
+        counts = np.zeros(len(self.position), int)
         _enter(xyz, *balls, counts, np.empty(0, int))
         ends = np.cumsum(counts)
         rows = np.empty(counts.sum(), int)
         _enter(xyz, *balls, ends - counts, rows)
-        return np.split(rows, ends[:-1]) if len(ends) else []
+        if len(ends):
+            return np.split(rows, ends[:-1])
+        return []
 
 
 def _reaching(first, last, shape):
@@ -77,12 +81,14 @@ def _enter(xyz, raster, position, squares, free, rows):
     """
     low, edge, shape, starts, balls = raster
     for i in range(len(xyz)):
-        x, y = (xyz[i, 0] - low[0]) / edge, (xyz[i, 1] - low[1]) / edge
+        x = (xyz[i, 0] - low[0]) / edge
+        y = (xyz[i, 1] - low[1]) / edge
         if not (x >= 0 and y >= 0 and x < shape[0] and y < shape[1]):
             continue
         cell = int(x) * shape[1] + int(y)
         for k in range(starts[cell], starts[cell + 1]):
-            ball, apart = balls[k], 0.0
+            ball = balls[k]
+            apart = 0.0
             for axis in range(3):
                 apart += (xyz[i, axis] - position[ball, axis]) ** 2
             if apart <= squares[ball]:

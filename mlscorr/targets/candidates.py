@@ -64,7 +64,9 @@ class PointsInBalls:
     """
 
     def __init__(self, balls: Neighbourhoods):
-        self._balls, self._parts, self._read = balls, [], 0
+        self._balls = balls
+        self._parts = []
+        self._read = 0
         self._first = np.full(len(balls.position), np.inf)
         self._last = -self._first
         self._size, self._taken = np.zeros((2, len(balls.position)), int)
@@ -100,7 +102,9 @@ class PointsInBalls:
 
         Those that no other ball waits for are let go of part by part, as dense balls are large.
         """
-        ball, size, end = self._balls[np.array([number])], self._size[number], 0
+        ball = self._balls[np.array([number])]
+        size = self._size[number]
+        end = 0
         kind = self._parts[0][1].intensity.dtype
         cloud = PointCloud(np.empty((size, 3)), np.empty(size), np.empty(size, kind))
         for place, (read, part, counts) in enumerate(self._parts):
@@ -114,15 +118,20 @@ class PointsInBalls:
                 if not (kept := counts > 0).all():
                     self._parts[place] = read, part[kept], counts[kept]
         self._parts = [entry for entry in self._parts if len(entry[1])]
-        self._first[number], self._last[number] = np.inf, -np.inf
+        self._first[number] = np.inf
+        self._last[number] = -np.inf
         self._size[number], self._taken[number] = 0, self._read
         return cloud
 
 
 def collect(
-    survey: Survey, read: Callable, fit: Callable, count: Callable, settled: Callable,
+    survey: Survey,
+    read: Callable,
+    fit: Callable,
+    count: Callable,
+    settled: Callable,
     progress: Callable,
-) -> Candidates:  # fmt: skip
+) -> Candidates:
     """Stream a survey's cloud files and hand on the points near each of its surveyed points.
 
     Memory does not grow with a file, as long as its points come about in order of time: a surveyed
@@ -143,9 +152,12 @@ def collect(
         than since (s).
     progress : function of a number of points
     """
-    trajectory, points = survey.trajectory, survey.surveyed
+    trajectory = survey.trajectory
+    points = survey.surveyed
     near = Neighbourhoods(points.position, search_radius(survey, points))
-    unplaced, starts, seconds = [NO_POINTS], {}, [np.empty(0, int)]
+    unplaced = [NO_POINTS]
+    starts = {}
+    seconds = [np.empty(0, int)]
 
     def hand_on(file, held, before, latest):
         for index in held.passed(before):
@@ -153,7 +165,8 @@ def collect(
         settled(min(held.since(), latest))
 
     for number, file in enumerate(survey.clouds):
-        held, limit = PointsInBalls(near), IO.chunk_points
+        held = PointsInBalls(near)
+        limit = IO.chunk_points
         for chunk in read(file):
             segment = trajectory.segment(chunk.gps_time)
             for part in np.unique(segment[segment >= 0]).tolist():
@@ -174,7 +187,8 @@ def collect(
             del chunk, segment, rows, has_pose, placed  # large, and needed no more
         hand_on(number, held, np.inf, np.inf)
     cloud = PointCloud.concatenate(unplaced)
-    passes, times = number_passes(starts), np.unique(np.concatenate(seconds))
+    passes = number_passes(starts)
+    times = np.unique(np.concatenate(seconds))
     return Candidates(unplaced=cloud, passes=passes, starts=starts, seconds=times)
 
 

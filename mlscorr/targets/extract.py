@@ -51,7 +51,10 @@ def fit_near_control(
     targets: list[PassTarget] = []
     for radius in dict.fromkeys(radii):
         ball = Neighbourhoods(np.zeros((1, 3)), np.array([radius]))
-        some = cloud if radius == whole else cloud[ball.contains(cloud.xyz)]
+        if radius == whole:
+            some = cloud
+        else:
+            some = cloud[ball.contains(cloud.xyz)]
         for segment, visit in split_visits(some, survey):
             path = ScannerPath.of(survey, visit.gps_time)
             known = [f for _, f in targets if visit.gps_time[0] <= f.gps_time <= visit.gps_time[-1]]

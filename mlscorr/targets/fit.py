@@ -87,10 +87,15 @@ class FittedTarget(Centre):
 
 
 def fit_targets(
-    cloud: PointCloud, path: ScannerPath, shapes: Sequence[tuple[str, float | None]],
-    scanner: Scanner, rng: np.random.Generator, region: BrightRegion | None = None,
-    origin: np.ndarray | None = None, known: Sequence[FittedTarget] = (),
-) -> list[FittedTarget]:  # fmt: skip
+    cloud: PointCloud,
+    path: ScannerPath,
+    shapes: Sequence[tuple[str, float | None]],
+    scanner: Scanner,
+    rng: np.random.Generator,
+    region: BrightRegion | None = None,
+    origin: np.ndarray | None = None,
+    known: Sequence[FittedTarget] = (),
+) -> list[FittedTarget]:
     """Fit targets of the given shapes in one piece of cloud of one pass and visit.
 
     Parameters
@@ -125,7 +130,8 @@ def fit_targets(
     if origin is None:
         origin = cloud.xyz.mean(axis=0)
         cloud = replace(cloud, xyz=cloud.xyz - origin)
-    intensity, tolerance = cloud.intensity, max(SETTINGS.thickness, 4 * scanner.range_noise)
+    intensity = cloud.intensity
+    tolerance = max(SETTINGS.thickness, 4 * scanner.range_noise)
     path = path.seen_from(origin)
     echoes = Echoes(cloud.xyz, cloud.gps_time, intensity, path, tolerance)
     blind = why_useless(intensity) is not None
@@ -226,14 +232,19 @@ def _best(fits):
 def _as_target(echoes, fit, origin):
     """The fit in the map: centre, covariance, normal towards the scanner, time at the centre."""
     points, state, rows = fit.beams
-    plane, outline = fit.seed.plane, fit.outline
+    plane = fit.seed.plane
+    outline = fit.outline
     met = rows[fit.on_target & (rows >= 0)]
     intensity = echoes.intensity[met].astype(float)
     centre = vars(centre_of(echoes, plane, outline, met))
     size, sigma = (outline.size, outline.size_sigma) if fit.size is None else (fit.size, 0.0)
     return FittedTarget(
-        **centre | {"position": centre["position"] + origin}, kind=fit.kind, size=float(size),
-        size_sigma=float(sigma), points=len(met), score=fit.assessment.score,
+        **centre | {"position": centre["position"] + origin},
+        kind=fit.kind,
+        size=float(size),
+        size_sigma=float(sigma),
+        points=len(met),
+        score=fit.assessment.score,
         cloud=PointCloud(echoes.xyz[met] + origin, echoes.gps_time[met], intensity),
         view=TargetView(points, state, outline, plane.axes[:2]),
-    )  # fmt: skip
+    )

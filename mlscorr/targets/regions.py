@@ -60,7 +60,8 @@ def bright_regions(xyz: np.ndarray, intensity: np.ndarray) -> list[BrightRegion]
     edge = 2 * SETTINGS.largest_size / 3  # of a third of a neighbourhood
     cell, keys_of, keys, number = number_voxels(xyz, low, edge)
     bright = np.flatnonzero(level > _background(cell, keys_of, keys, number, level)[cell])
-    thick, long = SETTINGS.thickness, 1 / SETTINGS.smallest_width
+    thick = SETTINGS.thickness
+    long = 1 / SETTINGS.smallest_width
     limits = SETTINGS.smallest_count, np.sqrt(2) * SETTINGS.largest_size, thick, long
     table = _component_tree(xyz[bright] - low, level[bright], SETTINGS.largest_size / 10, limits)
     order, starts = sort_by_voxel(cell, len(keys_of))
@@ -90,7 +91,9 @@ def _background(cell, keys_of, keys, number, level):
         for near in neighbours(keys_of[c], keys, number):
             around += histogram[near]
             occupied += 1
-        half, below, step = around.sum() / 2, 0, 0
+        half = around.sum() / 2
+        below = 0
+        step = 0
         while below + around[step] < half:
             below += around[step]
             step += 1
@@ -107,13 +110,17 @@ def _component_tree(local, level, edge, limits):
     """
     voxel, keys_of, keys, number = number_voxels(local, np.zeros(3), edge)
     n = len(keys_of)
-    brightest, table = np.zeros(n, np.int64), np.zeros((n, 17))
-    table[:, 2:5], table[:, 5:8] = 1e12, -1e12
+    brightest = np.zeros(n, np.int64)
+    table = np.zeros((n, 17))
+    table[:, 2:5] = 1e12
+    table[:, 5:8] = -1e12
     for i in range(len(local)):
         v = voxel[i]
         brightest[v] = max(brightest[v], level[i])
         table[v, 1] += 1
-        x, y, z = local[i, 0], local[i, 1], local[i, 2]
+        x = local[i, 0]
+        y = local[i, 1]
+        z = local[i, 2]
         for axis in range(3):
             table[v, 2 + axis] = min(table[v, 2 + axis], local[i, axis])
             table[v, 5 + axis] = max(table[v, 5 + axis], local[i, axis])
@@ -126,9 +133,11 @@ def _component_tree(local, level, edge, limits):
     order = np.argsort(-brightest, kind="mergesort")
     touched = np.full(n, -1)
     result = np.empty((3 * n + 16, 17))
-    count, first = 0, 0
+    count = 0
+    first = 0
     while first < n:
-        now, end = brightest[order[first]], first
+        now = brightest[order[first]]
+        end = first
         while end < n and brightest[order[end]] == now:
             v = order[end]
             parent[v] = v
@@ -150,7 +159,8 @@ def _component_tree(local, level, edge, limits):
 @njit(cache=True)
 def _join(parent, table, voxel, beside):
     """Join the components of two voxels."""
-    a, b = root_of(parent, voxel), root_of(parent, beside)
+    a = root_of(parent, voxel)
+    b = root_of(parent, beside)
     if a == b:
         return
     parent[b] = a
@@ -165,7 +175,8 @@ def _join(parent, table, voxel, beside):
 @njit(cache=True)
 def _moments(row):
     """Mean (3,), standard deviations (3,) along axes, and axes (3, 3) as columns."""
-    n, mean = row[1], row[8:11] / row[1]
+    n = row[1]
+    mean = row[8:11] / row[1]
     spread = np.empty((3, 3))
     for axis in range(3):
         spread[axis, axis] = row[11 + axis] / n - mean[axis] ** 2
@@ -198,12 +209,14 @@ def _likeness(table, xyz, low, level, grid, shape, largest):
     order, starts, keys, number, edge = grid
     thick, end, border, ratio, directions = shape
     result = np.zeros((len(table), 2))
-    uv, level_of = np.empty((largest, 2)), np.empty(largest, np.int8)
+    uv = np.empty((largest, 2))
+    level_of = np.empty(largest, np.int8)
     for k in range(len(table)):
         row = table[k]
         mean, sigma, axes = _moments(row)
         corner = np.sqrt(6.0) * sigma[2]  # of a square, if this is one
-        around, n = border * corner, 0
+        around = border * corner
+        n = 0
         middle = key_of(mean[0], mean[1], mean[2], edge)
         for near in neighbours(middle, keys, number):
             for i in order[starts[near] : starts[near + 1]]:
@@ -221,7 +234,8 @@ def _likeness(table, xyz, low, level, grid, shape, largest):
             bright = level_of[:n] >= row[0] - step
             share = jaccard_index(uv[:n], bright, end * corner, ratio, directions)
             if share > result[k, 0]:
-                result[k, 0], result[k, 1] = share, row[0] - step
+                result[k, 0] = share
+                result[k, 1] = row[0] - step
     return result
 
 

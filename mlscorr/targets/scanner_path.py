@@ -39,7 +39,8 @@ class ScannerPath:
         gps_time : (n,) array
             One at least. Units: s.
         """
-        trajectory, time = survey.trajectory, survey.trajectory.gps_time
+        trajectory = survey.trajectory
+        time = survey.trajectory.gps_time
         before = np.searchsorted(time, gps_time.min(), "right") - 1
         before = int(np.clip(before, 0, len(time) - 2))
         epochs = slice(before, max(before + 2, np.searchsorted(time, gps_time.max()) + 1))

@@ -42,7 +42,10 @@ def search_targets(
     """
     carried = None
     for chunk in chunks:
-        whole = chunk if carried is None else PointCloud.concatenate([carried, chunk])
+        if carried is None:
+            whole = chunk
+        else:
+            whole = PointCloud.concatenate([carried, chunk])
         targets = []
         for piece in pieces(whole, survey):
             targets += fit_piece(*piece, shapes, survey.scanner, rng)
@@ -51,10 +54,14 @@ def search_targets(
 
 
 def fit_piece(
-    cloud: PointCloud, path: ScannerPath, region: BrightRegion,
-    shapes: Sequence[tuple[str, float | None]], scanner: Scanner, rng: np.random.Generator,
+    cloud: PointCloud,
+    path: ScannerPath,
+    region: BrightRegion,
+    shapes: Sequence[tuple[str, float | None]],
+    scanner: Scanner,
+    rng: np.random.Generator,
     known: Sequence[FittedTarget] = (),
-) -> list[FittedTarget]:  # fmt: skip
+) -> list[FittedTarget]:
     """The FittedTarget of the shape that fits a region best, each fitted to the end, in a list.
 
     Parameters

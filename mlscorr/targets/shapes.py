@@ -12,7 +12,10 @@ from scipy.special import ndtr
 
 from mlscorr.targets.settings import SETTINGS
 
-MISS, DARK, BRIGHT = -1, 0, 1  # what a beam did at the plane: went by, met dark, met bright
+# what a beam did at the plane: went by, met dark, met bright
+MISS = -1
+DARK = 0
+BRIGHT = 1
 ROUND, SQUARE, CHECKERED, WHITE = range(4)  # WHITE: a checkerboard's, endless
 FORMS = {
     "circle": ROUND,
@@ -70,18 +73,24 @@ def form_of(kind: str, by_edges: bool) -> int:
     by_edges : bool
         Whether intensity tells nothing.
     """
-    return SQUARE if kind == "checkerboard" and by_edges else FORMS[kind]
+    if kind == "checkerboard" and by_edges:
+        return SQUARE
+    return FORMS[kind]
 
 
 @njit(cache=True)
 def _within(x, y, half, inner, form):
     """Distance (m) inside the outline of a place in the shape's own axes, negative outside."""
     if form == WHITE:
-        return min(abs(x), abs(y)) if x * y > 0 else -min(abs(x), abs(y))
+        if x * y > 0:
+            return min(abs(x), abs(y))
+        return -min(abs(x), abs(y))
     if form != ROUND:
         return half - max(abs(x), abs(y))
     radius = np.sqrt(x * x + y * y)
-    return min(half - radius, radius - inner * half) if inner > 0 else half - radius
+    if inner > 0:
+        return min(half - radius, radius - inner * half)
+    return half - radius
 
 
 @njit(cache=True)
@@ -97,10 +106,14 @@ def distance_inside(points: np.ndarray, outline: np.ndarray, form: int) -> np.nd
     form : int
         WHITE asks for the distance from a checkerboard's crossing lines, positive on white.
     """
-    cos, sin, distance = np.cos(outline[2]), np.sin(outline[2]), np.empty(len(points))
+    cos = np.cos(outline[2])
+    sin = np.sin(outline[2])
+    distance = np.empty(len(points))
     for i in range(len(points)):
-        du, dv = points[i, 0] - outline[0], points[i, 1] - outline[1]
-        x, y = cos * du + sin * dv, cos * dv - sin * du
+        du = points[i, 0] - outline[0]
+        dv = points[i, 1] - outline[1]
+        x = cos * du + sin * dv
+        y = cos * dv - sin * du
         distance[i] = _within(x, y, outline[3] / 2, outline[4], form)
     return distance
 
@@ -154,10 +167,14 @@ def _log_likelihood(points, side, outlines, form, width, share, log_share):
     result = np.zeros(len(outlines))
     for c in range(len(outlines)):
         u, v, turn, size, inner = outlines[c]
-        cos, sin, total = np.cos(turn), np.sin(turn), 0.0
+        cos = np.cos(turn)
+        sin = np.sin(turn)
+        total = 0.0
         for i in range(len(points)):
-            du, dv = points[i, 0] - u, points[i, 1] - v
-            x, y = cos * du + sin * dv, cos * dv - sin * du
+            du = points[i, 0] - u
+            dv = points[i, 1] - v
+            x = cos * du + sin * dv
+            y = cos * dv - sin * du
             within = _within(x, y, size / 2, inner, form)
             if form != CHECKERED:
                 total += _from_table(log_share, within * side[i], width)

@@ -12,10 +12,14 @@ _, POLE, LINE, DASH = range(len(TIE_KINDS))
 
 
 def candidate_pairs(
-    features: TieFeatures, correction: np.ndarray, sigma: np.ndarray, radius: float,
-    shift: np.ndarray | None = None, pause: float = SETTINGS.pause,
+    features: TieFeatures,
+    correction: np.ndarray,
+    sigma: np.ndarray,
+    radius: float,
+    shift: np.ndarray | None = None,
+    pause: float = SETTINGS.pause,
     angle: float = SETTINGS.parallel,
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+) -> tuple[np.ndarray, np.ndarray]:
     """Pairs (k, 2) of parallel features within their gates, and distances (k,) in such units.
 
     The earlier visit's stands first. Of each visit some nearest count, of either view.
@@ -30,25 +34,42 @@ def candidate_pairs(
         Largest between directions: twice a boresight error and more, at first. Units: rad.
     """
     place = features.centre + correction
-    sigmas, noise = SETTINGS.gate_sigmas, features.variance.max(initial=0.0)
+    sigmas = SETTINGS.gate_sigmas
+    noise = features.variance.max(initial=0.0)
     limit = np.hypot(min(radius, 2 * sigmas * sigma.max(initial=0.0)), SETTINGS.cell)
     limit = np.hypot(limit, sigmas * np.sqrt(2 * (noise + SETTINGS.surface_sigma**2)))
     edge = np.sqrt(2) * limit
     cell = np.floor(place[:, :2] / edge) @ [1 << CELL_BITS, 1]
     order = np.argsort(cell, kind="stable")
-    features, place, sigma = features[order], place[order], sigma[order]
+    features = features[order]
+    place = place[order]
+    sigma = sigma[order]
     # directions that differ by the angle are as far apart as places may be; no pole is near a plane
     attitude = limit / (2 * np.sin(angle / 2)) * _attitude(features)
     points = np.column_stack([place, attitude])
-    displaced = np.zeros_like(place) if shift is None else shift[order]
+    if shift is None:
+        displaced = np.zeros_like(place)
+    else:
+        displaced = shift[order]
     views = (
-        points, displaced, features.direction, kind_number(features), features.gps_time,
-        features.scanner, features.extent, features.variance, sigma**2,
-    )  # fmt: skip
+        points,
+        displaced,
+        features.direction,
+        kind_number(features),
+        features.gps_time,
+        features.scanner,
+        features.extent,
+        features.variance,
+        sigma**2,
+    )
     limits = (
-        float(radius), np.cos(angle), pause, SETTINGS.cell, SETTINGS.gate_sigmas,
+        float(radius),
+        np.cos(angle),
+        pause,
+        SETTINGS.cell,
+        SETTINGS.gate_sigmas,
         2 * SETTINGS.surface_sigma**2,
-    )  # fmt: skip
+    )
     grid = cell[order], edge, visit_number(features), SETTINGS.neighbours
     sides = [0.0] if shift is None else [1.0, -1.0]
     parts = [_pairs_near(*grid, side, views, limits) for side in sides]
@@ -93,24 +114,34 @@ def _pairs_near(cells, edge, visit, number, side, views, limits):
     nearest to a view: of visits before where it is displaced to the side 1, of visits after where
     to the side -1, else of all others; of its own visit in each case, beyond the pause.
     """
-    points, shift, gps_time, pause = views[0], views[1], views[4], limits[2]
-    count, columns = len(points), float(1 << CELL_BITS)
-    near, square, rank = np.empty(count, np.int64), np.empty(count), np.zeros(count, np.int64)
-    pairs, distances = [], []
+    points = views[0]
+    shift = views[1]
+    gps_time = views[4]
+    pause = limits[2]
+    count = len(points)
+    columns = float(1 << CELL_BITS)
+    near = np.empty(count, np.int64)
+    square = np.empty(count)
+    rank = np.zeros(count, np.int64)
+    pairs = []
+    distances = []
     for row in range(count):
-        point, size = points[row].copy(), 0
+        point = points[row].copy()
+        size = 0
         point[:3] += side * shift[row]
         for line in (-1.0, 0.0, 1.0):
             cell = (np.floor(point[0] / edge) + line) * columns + np.floor(point[1] / edge)
             end = np.searchsorted(cells, cell + 1.0, "right")
             for i in range(np.searchsorted(cells, cell - 1.0), end):
-                later, total = visit[i] - visit[row], 0.0
+                later = visit[i] - visit[row]
+                total = 0.0
                 if later == 0 and abs(gps_time[i] - gps_time[row]) <= pause:
                     continue
                 for axis in range(point.size):
                     total += (points[i, axis] - point[axis]) ** 2
                 if total < edge**2 and later * side <= 0:
-                    near[size], square[size] = i, total
+                    near[size] = i
+                    square[size] = total
                     size += 1
         for i in near[np.argsort(square[:size])]:
             rank[visit[i]] += 1
@@ -134,11 +165,14 @@ def _distance(views, first, second, limits):
     seconds = abs(gps_time[first] - gps_time[second])
     # a pass starts with each file too: tiles of one scanner see the street at one visit
     is_pair = seconds > pause or scanner[first] != scanner[second]
-    kind, sign, cosine = kinds[first], 1.0, 0.0
+    kind = kinds[first]
+    sign = 1.0
+    cosine = 0.0
     for axis in range(3):
         cosine += direction[first, axis] * direction[second, axis]
     if kind >= LINE and cosine < 0.0:  # paint has no front
-        sign, cosine = -1.0, -cosine
+        sign = -1.0
+        cosine = -cosine
     if not is_pair or kind != kinds[second] or cosine < least_cosine:
         return np.inf
     length = along = square = 0.0

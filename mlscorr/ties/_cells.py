@@ -52,10 +52,18 @@ def hash_rows(keys: np.ndarray, count: int, size: int) -> np.ndarray:
 
 @njit(cache=True)
 def add_points(
-    xyz: np.ndarray, gps_time: np.ndarray, begin: int, grid: np.ndarray, passes: np.ndarray,
-    group: int, starts: np.ndarray, table: np.ndarray, keys: np.ndarray, moments: np.ndarray,
+    xyz: np.ndarray,
+    gps_time: np.ndarray,
+    begin: int,
+    grid: np.ndarray,
+    passes: np.ndarray,
+    group: int,
+    starts: np.ndarray,
+    table: np.ndarray,
+    keys: np.ndarray,
+    moments: np.ndarray,
     count: int,
-) -> tuple[int, int]:  # fmt: skip
+) -> tuple[int, int]:
     """Add points to the moments of their cells, until all are added or no row is left.
 
     Parameters
@@ -81,15 +89,21 @@ def add_points(
     begin, count : int
         The first point that was not added, and the rows in use then.
     """
-    low, high, segment, row = np.inf, -np.inf, -1, -1
-    last_cell, last_moment = np.int64(EMPTY), np.int64(EMPTY)
+    low = np.inf
+    high = -np.inf
+    segment = -1
+    row = -1
+    last_cell = np.int64(EMPTY)
+    last_moment = np.int64(EMPTY)
     last_x = last_y = last_z = 0.0
     for i in range(begin, len(xyz)):
         time = gps_time[i]
         if not low <= time <= high:
             segment = np.searchsorted(passes[:, 0], time, side="right") - 1
             if segment < 0 or time > passes[segment, 1]:
-                low, high, last_moment = np.inf, -np.inf, np.int64(EMPTY)
+                low = np.inf
+                high = -np.inf
+                last_moment = np.int64(EMPTY)
                 continue
             low, high = passes[segment]
         starts[segment] = min(starts[segment], time)
@@ -102,10 +116,14 @@ def add_points(
             if table[slot] == EMPTY:
                 if count == len(keys):
                     return i, count
-                table[slot], keys[count, 0], keys[count, 1] = count, cell, moment
+                table[slot] = count
+                keys[count, 0] = cell
+                keys[count, 1] = moment
                 moments[count] = 0.0
                 count += 1
-            row, last_cell, last_moment = table[slot], cell, moment
+            row = table[slot]
+            last_cell = cell
+            last_moment = moment
         sums = moments[row]
         sums[0] += 1.0
         since = time - grid[3] - second * grid[5]
@@ -116,17 +134,25 @@ def add_points(
         if follows:
             sums[11] += 1.0
             _add_products(sums, 12, x - last_x, y - last_y, z - last_z)
-        last_x, last_y, last_z = x, y, z
+        last_x = x
+        last_y = y
+        last_z = z
     return len(xyz), count
 
 
 @njit(cache=True, inline="always")
 def _split(place, grid):
     """Key of the cell that holds a place, and the way (m) to that from its middle."""
-    x, y, z = place[0] - grid[0], place[1] - grid[1], place[2] - grid[2]
-    a, b, c = np.floor(x / grid[4]), np.floor(y / grid[4]), np.floor(z / grid[4])
+    x = place[0] - grid[0]
+    y = place[1] - grid[1]
+    z = place[2] - grid[2]
+    a = np.floor(x / grid[4])
+    b = np.floor(y / grid[4])
+    c = np.floor(z / grid[4])
     cell = (((np.int64(a) << CELL_BITS) + np.int64(b)) << CELL_BITS) + np.int64(c)
-    x, y, z = x - (a + 0.5) * grid[4], y - (b + 0.5) * grid[4], z - (c + 0.5) * grid[4]
+    x = x - (a + 0.5) * grid[4]
+    y = y - (b + 0.5) * grid[4]
+    z = z - (c + 0.5) * grid[4]
     return cell, x, y, z
 
 
@@ -182,9 +208,18 @@ class CellTable:
         begin = 0
         while True:
             begin, self.count = add_points(
-                cloud.xyz, cloud.gps_time, begin, self._grid, passes, group, starts, self._table,
-                self.keys, self.moments, self.count,
-            )  # fmt: skip
+                cloud.xyz,
+                cloud.gps_time,
+                begin,
+                self._grid,
+                passes,
+                group,
+                starts,
+                self._table,
+                self.keys,
+                self.moments,
+                self.count,
+            )
             if begin == len(cloud):
                 return
             self.keys = np.concatenate([self.keys, np.empty_like(self.keys)])
@@ -212,8 +247,11 @@ class CellTable:
         group : (k,) int array
         moments : (k, 21) array
         """
-        keys, moments = self.keys[: self.count][rows], self.moments[: self.count][rows]
-        half, rest, cell = 1 << (CELL_BITS - 1), keys[:, 0], np.empty((len(keys), 3))
+        keys = self.keys[: self.count][rows]
+        moments = self.moments[: self.count][rows]
+        half = 1 << (CELL_BITS - 1)
+        rest = keys[:, 0]
+        cell = np.empty((len(keys), 3))
         for axis in (2, 1):
             cell[:, axis] = ((rest + half) & (2 * half - 1)) - half
             rest = (rest - cell[:, axis].astype(np.int64)) >> CELL_BITS

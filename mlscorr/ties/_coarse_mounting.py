@@ -15,9 +15,12 @@ from mlscorr.ties.thinning import some_blocks
 
 
 def coarse_mounting(
-    features: TieFeatures, trajectory: Trajectory, mountings: Sequence[Mounting], sigma: np.ndarray,
+    features: TieFeatures,
+    trajectory: Trajectory,
+    mountings: Sequence[Mounting],
+    sigma: np.ndarray,
     radius: float,
-) -> tuple[Mounting, ...]:  # fmt: skip
+) -> tuple[Mounting, ...]:
     """Mountings of k scanners that put the planes of all visits on each other.
 
     One lever arm and one boresight of each scanner for the whole survey, and a shift of each pass,
@@ -46,7 +49,9 @@ def coarse_mounting(
     each = np.full(3 * len(passes), max(shift, SETTINGS.surface_sigma) ** -2.0)
     prior = block_diag(*map(np.linalg.inv, known), np.diag(each))
     turn_sigma = np.sqrt(max(np.diag(covariance)[3:].max() for covariance in known))
-    state, width, at = np.zeros(len(prior)), radius / 2, tuple(mountings)
+    state = np.zeros(len(prior))
+    width = radius / 2
+    at = tuple(mountings)
     while width > SETTINGS.roughest:
         angle = SETTINGS.parallel + 2 * turn_sigma * 2 * width / radius
         for _ in range(3):
@@ -112,7 +117,8 @@ def turned_directions(features: TieFeatures, move: Callable) -> np.ndarray:
     move : function of places (n, 3) and times (n,)
         Gives places. Units: m, s.
     """
-    axis, rows = features.direction, np.arange(len(features))
+    axis = features.direction
+    rows = np.arange(len(features))
     side = np.cross(axis, np.eye(3)[np.abs(axis).argmin(axis=1)])
     side /= np.linalg.norm(side, axis=1, keepdims=True)
     centre = move(features.centre, features.gps_time)
@@ -133,7 +139,8 @@ def turned_directions(features: TieFeatures, move: Callable) -> np.ndarray:
 def _design(features, trajectory, mountings, passes, pairs, normal):
     """Rows of pairs: n (first - second) of the k mountings and of p passes' shifts (6 k + 3 p)."""
     first = 2 * len(mountings)
-    numbered, rows = dict(enumerate(mountings)), np.zeros((len(pairs), first + len(passes), 3))
+    numbered = dict(enumerate(mountings))
+    rows = np.zeros((len(pairs), first + len(passes), 3))
     number = np.searchsorted(passes, features.pass_number[pairs])
     for view, sign in ((0, 1.0), (1, -1.0)):
         columns = features.centre, features.gps_time, features.scanner

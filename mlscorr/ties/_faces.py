@@ -45,7 +45,8 @@ def join_across_faces(
     is_cut = is_thin & (points >= SETTINGS.points)[:, None]
     is_cut &= SETTINGS.cell / 2 - np.abs(mean) < 2.5 * spread
     rank = np.argsort(np.argsort(points, kind="stable"))
-    joined, ways = moments.copy(), np.zeros_like(mean)
+    joined = moments.copy()
+    ways = np.zeros_like(mean)
     for axis in np.flatnonzero(is_cut.any(axis=0)):
         rows = np.flatnonzero(is_cut[:, axis])
         way = np.sign(mean[rows, axis, None]) * np.eye(3)[axis]
@@ -74,7 +75,9 @@ def _cells_at(middle, begin, group, rows, way):
 
 def _moved(moments, way):
     """Moments (k, 21) about the middle of cells a way (k, 3) before. Units of the way: m."""
-    points, sums, moved = moments[:, :1], moments[:, 2:5], moments.copy()
+    points = moments[:, :1]
+    sums = moments[:, 2:5]
+    moved = moments.copy()
     moved[:, 2:5] += points * way
     cross = sums[:, ROWS] * way[:, COLUMNS] + way[:, ROWS] * sums[:, COLUMNS]
     moved[:, 5:11] += cross + points * way[:, ROWS] * way[:, COLUMNS]

@@ -97,11 +97,18 @@ def _dashes(dashes):
 
 def _features(kind, stripes, centre, direction, variance, extent):
     return TieFeatures(
-        pass_number=stripes.group, scanner=stripes.group, kind=np.full(len(stripes), kind),
-        gps_time=stripes.gps_time, centre=centre, direction=direction, variance=variance,
-        tilt=stripes.width / stripes.count / stripes.length, extent=extent, points=stripes.count,
+        pass_number=stripes.group,
+        scanner=stripes.group,
+        kind=np.full(len(stripes), kind),
+        gps_time=stripes.gps_time,
+        centre=centre,
+        direction=direction,
+        variance=variance,
+        tilt=stripes.width / stripes.count / stripes.length,
+        extent=extent,
+        points=stripes.count,
         sweep=stripes.pace[:, None] * stripes.along,
-    )  # fmt: skip
+    )
 
 
 def window_of(since: np.ndarray) -> np.ndarray:
@@ -151,7 +158,8 @@ def fit_stripes(crossings: Crossings, number: np.ndarray) -> Stripes:
         Of each one's piece, from 0.
     """
     count = np.bincount(number)
-    place, time = crossings.place, crossings.gps_time
+    place = crossings.place
+    time = crossings.gps_time
 
     def mean(values):
         return np.bincount(number, values) / np.maximum(count, 1)
@@ -172,10 +180,18 @@ def fit_stripes(crossings: Crossings, number: np.ndarray) -> Stripes:
         np.maximum.at(extremes[:, 1], number, column)
     length = np.maximum(values[:, 1], SETTINGS.rounding**2)
     stripes = Stripes(
-        group=crossings.group[rows], count=count, gps_time=gps_time, centre=centre, along=along,
-        ends=ends, begin=times[:, 0], end=times[:, 1], length=length,
+        group=crossings.group[rows],
+        count=count,
+        gps_time=gps_time,
+        centre=centre,
+        along=along,
+        ends=ends,
+        begin=times[:, 0],
+        end=times[:, 1],
+        length=length,
         width=np.maximum(values[:, 0], 0.0) * count / np.maximum(count - 2, 1),
-        pace=mean((time - gps_time[number]) * way) / length, edges=mean(crossings.variance),
-    )  # fmt: skip
+        pace=mean((time - gps_time[number]) * way) / length,
+        edges=mean(crossings.variance),
+    )
     kept = (count >= SETTINGS.crossings) & (stripes.width <= SETTINGS.roughest**2)
     return stripes[kept & (stripes.length >= SETTINGS.narrowest**2)]

@@ -77,37 +77,51 @@ def bright_runs(xyz: np.ndarray, intensity: np.ndarray, limits: np.ndarray) -> n
     """
     widest, contrast, steepest = limits
     runs = np.empty((len(xyz) // 3 + 1, 4), np.int64)
-    count, first, end = 0, -1, -1
+    count = 0
+    first = -1
+    end = -1
     known = mean = variance = width = 0.0
     for i in range(1, len(xyz)):
-        x, y, z = xyz[i, 0] - xyz[i - 1, 0], xyz[i, 1] - xyz[i - 1, 1], xyz[i, 2] - xyz[i - 1, 2]
+        x = xyz[i, 0] - xyz[i - 1, 0]
+        y = xyz[i, 1] - xyz[i - 1, 1]
+        z = xyz[i, 2] - xyz[i - 1, 2]
         step = np.sqrt(x * x + y * y + z * z)
         value = float(intensity[i])
         if step > widest / 5:  # fewer points don't tell the ground's intensity
-            first, end, known = -1, -1, 0.0
+            first = -1
+            end = -1
+            known = 0.0
             continue
         sigma = np.sqrt(variance + 1 / 12)  # of integers
         is_bright = known >= widest and value > mean + contrast * sigma
         if is_bright and first < 0:
-            first, width = i, 0.0
+            first = i
+            width = 0.0
         if first >= 0:
             width += step
             if width > widest:  # another surface
-                first, end, known = -1, -1, 0.0
+                first = -1
+                end = -1
+                known = 0.0
             elif is_bright:
                 end = -1
             elif end < 0:  # a single dark point may be texture
                 end = i
             else:
-                a, b = xyz[first - 1], xyz[end]
-                rise, way = abs(b[2] - a[2]), np.hypot(b[0] - a[0], b[1] - a[1])
+                a = xyz[first - 1]
+                b = xyz[end]
+                rise = abs(b[2] - a[2])
+                way = np.hypot(b[0] - a[0], b[1] - a[1])
                 if end - first > 1 and rise <= steepest * way:
                     runs[count] = first - 1, first, end - 1, end
                     count += 1
-                first, end = -1, -1
+                first = -1
+                end = -1
             continue
         if known == 0.0:
-            mean, variance, known = value, 0.0, step
+            mean = value
+            variance = 0.0
+            known = step
             continue
         share = step / min(known + step, widest)
         variance = (1.0 - share) * (variance + share * (value - mean) ** 2)

@@ -13,7 +13,10 @@ from mlscorr.ties.settings import SETTINGS
 # their mean lies pi / 4 of the radius before the axis, their variance across is radius^2 / 3, and
 # that along the beam (2/3 - pi^2 / 16) radius^2. Of a square one that shows two sides they lie
 # 1 / (1 + sin 2 a) of half its width before it, turned by a: 2 / pi on average.
-DEPTH, SQUARE_DEPTH, ACROSS, ALONG = np.pi / 4, 2 / np.pi, 1 / 3, 2 / 3 - np.pi**2 / 16
+DEPTH = np.pi / 4
+SQUARE_DEPTH = 2 / np.pi
+ACROSS = 1 / 3
+ALONG = 2 / 3 - np.pi**2 / 16
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -53,7 +56,8 @@ def covariances(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     noise : (n, 3, 3) array
         Half the mean product of the differences; NaN where neighbours are too rare. Units: m^2.
     """
-    count, followers = moments[:, :1], moments[:, 11:12]
+    count = moments[:, :1]
+    followers = moments[:, 11:12]
     mean = moments[:, 2:5] / count
     products = moments[:, 5:11] / count - mean[:, ROWS] * mean[:, COLUMNS]
     differences = moments[:, 12:18] / np.maximum(2 * followers, 1.0)
@@ -97,7 +101,8 @@ def find_shapes(
     values, axes = np.linalg.eigh(covariance[rows])
     values = np.maximum(values, SETTINGS.rounding**2)  # points of a file may be the same
     count = moments[:, 0]
-    time, local = begin + moments[:, 1] / count, moments[:, 2:5] / count[:, None]
+    time = begin + moments[:, 1] / count
+    local = moments[:, 2:5] / count[:, None]
     sight = middle + local - scanner_position(survey.trajectory, survey.mounting, time)
     sight /= np.linalg.norm(sight, axis=1, keepdims=True)
     believed = survey.scanner.range_noise**2 * np.eye(3)
@@ -109,12 +114,18 @@ def find_shapes(
     shapes = Shapes.concatenate([planes, poles])
     kind = np.repeat(["plane", "pole"], [len(planes), len(poles)])
     return TieFeatures(
-        pass_number=group[rows], scanner=group[rows], kind=kind, gps_time=time[rows],
-        centre=middle[rows] + (local[rows] + shapes.shift), direction=shapes.direction,
-        variance=shapes.variance, tilt=shapes.tilt, extent=shapes.extent,
+        pass_number=group[rows],
+        scanner=group[rows],
+        kind=kind,
+        gps_time=time[rows],
+        centre=middle[rows] + (local[rows] + shapes.shift),
+        direction=shapes.direction,
+        variance=shapes.variance,
+        tilt=shapes.tilt,
+        extent=shapes.extent,
         points=count[rows].astype(int),
         sweep=_sweep(moments[rows], values[rows], axes[rows], kind == "pole"),
-    )  # fmt: skip
+    )
 
 
 def _sweep(moments, values, axes, is_pole):
@@ -133,13 +144,15 @@ def _with_time(moments):
 
 def _planes(moments, values, axes, noise, sight):
     """Those of cells that hold a plane."""
-    normal, points = axes[:, :, 0], moments[:, 0]
+    normal = axes[:, :, 0]
+    points = moments[:, 0]
     variance, of_mean = _scatter(values[:, 0], moments, _along(normal, noise))
     slant = np.einsum("ni,ni->n", normal, sight)
     is_plane = (variance <= SETTINGS.roughest**2) & (values[:, 1] >= SETTINGS.narrowest**2)
     is_plane &= np.abs(slant) >= SETTINGS.grazing
     direction = normal * -np.sign(slant)[:, None]
-    shift, narrow = np.zeros_like(normal), values[:, 1]
+    shift = np.zeros_like(normal)
+    narrow = values[:, 1]
     rows = np.arange(len(points))
     shapes = Shapes(rows, direction, of_mean, of_mean / narrow, np.sqrt(narrow), shift)
     return shapes[is_plane]
@@ -164,7 +177,8 @@ def _scatter(variance, moments, between):
 
 def _lines(moments):
     """Number of scan lines (n,), or about so where the order of points doesn't tell."""
-    points, followers = moments[:, 0], moments[:, 11]
+    points = moments[:, 0]
+    followers = moments[:, 11]
     return np.where(_is_ordered(moments), points - followers, np.sqrt(points))
 
 
@@ -175,12 +189,15 @@ def _is_ordered(moments):
 
 def _poles(moments, values, axes, noise, sight, way):
     """Those of cells that hold a pole and nothing else."""
-    points, axis = moments[:, 0], axes[:, :, 2] * np.where(axes[:, 2, 2:] < 0, -1.0, 1.0)
+    points = moments[:, 0]
+    axis = axes[:, :, 2] * np.where(axes[:, 2, 2:] < 0, -1.0, 1.0)
     across = np.cross(axis, sight)
     across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), SETTINGS.grazing)
     beam = np.cross(across, axis)
     matrix = np.einsum("nik,nk,njk->nij", axes, values, axes)
-    side, deep, between = _along(across, matrix), _along(beam, matrix), _along(beam, noise)
+    side = _along(across, matrix)
+    deep = _along(beam, matrix)
+    between = _along(beam, noise)
     radius = np.sqrt(side / ACROSS)
     # by variance a round pole is a seventh as thick as wide; a square one, turned by 5 deg or more,
     # shows two sides, a fifth as thick as wide and up to a third as deep; a cut arc is a
@@ -208,8 +225,10 @@ def _poles(moments, values, axes, noise, sight, way):
     lines = _lines(moments)
     is_pole &= lines > 1
     variance = side / lines**2 + depth**2 * of_radius + (SETTINGS.roundness * radius) ** 2
-    tilt, extent = side / lines**2 / values[:, 2], np.sqrt(values[:, 2])
-    shift, rows = (depth * radius)[:, None] * beam, np.arange(len(points))
+    tilt = side / lines**2 / values[:, 2]
+    extent = np.sqrt(values[:, 2])
+    shift = (depth * radius)[:, None] * beam
+    rows = np.arange(len(points))
     return Shapes(rows, axis, variance, tilt, extent, shift)[is_pole]
 
 

@@ -46,7 +46,8 @@ def consistent_ties(ties: Ties, correction: np.ndarray) -> np.ndarray:
     if len(ties) == 0:
         return np.zeros(0, bool)
     order = np.argsort(ties.gps_time[:, 0])  # whose neighbours lie side by side in memory too
-    left, variance = residuals(ties, correction)[order], ties.variance[order]
+    left = residuals(ties, correction)[order]
+    variance = ties.variance[order]
     # a direction and its opposite are the same, with the other sign; pass pairs are apart in time
     points = np.column_stack([ties.gps_time / SETTINGS.window, 2 * ties.direction])[order]
     opposite = points * np.repeat([1.0, -1.0], [2, 3])

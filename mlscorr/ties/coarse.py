@@ -60,7 +60,9 @@ def coarse_correction(features: TieFeatures, radius: float) -> np.ndarray:
         before = before[is_plane[before]]
         tree = cKDTree(features.centre[before] + correction[before])
         stretch = np.floor(features.gps_time[rows] / SETTINGS.pause)
-        times, motions, middles = [], [], []
+        times = []
+        motions = []
+        middles = []
         for part in np.unique(stretch):
             inside = rows[(stretch == part) & is_plane[rows]]
             votes = _votes(features, inside, before, tree, radius)
@@ -94,10 +96,13 @@ def _votes(features, inside, before, tree, radius):
         return Votes(np.empty((0, 3)), np.empty((0, 3)), np.empty(0))
     _, near = tree.query(features.centre[inside], range(1, count + 1), distance_upper_bound=limit)
     row, column = np.nonzero(near < len(before))
-    near, row = near[row, column], inside[row]
-    first, second = features.direction[row], features.direction[before[near]]
+    near = near[row, column]
+    row = inside[row]
+    first = features.direction[row]
+    second = features.direction[before[near]]
     parallel = np.einsum("ni,ni->n", first, second) >= np.cos(SETTINGS.parallel)
-    near, row = near[parallel], row[parallel]
+    near = near[parallel]
+    row = row[parallel]
     normal = (first + second)[parallel]
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     apart = tree.data[near] - features.centre[row]
@@ -111,7 +116,8 @@ def _motion(votes, radius):
     """Shift and rotation (6,), m and rad, that most votes agree with."""
     design = np.column_stack([votes.normal, np.cross(votes.arm, votes.normal)])
     prior = np.repeat([radius, SETTINGS.parallel], 3) ** -2.0
-    motion, width = np.append(_most_votes(votes, radius), np.zeros(3)), radius / 2
+    motion = np.append(_most_votes(votes, radius), np.zeros(3))
+    width = radius / 2
     while width > SETTINGS.roughest:
         for _ in range(3):
             left = votes.misfit - design @ motion
@@ -126,14 +132,17 @@ def _most_votes(votes, radius):
     """The shift (3,) by the fullest bin of misfits of each class of directions. Units: m."""
     bins = direction_class(votes.normal)
     opposite = bins > 13  # folded: a wall to the left and one to the right vote together
-    bins, sign = np.where(opposite, 26 - bins, bins), np.where(opposite, -1.0, 1.0)
-    total, right = 1e-6 * np.eye(3), np.zeros(3)
+    bins = np.where(opposite, 26 - bins, bins)
+    sign = np.where(opposite, -1.0, 1.0)
+    total = 1e-6 * np.eye(3)
+    right = np.zeros(3)
     width = 2 * SETTINGS.roughest
     for number in np.unique(bins):
         misfit = (votes.misfit * sign)[bins == number]
         edges = np.arange(-radius - width, radius + 2 * width, width)
         count = np.convolve(np.histogram(misfit, edges)[0], [1, 2, 1], "same")
-        best, weight = edges[np.argmax(count)] + width / 2, float(count.max() - np.median(count))
+        best = edges[np.argmax(count)] + width / 2
+        weight = float(count.max() - np.median(count))
         normal = (votes.normal * sign[:, None])[bins == number].mean(axis=0)
         total += weight * np.outer(normal, normal)
         right += weight * best * normal

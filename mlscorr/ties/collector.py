@@ -36,16 +36,21 @@ class TieCollector:
         held_cells: int = SETTINGS.held_cells,
         origin: np.ndarray | None = None,
     ):
-        self._survey, self._held_cells = survey, held_cells
+        self._survey = survey
+        self._held_cells = held_cells
         self._segments = survey.trajectory.passes
         start = np.floor(survey.trajectory.gps_time[0])
-        self._origin = np.floor(survey.trajectory.position[0]) if origin is None else origin
+        if origin is None:
+            self._origin = np.floor(survey.trajectory.position[0])
+        else:
+            self._origin = origin
         self._cells = CellTable(self._origin, start, SETTINGS.cell, SETTINGS.moment)
         self._starts = np.full((len(survey.clouds), len(self._segments)), np.inf)
         self._start = start
         self._crossings: list[Crossings] = []
         self._kept: list[TieFeatures] = []
-        self._kept_in_order, self._loose = 0, 0
+        self._kept_in_order = 0
+        self._loose = 0
 
     def add(self, file: CloudFile, chunk: PointCloud) -> None:
         """Take in a chunk of a file.
@@ -78,7 +83,8 @@ class TieCollector:
             features = TieFeatures.concatenate(self._kept)
             rows = thin(features, self._origin, self._survey.trajectory)
             self._kept = [features[rows]]
-            self._kept_in_order, self._loose = len(self._kept[0]), 0
+            self._kept_in_order = len(self._kept[0])
+            self._loose = 0
 
     def _shapes(self, rows):
         """Features of cells (count,), each seen from the scanner of its file."""

@@ -12,9 +12,13 @@ from mlscorr.ties.thinning import direction_class, integer_hash, kind_number
 
 
 def pair_features(
-    features: TieFeatures, correction: np.ndarray, sigma: np.ndarray, radius: float,
-    turned: np.ndarray | None = None, pause: float = SETTINGS.pause,
-) -> Ties:  # fmt: skip
+    features: TieFeatures,
+    correction: np.ndarray,
+    sigma: np.ndarray,
+    radius: float,
+    turned: np.ndarray | None = None,
+    pause: float = SETTINGS.pause,
+) -> Ties:
     """Ties between features of two visits, or of two scanners that saw a thing on the same pass.
 
     A feature has at most one partner in each other pass of each scanner, one in its own at another
@@ -46,7 +50,10 @@ def pair_features(
     Ties
         Misclosures are of the recorded places, whatever the correction.
     """
-    present = features if turned is None else replace(features, direction=turned)
+    if turned is None:
+        present = features
+    else:
+        present = replace(features, direction=turned)
     search = correction, sigma, radius, None, pause
     pairs = _mutual(present, *candidate_pairs(present, *search))
     pairs = pairs[_beyond_chance(present, search, pairs)]
@@ -80,7 +87,8 @@ def _beyond_chance(features, search, pairs):
     where most agree: so of the displaced the fullest counts.
     """
     correction, sigma, radius, _, pause = search
-    radius, sigma = max(radius, SETTINGS.least_gate), np.maximum(sigma, SETTINGS.roughest)
+    radius = max(radius, SETTINGS.least_gate)
+    sigma = np.maximum(sigma, SETTINGS.roughest)
     widest = _largest_near(features.centre + correction, sigma, radius)
     variance = 2 * (widest**2 + features.variance + SETTINGS.surface_sigma**2)
     gate = np.minimum(radius, SETTINGS.gate_sigmas * np.sqrt(variance))

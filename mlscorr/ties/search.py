@@ -53,7 +53,8 @@ def search_ties(survey: Survey, features: TieFeatures) -> TieSearch:
     for pause in (SETTINGS.pause, least_pause(survey, features)):
         ties = pair_features(features, correction, sigma, radius, pause=pause)
         agree = consistent_ties(ties, correction)
-        left, is_pole = np.abs(residuals(ties[agree], correction)), ties.kind[agree] == "pole"
+        left = np.abs(residuals(ties[agree], correction))
+        is_pole = ties.kind[agree] == "pole"
         of_pole = features.kind == "pole"  # farther apart along the way than walls tell
         for rows, narrowed in ((is_pole, of_pole), (~is_pole, ~of_pole)):
             if rows.any():
@@ -85,7 +86,9 @@ def least_pause(survey: Survey, features: TieFeatures) -> float:
     moments = np.floor(features.gps_time / SETTINGS.moment)
     is_most = 2 * len(np.unique(moments[is_again])) > len(np.unique(moments))
     is_known = survey.mounting is not None or survey.trajectory.session is None
-    return SETTINGS.moment if is_most and is_known and not survey.scanners else SETTINGS.pause
+    if is_most and is_known and not survey.scanners:
+        return SETTINGS.moment
+    return SETTINGS.pause
 
 
 def agreeing_ties(ties: Ties, correction: np.ndarray) -> Ties:

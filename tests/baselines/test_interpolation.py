@@ -8,7 +8,9 @@ from mlscorr.baselines import Undetermined, fit_gaussian_process, fit_linear, fi
 from mlscorr.survey import Matched, Trajectory
 from tests.beds.discs import observed_discs, surveyed_discs
 
-START, CORNER = 413200.0, np.array([528000.0, 3379000.0, 20.0])  # s, m
+# s, m
+START = 413200.0
+CORNER = np.array([528000.0, 3379000.0, 20.0])
 TIME = np.arange(0.0, 200.0, 0.1)
 
 

@@ -61,7 +61,8 @@ def test_targets_nearly_on_a_plane_are_refused():
 def test_passes_over_one_target_are_one_target():
     "Four observations of two targets don't determine a rigid motion"
     place, time = targets(np.random.default_rng(5), 2)
-    twice, times = np.vstack([place, place + 0.3]), np.append(time, time + 0.2)
+    twice = np.vstack([place, place + 0.3])
+    times = np.append(time, time + 0.2)
     matched = observed(twice, times, twice, ("T1", "T2", "T3", "T4"))[[0, 1, 0, 1]]
     with pytest.raises(Undetermined, match="there are 2"):
         fit_rigid(matched)

@@ -34,7 +34,8 @@ def test_the_literal_collocation_is_that_of_the_paper(order):
     correction, found = fit_literal(drive, matched, Pos(), order)
     assert found["correlation_time"] == pytest.approx(4 * epochs_interval(time))
     arm = place - drive.at(time).position
-    n, c0 = len(time), np.array(found["c0"])
+    n = len(time)
+    c0 = np.array(found["c0"])
     b = np.zeros((3 * n, 6 * n))
     for i, (x, y, z) in enumerate(arm):
         minus_phi = [[0, z, -y], [-z, 0, x], [y, -x, 0]]

@@ -15,7 +15,8 @@ from tests.beds.streets import SHIFT, START, TIME, observed, on_a_line, targets
 
 def surface_points(rng, observations, density=400):
     "Points on the discs of observed targets, with 3 mm of noise: (PointCloud, pass numbers)"
-    xyz, time = [], []
+    xyz = []
+    time = []
     for i in range(len(observations)):
         normal = observations.normal[i]
         level = np.cross([0.0, 0.0, 1.0], normal)

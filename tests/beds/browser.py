@@ -27,11 +27,20 @@ def browse(folder, wrapper):
     path = folder / "wrapper.html"
     path.write_text(wrapper + ENDING, encoding="utf-8")
     command = [
-        BROWSER, "--headless", "--no-sandbox", "--disable-background-networking",
-        "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--allow-file-access-from-files",
-        f"--user-data-dir={folder / 'profile'}", "--window-size=1700,1000",
-        "--virtual-time-budget=30000", "--enable-logging=stderr", "--dump-dom", path.as_uri(),
-    ]  # fmt: skip
+        BROWSER,
+        "--headless",
+        "--no-sandbox",
+        "--disable-background-networking",
+        "--use-angle=swiftshader",
+        "--enable-unsafe-swiftshader",
+        "--allow-file-access-from-files",
+        f"--user-data-dir={folder / 'profile'}",
+        "--window-size=1700,1000",
+        "--virtual-time-budget=30000",
+        "--enable-logging=stderr",
+        "--dump-dom",
+        path.as_uri(),
+    ]
     process = subprocess.run(command, capture_output=True, text=True, timeout=600)
     text = re.search(r'<pre id="result">(.*?)</pre>', process.stdout, re.S)
     assert text, process.stderr[-2000:]

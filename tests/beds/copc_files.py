@@ -34,12 +34,15 @@ def pages_of(entries, start):
     low = entries[entries["key"][:, 0] < 2]
     high = entries[entries["key"][:, 0] >= 2]
     above = high["key"][:, 1:] >> (high["key"][:, 0] - 2)[:, None]
-    root, data = [low], b""
+    root = [low]
+    data = b""
     for place in np.unique(above, axis=0):
         page = high[(above == place).all(axis=1)]
         link = np.zeros(1, ENTRY)
         link["key"] = (2, *place)
-        link["start"], link["size"], link["points"] = start + len(data), page.nbytes, -1
+        link["start"] = start + len(data)
+        link["size"] = page.nbytes
+        link["points"] = -1
         data += page.tobytes()
         root.append(link)
     root = np.concatenate(root)
@@ -49,7 +52,9 @@ def pages_of(entries, start):
 def head_of(source, header):
     "Header and VLRs of a LAS file as those of a COPC, and the LASzip VLR"
     head = bytearray(source.read_bytes()[: header.offset_to_point_data])
-    old, parts, position = head[HEADER:], [], 0
+    old = head[HEADER:]
+    parts = []
+    position = 0
     while len(parts) < len(header.vlrs):
         size = 54 + struct.unpack_from("<H", old, position + 20)[0]
         parts.append(bytes(old[position : position + size]))
@@ -76,7 +81,8 @@ def write_copc(source, target, seed=1, evlr=b""):
     las = laspy.read(source)
     rng = np.random.default_rng(seed)
     records = las.points.array
-    corner, edge = las.header.mins, float(np.max(las.header.maxs - las.header.mins)) * 1.001 + 0.001
+    corner = las.header.mins
+    edge = float(np.max(las.header.maxs - las.header.mins)) * 1.001 + 0.001
     keys = drawn_nodes(np.asarray(las.xyz), (corner, edge), rng)
     present = {tuple(key) for key in keys.tolist()}
     for key in sorted(present, reverse=True):
@@ -111,9 +117,15 @@ def write_copc(source, target, seed=1, evlr=b""):
         root = file.tell() - page.nbytes
         times = records["gps_time"]
         info = struct.pack(
-            "<5d2Q2d88x", *(corner + edge / 2), edge / 2, edge / 128, root, page.nbytes,
-            times.min(), times.max(),
-        )  # fmt: skip
+            "<5d2Q2d88x",
+            *(corner + edge / 2),
+            edge / 2,
+            edge / 128,
+            root,
+            page.nbytes,
+            times.min(),
+            times.max(),
+        )
         struct.pack_into("<QI", head, 235, first, count)
         head[HEADER + 54 : HEADER + 54 + 160] = info
         file.seek(0)

@@ -16,7 +16,8 @@ def collocate_correlated(gps_time, misclosure, covariance, design, signals):
     n = len(misclosure)
     each = [Signal(_apart(signal.mixing), signal.covariance) for signal in signals]
     noise = Noise(np.asarray(covariance)[None])
-    epochs, values = np.reshape(gps_time, (1, n)), np.reshape(misclosure, (1, n))
+    epochs = np.reshape(gps_time, (1, n))
+    values = np.reshape(misclosure, (1, n))
     return collocate_rows_dense([SparseRows(epochs, values, noise, design[None], each)])
 
 

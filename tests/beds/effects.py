@@ -16,7 +16,9 @@ from mlscorr.survey import ControlPoints, Mounting, Trajectory
 START = 357_700.0  # s of the GPS week
 CENTRE = np.array([532_000.0, 3_374_000.0, 42.0])  # m, UTM
 PASSES = ((0.0, 60.0), (100.0, 160.0))  # s after START: there, and back
-TARGETS, BEAMS = 8, 500  # in each pass, on each target
+# in each pass, on each target
+TARGETS = 8
+BEAMS = 500
 WALK_INTENSITY = 6553.5  # a tenth of the full scale
 GRAZING = SETTINGS.grazing_cosine
 AGREEMENT = 1e-3  # of the analytic mean shift; second order and rounding stay below 1e-4

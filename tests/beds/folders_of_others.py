@@ -61,15 +61,19 @@ def bed():
     "Simulated once: two passes of 8 s there and back, four control points and a check point"
     place = Path(tempfile.mkdtemp(prefix="folders-of-others-"))
     scenario = Scenario(
-        drive={"duration": 8.0, "speed": 4.5,
-               "passes": [{}, {"direction": "back", "lateral": -3.0, "pause": 20.0}]},
+        drive={
+            "duration": 8.0,
+            "speed": 4.5,
+            "passes": [{}, {"direction": "back", "lateral": -3.0, "pause": 20.0}],
+        },
         targets={"control": 4, "check": 1, "hidden": 0.0, "kinds": ["circle"]},
         scanner=[{"lines_per_second": 40, "points_per_line": 400}],
-    )  # fmt: skip
+    )
     simulate(scenario, np.random.default_rng(5)).write(place)
     rows = [line.split(",") for line in (place / "control.csv").read_text().splitlines()[1:]]
-    points = [("CP"[row[-1] == "control"] + row[0][1:], *map(float, row[1:4]), row[-1])
-              for row in rows]  # fmt: skip
+    points = [
+        ("CP"[row[-1] == "control"] + row[0][1:], *map(float, row[1:4]), row[-1]) for row in rows
+    ]
     for path in place.glob("*.laz"):  # in which init finds times quickly
         laspy.read(path).write(path.with_suffix(".las"))
     return Bed(sorted(place.glob("*.las")), read_trajectory(place / "trajectory.csv"), points)
@@ -107,7 +111,8 @@ def rewritten(path, source, version="1.4", form=6, crs=None, rows=slice(None), s
     "Rows of a cloud in another version and format, its times in standard time by added seconds"
     old = laspy.read(source)
     header = laspy.LasHeader(point_format=form, version=version)
-    header.scales, header.offsets = old.header.scales, old.header.offsets
+    header.scales = old.header.scales
+    header.offsets = old.header.offsets
     header.global_encoding.gps_time_type = laspy.header.GpsTimeType(int(seconds is not None))
     add_crs(header, crs)
     las = laspy.LasData(header)
@@ -181,8 +186,10 @@ def inertial_explorer(folder, bed):
     rows = bed.table
     rows[:, 6] = geographic(bed.trajectory, CRS)[:, 5]
     lines = ["Project:     street", "Program:     Inertial Explorer Version 8.90", ""]
-    lines += ["GPSTime  Easting  Northing  H-Ell  Roll  Pitch  Heading",
-              "(sec)  (m)  (m)  (m)  (deg)  (deg)  (deg)"]  # fmt: skip
+    lines += [
+        "GPSTime  Easting  Northing  H-Ell  Roll  Pitch  Heading",
+        "(sec)  (m)  (m)  (m)  (deg)  (deg)  (deg)",
+    ]
     lines += ["  ".join(f"{value:.7f}" for value in row) for row in rows]
     (folder / "export.txt").write_text("\n".join([*lines, ""]))
 
@@ -209,8 +216,10 @@ def german(folder, bed):
 
 def office(folder, bed):
     "Kinds with their sizes, and roles, in words of an office"
-    rows = [(*point[:4], "Scheibe 0,6", "Kontrolle" if point[4] == "check" else "Pass")
-            for point in bed.points]  # fmt: skip
+    rows = [
+        (*point[:4], "Scheibe 0,6", "Kontrolle" if point[4] == "check" else "Pass")
+        for point in bed.points
+    ]
     names = ["Punkt", "Rechtswert", "Hochwert", "Höhe", "Bemerkung", "Rolle"]
     form = ["{}", *["{:.4f}"] * 3, "{}", "{}"]
     table(folder / "Passpunkte.csv", names, rows, form, ";", ",", "cp1252")
@@ -233,8 +242,12 @@ def spanish(folder, bed):
 def chinese(folder, bed):
     names = ["GPS时间", "东坐标", "北坐标", "高程", "横滚角", "俯仰角", "航向角"]
     poses(folder / "轨迹.csv", names, bed, encoding="gb18030")
-    places(folder / "控制点.csv", ["点号", "东坐标(m)", "北坐标(m)", "高程(m)"], bed,
-           encoding="gb18030")  # fmt: skip
+    places(
+        folder / "控制点.csv",
+        ["点号", "东坐标(m)", "北坐标(m)", "高程(m)"],
+        bed,
+        encoding="gb18030",
+    )
 
 
 def total_station(folder, bed):
@@ -273,7 +286,8 @@ def tiles(folder, bed):
         parts = [laspy.read(path) for path in bed.clouds]
         header = parts[0].header
         las = laspy.LasData(laspy.LasHeader(point_format=6, version="1.4"))
-        las.header.scales, las.header.offsets = header.scales, header.offsets
+        las.header.scales = header.scales
+        las.header.offsets = header.offsets
         chosen = [np.searchsorted(edges, part.x) == k for part in parts]
         for name in ("xyz", "gps_time", "intensity"):
             values = [getattr(part, name)[c] for part, c in zip(parts, chosen, strict=True)]
@@ -350,8 +364,11 @@ def photographs(folder, bed):
 
 def nested(folder, bed):
     "Folders two deep, as delivered"
-    for name, part in (("01_Scans/LAS", las), ("02_POS/export", trajectory_csv),
-                       ("03_Control", control_csv)):  # fmt: skip
+    for name, part in (
+        ("01_Scans/LAS", las),
+        ("02_POS/export", trajectory_csv),
+        ("03_Control", control_csv),
+    ):
         (folder / name).mkdir(parents=True)
         part(folder / name, bed)
 
@@ -420,7 +437,7 @@ FOLDERS = (
     OthersFolder(
         "text of Inertial Explorer",
         others(las, inertial_explorer, control_csv),
-        "Inertial Explorer.* heading = \"clockwise from true north\"",
+        'Inertial Explorer.* heading = "clockwise from true north"',
         {**TRUE, "crs": CRS},
     ),
     OthersFolder("TRJ of TerraScan", others(las, terrascan, control_csv)),
@@ -436,29 +453,38 @@ FOLDERS = (
         )
     ),
     OthersFolder(
-        "words of an office", others(las, trajectory_csv, office),
-        'Bemerkung holds Scheibe 0,6: .*control.words.Kontrolle = ',
-        {"control.columns.kind": "Bemerkung", "control.sigma": [0.003, 0.004],
-         "control.words": {"Scheibe 0,6": "circle 0.6", "Pass": "control", "Kontrolle": "check"}},
+        "words of an office",
+        others(las, trajectory_csv, office),
+        "Bemerkung holds Scheibe 0,6: .*control.words.Kontrolle = ",
+        {
+            "control.columns.kind": "Bemerkung",
+            "control.sigma": [0.003, 0.004],
+            "control.words": {"Scheibe 0,6": "circle 0.6", "Pass": "control", "Kontrolle": "check"},
+        },
     ),
     OthersFolder("workbook", others(las, trajectory_csv, workbook), NAMED, SIZE),
     OthersFolder(
-        "LAS 1.2 without a CRS", others(las_1_2, trajectory_csv, control_csv),
+        "LAS 1.2 without a CRS",
+        others(las_1_2, trajectory_csv, control_csv),
     ),
     OthersFolder(
-        "LAZ with WKT", others(with_wkt, trajectory_csv, control_csv),
+        "LAZ with WKT",
+        others(with_wkt, trajectory_csv, control_csv),
         clouds=("pass-1.laz", "pass-2.laz"),
     ),
     OthersFolder("standard time against week", others(standard_time, trajectory_csv, control_csv)),
     OthersFolder(
-        "tiles by place", others(tiles, trajectory_csv, control_csv),
+        "tiles by place",
+        others(tiles, trajectory_csv, control_csv),
         clouds=tuple(f"tile_{k}.las" for k in range(6)),
     ),
     OthersFolder(
-        "two runs, two trajectories", others(las, two_runs, control_csv),
+        "two runs, two trajectories",
+        others(las, two_runs, control_csv),
     ),
     OthersFolder(
-        "two scanners' files", others(two_scanners, trajectory_csv, control_csv),
+        "two scanners' files",
+        others(two_scanners, trajectory_csv, control_csv),
         clouds=tuple(f"{side} {k}.las" for side in ("left", "right") for k in (1, 2)),
         control=3,  # half of the points show one target too thinly
     ),
@@ -467,56 +493,67 @@ FOLDERS = (
         "PLY of CloudCompare", others(ply, trajectory_csv, control_csv), clouds=LAZ_OF_SCAN
     ),
     OthersFolder(
-        "E57 without times", others(timeless, trajectory_csv, control_csv),
+        "E57 without times",
+        others(timeless, trajectory_csv, control_csv),
         "no time of its points in scan 1 of 1.* export it with the field timeStamp, or as LAS",
         mend=others(remove("scan.e57"), las),
     ),
     OthersFolder(
-        "POFX of RIEGL", others(las, pofx, control_csv),
-        "POFX of RIEGL, whose layout is not public: export it as POF, SBET or text", mend=pof,
+        "POFX of RIEGL",
+        others(las, pofx, control_csv),
+        "POFX of RIEGL, whose layout is not public: export it as POF, SBET or text",
+        mend=pof,
     ),
     OthersFolder(
-        "check points in a file of their own", others(las, trajectory_csv, apart),
-        "2 files may be the control .*check.csv.* Join those that belong together", mend=together,
+        "check points in a file of their own",
+        others(las, trajectory_csv, apart),
+        "2 files may be the control .*check.csv.* Join those that belong together",
+        mend=together,
     ),
     OthersFolder("pictures, PDF and clutter", others(*OURS, clutter, photographs)),
     OthersFolder("folders in folders", nested),
     OthersFolder(
-        "two plausible trajectories", others(*OURS, smoothed),
+        "two plausible trajectories",
+        others(*OURS, smoothed),
         "2 files may be the trajectory.*smoothed.csv.*--set 'trajectory.file",
         {"trajectory.file": "smoothed.csv"},
     ),
     OthersFolder(
-        "a table that is no control", others(las, trajectory_csv, no_control),
+        "a table that is no control",
+        others(las, trajectory_csv, no_control),
         "weather.csv is neither .*: its columns are station, temperature, pressure. Name its",
         mend=others(remove("weather.csv"), control_csv),
     ),
     OthersFolder(
-        "easting and northing exchanged", others(las, trajectory_csv, exchanged),
-        "Easting and northing seem to be swapped", mend=control_csv,
+        "easting and northing exchanged",
+        others(las, trajectory_csv, exchanged),
+        "Easting and northing seem to be swapped",
+        mend=control_csv,
     ),
     OthersFolder(
-        "no heights", others(las, trajectory_csv, no_heights), "no column height",
-        SIZE | CHECK, mend=lambda folder, bed: places(
-            folder / "points.csv", ["Point", "Easting", "Northing", "Height"], bed),
+        "no heights",
+        others(las, trajectory_csv, no_heights),
+        "no column height",
+        SIZE | CHECK,
+        mend=lambda folder, bed: places(
+            folder / "points.csv", ["Point", "Easting", "Northing", "Height"], bed
+        ),
     ),
     OthersFolder(
-        "dates in place of seconds", others(las, dated, control_csv),
+        "dates in place of seconds",
+        others(las, dated, control_csv),
         "'2026-05-07 .*where a number belongs.* a date or a time of day: give seconds",
         mend=trajectory_csv,
     ),
+    OthersFolder("control in feet", others(las, trajectory_csv, in_feet), "feet", mend=control_csv),
     OthersFolder(
-        "control in feet", others(las, trajectory_csv, in_feet), "feet", mend=control_csv
-    ),
-    OthersFolder(
-        "each point surveyed twice", others(las, trajectory_csv, surveyed_twice),
+        "each point surveyed twice",
+        others(las, trajectory_csv, surveyed_twice),
         fault="Is each point named twice",
     ),
     OthersFolder("LAS beside LAZ", others(in_two_encodings, trajectory_csv, control_csv)),
-    OthersFolder(
-        "uppercase endings", uppercase, clouds=("PASS-1.LAS", "PASS-2.LAS")
-    ),
-)  # fmt: skip
+    OthersFolder("uppercase endings", uppercase, clouds=("PASS-1.LAS", "PASS-2.LAS")),
+)
 
 
 def nested_tables(given):
@@ -589,7 +626,9 @@ def outcome(case, place):
         return f"{type(error).__name__}: {error}"
     if case.fault is not None:
         return "fault of both"
-    return "result" if case.sentence is None else "sentence, result"
+    if case.sentence is None:
+        return "result"
+    return "sentence, result"
 
 
 if __name__ == "__main__":

@@ -68,11 +68,13 @@ def write_e57(path, scans):
             if key in scan:
                 struct(node, name, dateTimeValue=scan[key])
         prototype = libe57.StructureNode(image)
-        buffers, kept = libe57.VectorSourceDestBuffer(), []
+        buffers = libe57.VectorSourceDestBuffer()
+        kept = []
         for name, column in scan["fields"].items():
             values = np.ascontiguousarray(column)
             if values.dtype.kind in "iu":
-                low, high = int(values.min()), max(int(values.max()), 1)
+                low = int(values.min())
+                high = max(int(values.max()), 1)
                 prototype.set(name, libe57.IntegerNode(image, low, low, high))
             else:
                 single = name in scan.get("single", ())

@@ -17,7 +17,8 @@ from tests.beds.gap_inference import surveyed
 
 def noise_of_positions(g, effect, rng):
     "What noise of the recorded positions makes of rows of one time (m,)"
-    trajectory, rows = g.survey.trajectory, g.rows
+    trajectory = g.survey.trajectory
+    rows = g.rows
     moved = effect.apply(trajectory, rows.reference, rng).position - trajectory.position
     at_rows = [np.interp(rows.gps_time, trajectory.gps_time, axis) for axis in moved.T]
     return np.einsum("mi,im->m", rows.partials[:, :3], at_rows)
@@ -32,7 +33,9 @@ class Bed:
     def __init__(self, *effects):
         g = features.geometry(3, targets=24, patches=80)
         fixed = [effect for effect in effects if not effect.random]
-        self.rows, self.survey, self.effects = surveyed(g, 31, *fixed), g.survey, effects
+        self.rows = surveyed(g, 31, *fixed)
+        self.survey = g.survey
+        self.effects = effects
         for effect in effects[len(fixed) :]:
             if effect.name == "dropout":
                 moved = -effect.magnitude * (self.rows.channel == "return_rate")
@@ -65,11 +68,13 @@ class Bed:
         return float(white.squares[0])
 
     def close(self, label, simulated=None):
-        simulated, rng = simulated or self.simulated, np.random.default_rng(2)
+        simulated = simulated or self.simulated
+        rng = np.random.default_rng(2)
         return close_gap(self.found(self.cause(label)), simulated, rng)
 
     def folds(self, cause, simulated=None, progress=None):
-        simulated, rng = simulated or self.simulated, np.random.default_rng(2)
+        simulated = simulated or self.simulated
+        rng = np.random.default_rng(2)
         model = self.evidence.likely_model(cause.effect)
         case = self.found(cause)
         whole = predict_whole(case, simulated)

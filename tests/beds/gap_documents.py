@@ -159,24 +159,41 @@ def round_document(label, **changes):
 def contrasts():
     "Intensity that falls off beyond 20 m, of all 3 bins one unknown; nothing of the others"
     table = {
-        "by": "range", "edges": [0, 10, 20, 40], "real": [8660.0, 8101.6, None],
-        "simulated": [8669.5, 11342.0, None], "value": [0.9989, 0.7143, None],
-        "sigma": [0.0021, 0.0052, None], "blocks": [20.1, 17.3, 2.0],
+        "by": "range",
+        "edges": [0, 10, 20, 40],
+        "real": [8660.0, 8101.6, None],
+        "simulated": [8669.5, 11342.0, None],
+        "value": [0.9989, 0.7143, None],
+        "sigma": [0.0021, 0.0052, None],
+        "blocks": [20.1, 17.3, 2.0],
         "differs": [False, True, False],
-    }  # fmt: skip
+    }
     common = {"unit": "counts", "whole": None, "confidence": 0.99, "replicas": 400}
     said = "Real returns are 1.40 ± 0.01 times weaker than simulated ones beyond 10 m."
     return [
-        {"channel": "intensity", "figure": "ratio", "silent": "", "tables": [table],
-         "sentences": [said], **common},
-        {"channel": "edge_width", "figure": "difference", "silent": "Too few depth edges.",
-         "tables": [], "sentences": [], **common},
-    ]  # fmt: skip
+        {
+            "channel": "intensity",
+            "figure": "ratio",
+            "silent": "",
+            "tables": [table],
+            "sentences": [said],
+            **common,
+        },
+        {
+            "channel": "edge_width",
+            "figure": "difference",
+            "silent": "Too few depth edges.",
+            "tables": [],
+            "sentences": [],
+            **common,
+        },
+    ]
 
 
 def splits(rng):
     def one(by, name, unit, count, **bins):
-        before, after = rng.normal(12.0, 5.0, count), rng.normal(0.0, 2.0, count)
+        before = rng.normal(12.0, 5.0, count)
+        after = rng.normal(0.0, 2.0, count)
         return {
             "by": by,
             "name": name,
@@ -200,7 +217,8 @@ def splits(rng):
 def apart(rng):
     "Classes and correlation: lever arm up and vertical datum are one class"
     signature = rng.normal(size=(len(NAMES), 40))
-    up, datum = NAMES.index("lever_arm up"), NAMES.index("vertical_datum")
+    up = NAMES.index("lever_arm up")
+    datum = NAMES.index("vertical_datum")
     signature[datum] = signature[up] + 0.1 * signature[datum]
     matrix = np.corrcoef(signature)
     return {

@@ -34,12 +34,17 @@ def named(rows, g, signs, replicas=0):
 
 def dense(g, model):
     "V of all metric rows, written out"
-    rows, m = g.rows, len(g.rows)
-    bg, tau = g.background, model.time * g.background.correlation_time
+    rows = g.rows
+    m = len(g.rows)
+    bg = g.background
+    tau = model.time * g.background.correlation_time
     lag = np.subtract.outer(bg.gps_time, bg.gps_time)
     smooth = Covariance(model.family, tau)
     anew = smooth(np.subtract.outer(bg.clock, bg.clock))
-    growth = np.array([*model.raised, 1.0])[bg.raised] if model.raised else 1.0
+    if model.raised:
+        growth = np.array([*model.raised, 1.0])[bg.raised]
+    else:
+        growth = 1.0
     position = np.reshape(growth, (-1, 1)) * bg.position
     legs = model.scale**2 * anew * (position @ position.T)
     scale, family, time = model.attitude

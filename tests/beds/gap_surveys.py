@@ -21,7 +21,8 @@ class Read:
 
 def read_once(survey):
     "Targets, patches, and what lies about the targets"
-    collector, surroundings = PatchCollector(survey), Surroundings(survey)
+    collector = PatchCollector(survey)
+    surroundings = Surroundings(survey)
 
     def read(file):
         for chunk in read_chunks(file):

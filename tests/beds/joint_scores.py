@@ -22,7 +22,8 @@ def joint(**score):
 
 def records(number, seed=0, worlds=8):
     "Records of clean surveys, effects, noise, unknown and pairs whose evidence mostly shows them"
-    rng, made = np.random.default_rng(seed), []
+    rng = np.random.default_rng(seed)
+    made = []
     for i in range(number):
         kind = str(rng.choice(["clean", "single", "noise", "outside", "pair"]))
         size = float(rng.uniform(1.0, 8.0))

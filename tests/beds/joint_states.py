@@ -38,7 +38,10 @@ class Bed:
 
     def __init__(self, seed, families=None, n=7, r=2):
         rng = np.random.default_rng(seed)
-        names = rng.choice(ALL_FAMILIES, 3) if families is None else families
+        if families is None:
+            names = rng.choice(ALL_FAMILIES, 3)
+        else:
+            names = families
         self.families = [str(name) for name in names]
         self.covariances = [
             Covariance(name, time)
@@ -79,7 +82,8 @@ class Bed:
 
     def joint(self, times):
         "Covariance (q d, q d) of the states at several times"
-        q, d = len(times), len(self.prior)
+        q = len(times)
+        d = len(self.prior)
         total = np.zeros((q, d, q, d))
         for i, late in enumerate(times):
             for j, early in enumerate(times):

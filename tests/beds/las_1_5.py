@@ -2,7 +2,9 @@
 
 import struct
 
-OLD, NEW = 375, 393  # bytes of the header
+# bytes of the header
+OLD = 375
+NEW = 393
 OFFSET_FLAG = 64  # bit 6 of the global encoding
 
 

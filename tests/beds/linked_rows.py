@@ -30,7 +30,8 @@ class Street:
 
     def __post_init__(self):
         rng = np.random.default_rng(self.seed)
-        n, t = 2 * self.targets, self.ties
+        n = 2 * self.targets
+        t = self.ties
         there = rng.uniform(0.0, LENGTH / 2, self.targets)
         back = LENGTH - there + rng.uniform(-1.0, 1.0, self.targets)
         self.control_time = START + np.append(there, back)[:, None]
@@ -54,11 +55,13 @@ class Street:
 
     def signals(self, gps_time, seen):
         "Drift, jitter and attitude, as they enter rows (n, r, 6)"
-        drift, family = Signal(seen[:, :, :3], Covariance(self.family, self.time)), self.family
+        drift = Signal(seen[:, :, :3], Covariance(self.family, self.time))
+        family = self.family
         if self.family == INTEGRATED:
             number = (gps_time >= RESTART).astype(int)
             since = np.maximum(gps_time - np.array([START - 30.0, RESTART])[number], 0.05)
-            mixing, family = seen[:, :, :3] * ((since / 60.0) ** 1.5)[:, None, None], "matern32"
+            mixing = seen[:, :, :3] * ((since / 60.0) ** 1.5)[:, None, None]
+            family = "matern32"
             drift = Signal(mixing, Covariance(INTEGRATED, 1.0), np.log(since) + 2000.0 * number)
         jitter = Signal(0.02 * seen[:, :, :3], Covariance("exponential", self.time / 8))
         return [drift, jitter, Signal(1e-3 * seen[:, :, 3:], Covariance(family, self.time / 2))]
@@ -66,7 +69,8 @@ class Street:
     @property
     def rows(self):
         "Control and ties, of which control has a datum difference as trend"
-        n, t = 2 * self.targets, self.ties
+        n = 2 * self.targets
+        t = self.ties
         control = SparseRows(
             self.control_time,
             self.misclosure[: 3 * n].reshape(n, 3),
@@ -91,7 +95,8 @@ class Street:
     @cached_property
     def _views(self):
         "Times and signals of all views of epochs, and the row of each"
-        n, t = 2 * self.targets, self.ties
+        n = 2 * self.targets
+        t = self.ties
         seen = np.concatenate([self.control_seen.reshape(-1, 1, 6), self.tie_seen])
         times = np.concatenate([np.repeat(self.control_time.ravel(), 3), self.tie_time.ravel()])
         row = np.append(np.arange(3 * n), 3 * n + np.repeat(np.arange(t), 2))
@@ -117,7 +122,8 @@ class Street:
         pairs = zip(here, signals, strict=True)
         cross = sum(_across(a, self.asked, b, times) for a, b in pairs) @ sums.T
         prior = sum(np.einsum("qij,qij->qi", s.mixing, s.mixing) for s in here).ravel()
-        inverse, design = np.linalg.inv(self.total), self.design
+        inverse = np.linalg.inv(self.total)
+        design = self.design
         normal = design.T @ inverse @ design
         trend = np.linalg.solve(normal, design.T @ inverse @ self.misclosure)
         weights = inverse @ (self.misclosure - design @ trend)

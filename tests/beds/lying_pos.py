@@ -6,7 +6,9 @@ from scipy.spatial.transform import Rotation
 from mlscorr.survey import Matched, Trajectory
 from tests.beds.discs import observed_discs, surveyed_discs
 
-START, CORNER = 413200.0, np.array([528000.0, 3379000.0, 20.0])  # s, m
+# s, m
+START = 413200.0
+CORNER = np.array([528000.0, 3379000.0, 20.0])
 TIME = np.arange(0.0, 240.0, 0.1)
 
 
@@ -23,7 +25,8 @@ def survey(rng, error, times):
     "A recorded drive of 10 m/s that lacks an error, and targets 8 m beside it"
     path = CORNER + np.outer(TIME, [6.0, 8.0, 0.0])
     trajectory = Trajectory(START + TIME, path - error, Rotation.identity(len(TIME)))
-    rows, n = np.searchsorted(TIME, times), len(times)
+    rows = np.searchsorted(TIME, times)
+    n = len(times)
     place = trajectory.position[rows] + [6.4, -4.8, 0.5]
     name = tuple(f"T{i:02d}" for i in range(n))
     surveyed = place + error[rows] + 0.003 * rng.normal(size=(n, 3))

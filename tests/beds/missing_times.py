@@ -5,7 +5,10 @@ import numpy as np
 
 from tests.beds.foreign_clouds import write_ply
 
-START, CORNER, POINTS = 413_200.0, [532_000.0, 3_374_000.0, 40.0], 2_000  # s of week; UTM
+# s of week; UTM
+START = 413_200.0
+CORNER = [532_000.0, 3_374_000.0, 40.0]
+POINTS = 2_000
 TOML = """[cloud]
 files = ["{}"]
 
@@ -21,9 +24,11 @@ def write_survey(folder, value, cloud="pass.las", step=100):
     xyz = np.array(CORNER) + np.outer(np.arange(POINTS), [0.01, 0.001, 0.0])
     if cloud.endswith(".las"):
         header = laspy.LasHeader(point_format=6, version="1.4")
-        header.scales, header.offsets = [0.001] * 3, CORNER
+        header.scales = [0.001] * 3
+        header.offsets = CORNER
         las = laspy.LasData(header)
-        las.xyz, las.gps_time = xyz, times
+        las.xyz = xyz
+        las.gps_time = times
         las.write(folder / cloud)
     else:
         fields = dict(zip("xyz", xyz.T, strict=True)) | {"gps_time": times}

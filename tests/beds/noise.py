@@ -16,7 +16,8 @@ def add_noise(folder, cloud="pass-1.laz", is_flagged=True):
     path = folder / cloud
     las = laspy.read(path)
     control, check, _ = read_control(folder / "control.csv")
-    places, times = [], []
+    places = []
+    times = []
     for place in (control + check).position:
         near = np.argsort(np.linalg.norm(las.xyz - place, axis=1))[:EACH]
         places.append(place + rng.normal(0.0, SCATTER, (EACH, 3)))

@@ -37,7 +37,8 @@ class ObjectStore:
 
     def __call__(self, environ, start_response):
         "A request, as WSGI has it"
-        method, path = environ["REQUEST_METHOD"], environ["PATH_INFO"]
+        method = environ["REQUEST_METHOD"]
+        path = environ["PATH_INFO"]
         if self.lost and path.endswith(self.lost) and method in ("GET", "PUT"):
             self.lost_after -= 1
             if self.lost_after < 0:
@@ -45,7 +46,10 @@ class ObjectStore:
                 return [LOST]
 
         def begin(status, headers, *rest):
-            size = int(dict(headers).get("Content-Length", 0)) if method == "GET" else 0
+            if method == "GET":
+                size = int(dict(headers).get("Content-Length", 0))
+            else:
+                size = 0
             self.requests.append((method, path, environ.get("HTTP_RANGE"), size))
             return start_response(status, headers, *rest)
 

@@ -10,17 +10,29 @@ from tests.beds import tie_streets
 
 ORIGIN = np.array([447_000.3, 5_410_000.6, 120.2])  # m
 START = 413_200.25  # s
-SPEED, LENGTH, HEIGHT = 8.0, 64.0, 2.5  # m/s, m, m of the scanner above the road
-LINES, STEP = 80, 0.032  # scan lines a second, m between their points on the road
-WIDTH, DASH, GAP = 0.12, 3.0, 6.0  # m, of paint
+# m/s, m, m of the scanner above the road
+SPEED = 8.0
+LENGTH = 64.0
+HEIGHT = 2.5
+# scan lines a second, m between their points on the road
+LINES = 80
+STEP = 0.032
+# m, of paint
+WIDTH = 0.12
+DASH = 3.0
+GAP = 6.0
 EDGE = 3.4  # m from the middle line to that along the edge
 PAUSE = 60.0  # s between the passes
-DARK, BRIGHT, TEXTURE = 2_000.0, 5_000.0, 0.12  # intensities; one sigma of both, relative
+# intensities; one sigma of both, relative
+DARK = 2_000.0
+BRIGHT = 5_000.0
+TEXTURE = 0.12
 
 
 def turned(places, azimuth):
     "Places (n, 3) along the road, to its left and up as E, N, H; the road runs to an azimuth (deg)"
-    along, left = np.sin(np.radians(azimuth)), np.cos(np.radians(azimuth))
+    along = np.sin(np.radians(azimuth))
+    left = np.cos(np.radians(azimuth))
     axes = np.array([[along, left, 0.0], [-left, along, 0.0], [0.0, 0.0, 1.0]])
     return ORIGIN + places @ axes
 
@@ -41,7 +53,9 @@ def cloud(number, rng, azimuth=70.0, paint=on_paint, noise=0.004):
     ahead = np.tan(np.radians(35.0)) * (left - lateral)
     x = (LENGTH - SPEED * times if back else SPEED * times)[:, None] + ahead
     time = START + number * PAUSE + times[:, None] + np.linspace(0, 0.5 / LINES, left.shape[1])
-    x, y, time = x.ravel(), left.ravel(), time.ravel()
+    x = x.ravel()
+    y = left.ravel()
+    time = time.ravel()
     places = np.column_stack([x, y, rng.normal(0, noise, len(x))])
     level = np.where(paint(x, y), BRIGHT, DARK) * rng.normal(1.0, TEXTURE, len(x))
     return PointCloud(turned(places, azimuth), time, np.maximum(level, 0).astype(np.uint16))
@@ -50,11 +64,14 @@ def cloud(number, rng, azimuth=70.0, paint=on_paint, noise=0.004):
 def survey(azimuth=70.0, passes=2):
     "A Survey without files, a cloud for each pass"
     times = np.arange(0.0, LENGTH / SPEED + 0.02, 0.01)
-    time, place, heading = [], [], []
+    time = []
+    place = []
+    heading = []
     for number in range(passes):
         back = number % 2
         x = LENGTH - SPEED * times if back else SPEED * times
-        y, z = np.full(len(x), 1.5 if back else -1.5), np.full(len(x), HEIGHT)
+        y = np.full(len(x), 1.5 if back else -1.5)
+        z = np.full(len(x), HEIGHT)
         time.append(START + number * PAUSE + times)
         place.append(turned(np.column_stack([x, y, z]), azimuth))
         heading.append(np.full(len(x), np.radians(azimuth + 180.0 * back)))
@@ -66,7 +83,8 @@ def survey(azimuth=70.0, passes=2):
 
 def features(azimuth=70.0, seed=1, shift=(0.0, 0.0, 0.0), passes=2):
     "TieFeatures of the road, its second pass displaced by a shift (m)"
-    rng, parts = np.random.default_rng(seed), []
+    rng = np.random.default_rng(seed)
+    parts = []
     for number in range(passes):
         part = cloud(number, rng, azimuth)
         moved = part.xyz + np.where(number == 1, 1.0, 0.0) * np.array(shift)
@@ -76,6 +94,7 @@ def features(azimuth=70.0, seed=1, shift=(0.0, 0.0, 0.0), passes=2):
 
 def along_and_left(places, azimuth=70.0):
     "Places (n, 2) along the road and to the left of its middle line, of E, N, H"
-    along, left = np.sin(np.radians(azimuth)), np.cos(np.radians(azimuth))
+    along = np.sin(np.radians(azimuth))
+    left = np.cos(np.radians(azimuth))
     east, north, _ = (places - ORIGIN).T
     return np.column_stack([along * east + left * north, along * north - left * east])

@@ -42,7 +42,8 @@ class Case:
 
     def look(self, gps_time, body, rng):
         n = len(gps_time)
-        true, recorded = self.true.at(gps_time), self.recorded.at(gps_time)
+        true = self.true.at(gps_time)
+        recorded = self.recorded.at(gps_time)
         name = tuple(f"T{i:02d}" for i in range(1, n + 1))
         surveyed = true.position + true.attitude.apply(body) + SURVEYED * rng.normal(size=(n, 3))
         observed = (
@@ -112,10 +113,8 @@ def smooth_case(seed, n=16, sigma=0.1):
 
 def case_at_a_gap():
     "A drive with a constant error and a gap of 5 s, one target at each of its edges"
-    case, kept = (
-        Case(EPOCHS, CONSTANT, EPOCHS[[600, 650]], np.random.default_rng(1)),
-        EPOCHS < 60.05,
-    )
+    case = Case(EPOCHS, CONSTANT, EPOCHS[[600, 650]], np.random.default_rng(1))
+    kept = EPOCHS < 60.05
     kept[650:] = True
     case.recorded, case.true = case.recorded.select(kept), case.true.select(kept)
     return case

@@ -83,9 +83,11 @@ def share_tiles(folder):
         order = np.argsort(number // 1000, kind="stable")  # now of the one, now of the other
         whole = laspy.LasData(first.header)
         whole.points = laspy.ScaleAwarePointRecord(
-            points[order], first.header.point_format, first.header.scales,
+            points[order],
+            first.header.point_format,
+            first.header.scales,
             first.header.offsets,
-        )  # fmt: skip
+        )
         whole.write(folder / "tiles" / name)
         (folder / "first" / name).unlink()
         (folder / "second" / name).unlink()

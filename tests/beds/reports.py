@@ -126,13 +126,18 @@ def report_of(trajectory, rows):
         ],
         "warnings": [],
     }
-    first, last, size = min(times), max(times), 0.09
+    first = min(times)
+    last = max(times)
+    size = 0.09
     ends = trajectory.gps_time[[0, -1]]
     weak = (
         WeakStretch(ends[0], first, SPEED * (first - ends[0]), size, REASONS[2]),
         WeakStretch(last, ends[1], SPEED * (ends[1] - last), size, REASONS[3]),
     )
-    longest = float(np.ptp(trajectory.gaps)) if len(trajectory.gaps) else 0.0
+    if len(trajectory.gaps):
+        longest = float(np.ptp(trajectory.gaps))
+    else:
+        longest = 0.0
     return CorrectionReport(
         name="street",
         crs="EPSG:32650",
@@ -165,7 +170,8 @@ class Links(HTMLParser):
 
     def __init__(self, html):
         super().__init__()
-        self.tags, self.links = set(), []
+        self.tags = set()
+        self.links = []
         self.feed(html)
 
     def handle_starttag(self, tag, attributes):

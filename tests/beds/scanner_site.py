@@ -87,7 +87,9 @@ def _control(true, targets, look, rng, share):
     )
     if not share:
         seen = rows % 2 == scanner
-        rows, passes, scanner = rows[seen], passes[seen], scanner[seen]
+        rows = rows[seen]
+        passes = passes[seen]
+        scanner = scanner[seen]
     times = site.START + np.where(passes == 0, first[rows], second[rows]) + 0.7 * scanner
     xyz = look(times, place[rows], scanner) + site.NOISE * rng.standard_normal((len(rows), 3))
     named = tuple(names[row] for row in rows)

@@ -56,7 +56,10 @@ def scenario(effects=()):
 @cache
 def run(name=None):
     "A simulated survey with one effect, all its points, and the target that each lies on"
-    effects = () if name is None else ({"name": name, **SIZES[name]},)
+    if name is None:
+        effects = ()
+    else:
+        effects = ({"name": name, **SIZES[name]},)
     simulated = simulate(scenario(effects), np.random.default_rng(SEED))
     blocks = list(simulated.blocks())
     target = np.concatenate([simulated.scene.target[b.pulses.triangle] for b in blocks])
@@ -65,7 +68,8 @@ def run(name=None):
 
 def survey_of(simulated):
     "What is recorded, as a Survey without files"
-    targets, is_check = simulated.targets, simulated.is_check
+    targets = simulated.targets
+    is_check = simulated.is_check
 
     def some(rows):
         rows = np.flatnonzero(rows)

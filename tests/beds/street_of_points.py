@@ -29,9 +29,11 @@ def pieces(cloud, size):
 
 def target(name, place, moved=(0.3, 0.0, 0.0), gps_time=START + 20.0, left_out=(np.nan,) * 3):
     "A row of a target that was scanned at a place and surveyed beside it"
-    observed, before = np.array(place, float), np.array(moved, float)
+    observed = np.array(place, float)
+    before = np.array(moved, float)
     after = np.array([0.0, 0.0, 0.001])
-    sigma, left_out = np.full(3, np.nan), np.array(left_out, float)
+    sigma = np.full(3, np.nan)
+    left_out = np.array(left_out, float)
     vectors = (observed + before, observed, sigma, before, after, left_out)
     return TargetRow(name, 1, gps_time, "control", *vectors, True, None)
 

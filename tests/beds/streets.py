@@ -9,7 +9,8 @@ from tests.beds.discs import observed_discs, surveyed_discs
 START = np.array([523000.0, 3378000.0, 20.0])
 TIME = 413200.0
 SHIFT = np.array([0.42, -0.31, 0.27])
-LENGTH, DURATION = 400.0, 100.0
+LENGTH = 400.0
+DURATION = 100.0
 SIGMA = 0.003
 UP = np.array([0.0, 0.0, 2.0])
 
@@ -44,7 +45,8 @@ def targets(rng, n=16, first=3.0, last=97.0):
 def observed(place, time, surveyed, name=None):
     "Observations at places, matched to the control points that they belong to"
     n = len(place)
-    name = tuple(f"T{i:02d}" for i in range(n)) if name is None else name
+    if name is None:
+        name = tuple(f"T{i:02d}" for i in range(n))
     control = surveyed_discs(name, surveyed, SIGMA, normal=np.nan)
     observations = observed_discs(name, time, place, 0.001, normal=[0.6, -0.8, 0.0])
     return Matched(observations, control[control.rows(name)])

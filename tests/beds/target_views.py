@@ -26,7 +26,8 @@ def views(look, count=3):
 
 def echoes_of(seen):
     "A view as Echoes about ORIGIN"
-    cloud, path = seen.cloud, seen.path.seen_from(ORIGIN)
+    cloud = seen.cloud
+    path = seen.path.seen_from(ORIGIN)
     return Echoes(cloud.xyz - ORIGIN, cloud.gps_time, cloud.intensity, path, TOLERANCE)
 
 
@@ -41,7 +42,9 @@ def wall(white, rng, half=0.9, spacing=0.02, distance=6.0, noise=0.002):
     u, v = (grid.ravel() for grid in np.meshgrid(axis, axis, indexing="ij"))
     paint = np.asarray(white(u, v), dtype=float)
     there = np.isfinite(paint)
-    u, v, paint = u[there], v[there], paint[there]
+    u = u[there]
+    v = v[there]
+    paint = paint[there]
     xyz = np.column_stack([distance + rng.normal(0.0, noise, len(u)), u, v])
     intensity = np.where(paint > 0.5, 12_000.0, 2_000.0) * rng.normal(1.0, 0.03, len(u))
     time = 413_200.0 + 1e-4 * np.arange(len(u))

@@ -14,7 +14,10 @@ from mlscorr.ties import TieCollector
 
 ORIGIN = np.array([447_000.3, 5_410_000.6, 120.2])  # m
 START = 413_200.25  # s
-SPEED, LENGTH, HEIGHT = 8.0, 32.0, 2.5  # m/s, m, m of the scanner above the road
+# m/s, m, m of the scanner above the road
+SPEED = 8.0
+LENGTH = 32.0
+HEIGHT = 2.5
 WALL = 8.0  # m from the middle of the street to both facades
 CROSS_WALLS = (9.35, 21.15)  # m along the street
 POSTS = ((6.4, 5.55), (16.6, -5.45), (26.45, 5.55))  # m along and across
@@ -26,7 +29,9 @@ PAUSE = 60.0  # s between the passes
 
 def trajectory(passes=2):
     "There along the street and back, 2 m to the right of its middle each time; x is along"
-    time, place, heading = [], [], []
+    time = []
+    place = []
+    heading = []
     seconds = np.arange(0.0, LENGTH / SPEED + 1e-9, 0.01)
     for number in range(passes):
         back = number % 2
@@ -77,7 +82,8 @@ def post(foot, lateral, rng, n=700, radius=RADIUS, height=4.0):
     "Points (n, 3) on the half of a post that faces a scanner at some lateral place"
     side = rng.uniform(-1, 1, n)
     facing = np.sign(lateral - foot[1])
-    x, y = foot[0] + radius * side, foot[1] + facing * radius * np.sqrt(1 - side**2)
+    x = foot[0] + radius * side
+    y = foot[1] + facing * radius * np.sqrt(1 - side**2)
     return np.column_stack([x, y, rng.uniform(0.3, height, n)])
 
 
@@ -89,7 +95,9 @@ def scan(points, number, rng, noise=NOISE):
     line = np.floor(np.clip(x / SPEED, 0, LENGTH / SPEED - 1e-6) * LINES)
     angle = np.arctan2(points[:, 1] - lateral, points[:, 2] - HEIGHT)
     order = np.lexsort([angle, line])
-    points, line, angle = points[order], line[order], angle[order]
+    points = points[order]
+    line = line[order]
+    angle = angle[order]
     time = START + number * PAUSE + (line + (angle + np.pi) / (2 * np.pi + 1e-3)) / LINES
     sight = points - np.column_stack(
         [points[:, 0], np.full(len(points), lateral), np.full(len(points), HEIGHT)]
@@ -101,7 +109,8 @@ def scan(points, number, rng, noise=NOISE):
 
 def clouds(seed=1, passes=2, car=None):
     "A PointCloud for each pass; a car (n, 3) stands there in the first and hides what is below"
-    rng, parts = np.random.default_rng(seed), []
+    rng = np.random.default_rng(seed)
+    parts = []
     for number in range(passes):
         points = surfaces(rng, 2.0 if number % 2 else -2.0)
         if number == 0 and car is not None:

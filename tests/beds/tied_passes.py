@@ -9,7 +9,10 @@ from mlscorr.survey import Matched, Ties, Trajectory
 from tests.beds.discs import observed_discs, surveyed_discs
 
 ORIGIN = np.array([523_000.0, 3_378_000.0, 40.0])  # m, UTM
-START, LENGTH, PAUSE = 413_200.0, 60.0, 100.0  # s
+# s
+START = 413_200.0
+LENGTH = 60.0
+PAUSE = 100.0
 SPEED = 6.0  # m/s
 NOISE = 0.004  # m, of targets and of ties
 
@@ -31,7 +34,8 @@ class TiedPasses:
 def drift(time, seed):
     "True - recorded position (n, 3) of half a metre, by sines that no covariance family knows. m"
     rng = np.random.default_rng([seed, 7])
-    period, phase = rng.uniform(80.0, 200.0, (3, 3)), rng.uniform(0, 2 * np.pi, (3, 3))
+    period = rng.uniform(80.0, 200.0, (3, 3))
+    phase = rng.uniform(0, 2 * np.pi, (3, 3))
     size = 0.3 * np.array([1.0, 1.0, 0.5])
     turns = 2 * np.pi * time[:, None, None] / period + phase
     return size * np.sin(turns).sum(axis=2)
@@ -65,7 +69,8 @@ def _matched(times, trajectory, seed, rng):
     along = SPEED * np.minimum(times, 2 * LENGTH + PAUSE - times)  # there, or back
     place = ORIGIN + np.column_stack([along, np.full(n, 8.0), np.full(n, 3.0)])
     seen = place - drift(times, seed) + NOISE * rng.standard_normal((n, 3))
-    names, normal = tuple(f"T{i}" for i in range(n)), [0.0, -1.0, 0.0]
+    names = tuple(f"T{i}" for i in range(n))
+    normal = [0.0, -1.0, 0.0]
     observed = observed_discs(names, START + times, seen, NOISE, normal)
     return Matched(observed, surveyed_discs(names, place, 0.003, normal))
 

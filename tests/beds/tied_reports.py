@@ -18,7 +18,8 @@ def tied_report(wrong=0.0, sufficient=3):
     """
     drive = tied_passes(1, wrong=wrong)
     recorded = drive.trajectory
-    place, sigma = recorded.position + drive.error, np.full((len(recorded), 3), 0.01)
+    place = recorded.position + drive.error
+    sigma = np.full((len(recorded), 3), 0.01)
     true = Trajectory(recorded.gps_time, place, recorded.attitude, sigma, sigma / 50)
     correction = Correction(recorded, true)
     every = TieResiduals.of(drive.ties, np.ones(len(drive.ties), bool), correction)

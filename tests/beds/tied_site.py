@@ -12,11 +12,17 @@ from tests.beds.tied_passes import ties_of_planes
 
 START = 413_200.0  # s of week
 ORIGIN = np.array([523_000.0, 3_378_000.0, 40.0])  # m, UTM
-LENGTH, BACK = 40.0, 100.0  # s of a pass, and when the way back begins
+# s of a pass, and when the way back begins
+LENGTH = 40.0
+BACK = 100.0
 SPEED = 5.0  # m/s
-NOISE, SURVEYED = 0.003, 0.003  # m, one sigma
+# m, one sigma
+NOISE = 0.003
+SURVEYED = 0.003
 TIE_NOISE = 0.002  # m; a hundred such planes stand for the six hundred of 5 mm that a site gives
-POSITION, ATTITUDE = 0.005, np.radians([0.001, 0.001, 0.002])  # what the POS states
+# what the POS states
+POSITION = 0.005
+ATTITUDE = np.radians([0.001, 0.001, 0.002])
 LACKS = np.append([0.03, -0.02, 0.0], np.radians([0.3, -0.3, 0.4]))  # m, rad: half a degree
 RECORDED = Mounting(
     np.array([0.1, -0.6, 0.4]), Rotation.from_euler("xyz", [90, 0, 35], degrees=True)
@@ -90,7 +96,8 @@ def places(true, first, rng):
 def _matched(true, targets, look, rng):
     first = np.linspace(4.0, LENGTH - 4.0, targets)
     place, second = places(true, first, rng)
-    n, times = 2 * targets, START + np.append(first, second)
+    n = 2 * targets
+    times = START + np.append(first, second)
     seen = look(times, np.vstack([place, place]), NOISE * rng.standard_normal((n, 3)))
     names = tuple(f"T{i}" for i in range(targets))
     control = surveyed_discs(names, place + SURVEYED * rng.standard_normal(place.shape), SURVEYED)

@@ -44,7 +44,8 @@ def range_of(survey, cloud):
 
 def sampled(survey, change=None):
     "ChannelSample of a survey's clouds, each chunk of which something may change"
-    patches, sampler = PatchCollector(survey), SampleCollector(survey)
+    patches = PatchCollector(survey)
+    sampler = SampleCollector(survey)
     for file in survey.clouds:
         for recorded in read_chunks(file):
             chunk = recorded if change is None else change(survey, recorded)

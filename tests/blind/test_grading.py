@@ -11,8 +11,13 @@ from mlscorr.simulate._mechanisms import training_mechanisms
 from tests.beds.places import ROOT
 
 FOLDERS = (
-    "benchmarks", "mlscorr/gap", "mlscorr/effects", "tests/beds", "tests/gap", "tests/gap_training",
-)  # fmt: skip
+    "benchmarks",
+    "mlscorr/gap",
+    "mlscorr/effects",
+    "tests/beds",
+    "tests/gap",
+    "tests/gap_training",
+)
 SETTERS = sorted(
     path
     for folder in FOLDERS
@@ -37,7 +42,8 @@ def test_no_pair_of_direction_and_covariate_is_in_both_halves():
 
 def opened(text):
     "By what a Python text could reach the half that grades"
-    paths, names = [], []
+    paths = []
+    names = []
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Import):
             paths += [alias.name for alias in node.names]
@@ -59,20 +65,23 @@ def test_no_study_opens_the_grading_half(path):
     assert not opened(path.read_text())
 
 
-@pytest.mark.parametrize("text", [
-    "from mlscorr.blind._grading import grading_mechanisms",
-    "from mlscorr.blind.cases import outside_mechanisms",
-    "from mlscorr.blind import cases",
-    "from mlscorr import blind",
-    "import mlscorr.blind.cases as cases",
-    "from mlscorr.pipeline.blind import make_cases",
-    "from mlscorr.simulate._mechanisms import mechanisms",
-    "from mlscorr.simulate import mechanisms as every",
-    "import mlscorr.simulate._mechanisms as all_of_them",
-    "half = [each for each in known if not each.is_for_training]",
-    "half = getattr(each, 'is_for_training')",
-    "importlib.import_module('mlscorr.blind._grading')",
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "text",
+    [
+        "from mlscorr.blind._grading import grading_mechanisms",
+        "from mlscorr.blind.cases import outside_mechanisms",
+        "from mlscorr.blind import cases",
+        "from mlscorr import blind",
+        "import mlscorr.blind.cases as cases",
+        "from mlscorr.pipeline.blind import make_cases",
+        "from mlscorr.simulate._mechanisms import mechanisms",
+        "from mlscorr.simulate import mechanisms as every",
+        "import mlscorr.simulate._mechanisms as all_of_them",
+        "half = [each for each in known if not each.is_for_training]",
+        "half = getattr(each, 'is_for_training')",
+        "importlib.import_module('mlscorr.blind._grading')",
+    ],
+)
 def test_every_way_to_the_grading_half_is_seen(text):
     "By its own name, through cases of the blind check, by the whole grammar, or by a text"
     assert opened(text)

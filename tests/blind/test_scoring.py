@@ -62,7 +62,8 @@ def test_recovers_the_rates_of_hand_made_answers():
     found = (label("single", "range_bias"), answer("range_bias", shrink=0.98))
     missed = (label("single", "range_bias"), answer("none"))
     rows, told = scored(*clean, *[found] * 48, *[missed] * 2)
-    alarm, right = rows["clean: a cause claimed"], rows["right at 3 MDB and more"]
+    alarm = rows["clean: a cause claimed"]
+    right = rows["right at 3 MDB and more"]
     assert (alarm["cases"], alarm["value"], alarm["reached"]) == (100, 0.01, True)
     assert (right["cases"], right["value"], right["reached"]) == (50, 0.96, True)
     by_class = rows["right at 3 MDB and more, by class"]

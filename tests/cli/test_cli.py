@@ -352,7 +352,8 @@ def test_a_new_folder_names_no_file_of_an_earlier_run(tmp_path, capsys):
 def test_a_mounting_that_a_command_needs_is_a_fault_of_survey_toml(command, survey):
     "Exit code 2, as for other keys that are missing there, and the section is named"
     text = (survey / "survey.toml").read_text()
-    start, end = text.index("[mounting]"), text.index("[scanner]")
+    start = text.index("[mounting]")
+    end = text.index("[scanner]")
     (survey / "survey.toml").write_text(text[:start] + text[end:])
     ended = CliRunner().invoke(app, [command, str(survey), "-o", str(survey.parent / "out")])
     assert ended.exit_code == 2 and "survey.toml has no [mounting]" in ended.stderr, ended.stderr
@@ -365,7 +366,10 @@ def test_a_survey_toml_without_control_is_a_fault_of_it(command, survey):
     text = (survey / "survey.toml").read_text().partition("[scene]")[0]
     for content, code in ((text, 3), (text.replace('[control]\nfile = "control.csv"', ""), 2)):
         (survey / "survey.toml").write_text(content)
-        out = [] if command == "check" else ["-o", str(survey.parent / "out")]
+        if command == "check":
+            out = []
+        else:
+            out = ["-o", str(survey.parent / "out")]
         with warnings.catch_warnings(action="ignore"):
             ended = CliRunner().invoke(app, [command, str(survey), *out])
         assert ended.exit_code == code and "control" in ended.output, ended.output

@@ -23,7 +23,8 @@ def random_matrix(seed):
     rng = np.random.default_rng(seed)
     sizes, edges = random_graph(seed)
     pattern = Pattern.of(sizes, edges)
-    values, n = pattern.zeros, pattern.states
+    values = pattern.zeros
+    n = pattern.states
     dense = np.zeros((n, n))
     for a, b in np.vstack([edges, np.tile(np.arange(len(sizes))[:, None], 2)]):
         i, j = sorted((pattern.place[a], pattern.place[b]))

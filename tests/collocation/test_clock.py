@@ -23,7 +23,8 @@ def test_the_covariance_is_that_of_an_integrated_random_walk():
     gps_time = START + np.sort(np.random.default_rng(1).uniform(0.0, 300.0, 50))
     clock, sigma, since, number = grown(gps_time)
     covariance = Covariance("integrated", 1.0)(np.abs(clock[:, None] - clock))
-    early, late = np.minimum(since[:, None], since), np.maximum(since[:, None], since)
+    early = np.minimum(since[:, None], since)
+    late = np.maximum(since[:, None], since)
     intensity = 3 * 0.01**2  # m^2/s^3: the variance is intensity t^3 / 3
     walk = np.where(number[:, None] == number, early**2 * (3 * late - early) / 6, 0.0)
     assert np.outer(sigma, sigma) * covariance == pytest.approx(intensity * walk, abs=1e-9)
@@ -32,8 +33,10 @@ def test_the_covariance_is_that_of_an_integrated_random_walk():
 @pytest.mark.parametrize("seed", range(3))
 def test_the_recursion_equals_the_dense_formula_on_clocks(seed):
     "Prediction and its covariance to 1e-9 m, with one signal on its own clock and one on time"
-    rng, n = np.random.default_rng(seed), 30
-    gps_time, at = START + rng.uniform(0.0, 300.0, n), START + np.linspace(-5.0, 310.0, 150)
+    rng = np.random.default_rng(seed)
+    n = 30
+    gps_time = START + rng.uniform(0.0, 300.0, n)
+    at = START + np.linspace(-5.0, 310.0, 150)
 
     def signals(times):
         clock, sigma, *_ = grown(times)
@@ -43,7 +46,8 @@ def test_the_recursion_equals_the_dense_formula_on_clocks(seed):
             Signal(steady, Covariance("matern32", 30.0)),
         ]
 
-    observed, predicted = signals(gps_time), signals(at)
+    observed = signals(gps_time)
+    predicted = signals(at)
     given = rng.normal(size=(n, 3)), Noise(np.tile(1e-4 * EYE, (n, 1, 1))), np.tile(EYE, (n, 1, 1))
     wanted = np.tile(EYE, (150, 1, 1)), [s.mixing for s in predicted], [s.clock for s in predicted]
     fast = collocate(gps_time, *given, observed)

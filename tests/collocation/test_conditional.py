@@ -27,9 +27,12 @@ def layout_of(family):
 def test_gains_are_those_of_the_joint_covariance(family, at):
     "Least squares prediction from the states at both nodes, and the variance that it leaves"
     layout, covariance = layout_of(family)
-    d, rate, prior = covariance.states, covariance.rate, stationary(family)
+    d = covariance.states
+    rate = covariance.rate
+    prior = stationary(family)
     about = neighbours(1, d, 0)
-    about.before[0], about.after[0] = 0.0, 7.0
+    about.before[0] = 0.0
+    about.after[0] = 7.0
     fill_spans(layout, about)
     fill_gains(layout, about, np.array([at]))
     whole = carried(family, 7.0 * rate) @ prior
@@ -57,15 +60,24 @@ def test_an_epoch_takes_mean_and_covariance_from_the_nodes():
     "At the node before, mean and variance of two quantities are those of its first state"
     layout, _ = layout_of("matern32")
     about = neighbours(1, 2, 0)
-    about.before[0], about.after[0] = 0.0, 7.0
+    about.before[0] = 0.0
+    about.after[0] = 7.0
     fill_spans(layout, about)
-    about.columns[:, 0], about.joint[0, 0] = (0.4, 0.0, 9.0, 9.0), 0.09
-    mean, covariance = np.empty((1, 2)), np.empty((1, 2, 2))
+    about.columns[:, 0] = (0.4, 0.0, 9.0, 9.0)
+    about.joint[0, 0] = 0.09
+    mean = np.empty((1, 2))
+    covariance = np.empty((1, 2, 2))
     mixing = np.array([[[1.0], [2.0]]])
     epochs = Epochs(
-        np.zeros(1), np.zeros((1, 1)), np.zeros((1, 2, 0)), mixing, np.zeros(0), np.zeros((0, 0)),
-        mean, covariance,
-    )  # fmt: skip
+        np.zeros(1),
+        np.zeros((1, 1)),
+        np.zeros((1, 2, 0)),
+        mixing,
+        np.zeros(0),
+        np.zeros((0, 0)),
+        mean,
+        covariance,
+    )
     predict_between(layout, about, epochs, 0, 1)
     assert mean[0] == pytest.approx([0.4, 0.8])
     assert covariance[0] == pytest.approx(np.array([[0.09, 0.18], [0.18, 0.36]]))
@@ -78,7 +90,8 @@ def test_covariances_of_short_steps_are_inverted(family, step):
 
     covariance = Covariance(family, 10.0)
     layout = Layout.of([Signal(np.ones((1, 1, 1)), covariance)])
-    spread, inverse = np.zeros((1, 3, 3)), np.zeros((1, 3, 3))
+    spread = np.zeros((1, 3, 3))
+    inverse = np.zeros((1, 3, 3))
     fill_noise(layout, np.array([step]), spread)
     _invert(spread, layout.states, inverse)
     d = covariance.states

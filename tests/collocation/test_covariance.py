@@ -47,7 +47,8 @@ def test_smoother_families_move_less_in_a_short_time():
 
 def states_of(covariance, span):
     "F and Q over a span of time as matrices"
-    d, x = covariance.states, covariance.rate * span
+    d = covariance.states
+    x = covariance.rate * span
     triangle = np.zeros((3, 3))
     triangle[np.triu_indices(3)] = process_noise(d, x)
     spread = triangle + np.triu(triangle, 1).T

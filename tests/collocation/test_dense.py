@@ -72,8 +72,10 @@ def test_equals_the_textbook_with_explicit_inverses(seed):
     "Trend, signal and their covariances equal Eq. 13-15 written out with inverses, to 1e-9"
     case = Case(seed)
     solved = case.solve()
-    joint, m = case.joint(), len(case.gps_time)
-    a, b = case.design, case.asked_design.reshape(-1, case.design.shape[1])
+    joint = case.joint()
+    m = len(case.gps_time)
+    a = case.design
+    b = case.asked_design.reshape(-1, case.design.shape[1])
     weight = np.linalg.inv(joint[:m, :m] + case.noise)
     cofactor = np.linalg.inv(a.T @ weight @ a)
     trend = cofactor @ a.T @ weight @ case.misclosure  # Eq. 13
@@ -114,7 +116,8 @@ def test_equals_gaussian_process_regression_without_a_trend(family, nu):
     "Without trend, prediction, sigma and likelihood are scikit-learn's, to 1e-8"
     rng = np.random.default_rng(1)
     time = np.sort(rng.uniform(0, SPAN, 30))
-    values, asked = 0.3 * rng.normal(size=30), rng.uniform(-30, SPAN + 30, 50)
+    values = 0.3 * rng.normal(size=30)
+    asked = rng.uniform(-30, SPAN + 30, 50)
     kernel = ConstantKernel(0.04, "fixed") * Matern(25.0, "fixed", nu)
     process = GaussianProcessRegressor(kernel, alpha=1e-4, optimizer=None)
     process.fit(time[:, None], values)
@@ -147,16 +150,21 @@ def test_rows_of_two_epochs_equal_the_textbook(family):
 def test_what_observations_leave_of_others_together_equals_the_textbook(seed):
     "The whole covariance of what is asked, every row with every other, by inverses to 1e-9"
     case = Case(seed)
-    joint, m, q = case.joint(), len(case.gps_time), 4 * len(case.asked)
-    a, b = case.design, case.asked_design.reshape(q, -1)
-    weight, cross = np.linalg.inv(joint[:m, :m] + 1e-4 * np.eye(m)), joint[m:, :m]
+    joint = case.joint()
+    m = len(case.gps_time)
+    q = 4 * len(case.asked)
+    a = case.design
+    b = case.asked_design.reshape(q, -1)
+    weight = np.linalg.inv(joint[:m, :m] + 1e-4 * np.eye(m))
+    cross = joint[m:, :m]
     left = b - cross @ weight @ a
     error = joint[m:, m:] - cross @ weight @ cross.T
     error += left @ np.linalg.inv(a.T @ weight @ a) @ left.T
 
     def rows(times, design, mixings):
         "Single rows, whose noise is 1 cm"
-        n, pairs = len(times), zip(mixings, case.covariances, strict=True)
+        n = len(times)
+        pairs = zip(mixings, case.covariances, strict=True)
         signals = [Signal(mixing.reshape(n, 1, -1), covariance) for mixing, covariance in pairs]
         noise = Noise(np.full((n, 1, 1), 1e-4))
         return SparseRows(times[:, None], np.zeros((n, 1)), noise, design[:, None], signals)
@@ -170,7 +178,8 @@ def test_what_observations_leave_of_others_together_equals_the_textbook(seed):
 def test_a_polynomial_is_recovered_whatever_the_signal(order):
     "Misclosures that are a polynomial are explained by the trend alone, at all epochs to 1e-9 m"
     rng = np.random.default_rng(order)
-    gps_time, asked = START + np.linspace(0, SPAN, 12), START + rng.uniform(0, SPAN, 100)
+    gps_time = START + np.linspace(0, SPAN, 12)
+    asked = START + rng.uniform(0, SPAN, 100)
     truth = rng.normal(size=order + 1)
     signal = Signal(np.full((12, 1), 0.5), Covariance("matern32", 40.0))
     design = legendre(gps_time, order)
@@ -207,11 +216,13 @@ def test_stated_covariances_are_those_of_the_errors(family):
     each with 4 x 5 predicted values; the mean statistic within 0.6 of 4 (eight standard
     deviations of independent draws: those of one survey are correlated).
     """
-    statistics, covariance = [], Covariance(family, 40.0)
+    statistics = []
+    covariance = Covariance(family, 40.0)
     for seed in range(300):
         case = Case(seed, asked=5)
         case.covariances = covariance, Covariance("exponential", 8.0)
-        m, joint = len(case.gps_time), case.joint()
+        m = len(case.gps_time)
+        joint = case.joint()
         joint[:m, :m] += case.noise
         values, vectors = np.linalg.eigh(joint)
         drawn = vectors @ (np.sqrt(np.maximum(values, 0)) * case.rng.normal(size=len(joint)))
@@ -234,7 +245,9 @@ def test_leave_out_equals_leaving_out(seed):
     kept = np.setdiff1d(np.arange(len(case.gps_time)), rows)
     joint = case.joint()[: len(case.gps_time), : len(case.gps_time)] + case.noise
     weight = np.linalg.inv(joint[np.ix_(kept, kept)])
-    a, b, cross = case.design[kept], case.design[rows], joint[np.ix_(rows, kept)]
+    a = case.design[kept]
+    b = case.design[rows]
+    cross = joint[np.ix_(rows, kept)]
     cofactor = np.linalg.inv(a.T @ weight @ a)
     trend = cofactor @ a.T @ weight @ case.misclosure[kept]
     expected = case.misclosure[rows] - b @ trend
@@ -247,7 +260,8 @@ def test_leave_out_equals_leaving_out(seed):
 
 def test_rows_that_carry_the_trend_cannot_be_left_out():
     "A trend that needs an observation is not predicted without it: refused, with the numbers"
-    gps_time, design = START + np.array([0.0, 0.0, 100.0]), np.array([[1, 0], [1, 0], [1, 1.0]])
+    gps_time = START + np.array([0.0, 0.0, 100.0])
+    design = np.array([[1, 0], [1, 0], [1, 1.0]])
     solved = collocate_correlated(gps_time, np.zeros(3), 1e-4 * np.eye(3), design, [])
     assert [solved.determined_without([row]) for row in range(3)] == [True, True, False]
     with pytest.raises(ValueError, match=r"Without the 1 observations .* the other 2 do not"):
@@ -256,7 +270,8 @@ def test_rows_that_carry_the_trend_cannot_be_left_out():
 
 def test_origin_of_time_and_order_of_observations_do_not_matter():
     "A day later, shuffled: the same trend, likelihood and predictions to 1e-7"
-    case, day = Case(4), 86_400.0
+    case = Case(4)
+    day = 86_400.0
     solved = case.solve()
     mean, covariance = solved.predict(case.asked, case.asked_design, case.asked_mixing)
     order = case.rng.permutation(len(case.gps_time))
@@ -297,7 +312,8 @@ def test_a_trend_without_enough_observations_is_refused():
 
 def test_contradicting_observations_without_noise_are_refused():
     "Two observations of one epoch and no noise have no joint density: refused, saying why"
-    gps_time, one = START + np.array([0.0, 50.0, 50.0]), np.ones((3, 1))
+    gps_time = START + np.array([0.0, 50.0, 50.0])
+    one = np.ones((3, 1))
     signal = Signal(one, Covariance("matern32", 30.0))
     with pytest.raises(ValueError, match="not positive definite: two observations of one time"):
         collocate_correlated(gps_time, np.zeros(3), np.zeros((3, 3)), one, [signal])

@@ -45,11 +45,15 @@ def test_rows_of_one_epoch_are_solved_as_by_the_recursion(family):
 
 def test_least_squares_needs_no_signal():
     "Without signals the trend is the mean, and its sigma that of the mean of all rows"
-    n, none = 10, []
+    n = 10
+    none = []
     rows = SparseRows(
-        START + np.arange(n)[:, None], np.full((n, 1), 0.3), Noise(np.full((n, 1, 1), 1e-4)),
-        np.ones((n, 1, 1)), none,
-    )  # fmt: skip
+        START + np.arange(n)[:, None],
+        np.full((n, 1), 0.3),
+        Noise(np.full((n, 1, 1), 1e-4)),
+        np.ones((n, 1, 1)),
+        none,
+    )
     solved = collocate_rows([rows])
     assert solved.trend == pytest.approx([0.3])
     assert np.sqrt(solved.trend_covariance) == pytest.approx(0.01 / np.sqrt(n))
@@ -159,6 +163,7 @@ def test_no_tie_at_all_changes_nothing():
         ties.design[:0],
         signals,
     )
-    solved, alone = collocate_rows([control, empty]), collocate_rows([control])
+    solved = collocate_rows([control, empty])
+    alone = collocate_rows([control])
     assert solved.log_likelihood == pytest.approx(alone.log_likelihood, abs=1e-9)
     assert np.abs(street.predict(solved)[0] - street.predict(alone)[0]).max() < 1e-9

@@ -24,13 +24,18 @@ def interpolated(bed, gps_time, mixing, design=None, trend=None, root=None):
     q, r, _ = mixing.shape
     clocks = np.repeat(bed.gps_time[:, None], 3, axis=1)
     asked = np.repeat(gps_time[:, None], 3, axis=1)
-    mean, covariance = np.empty((q, r)), np.empty((q, r, r))
+    mean = np.empty((q, r))
+    covariance = np.empty((q, r, r))
     epochs = Epochs(
-        gps_time, asked, np.zeros((q, r, p)) if design is None else design, mixing,
+        gps_time,
+        asked,
+        np.zeros((q, r, p)) if design is None else design,
+        mixing,
         np.zeros(p) if trend is None else trend,
         np.zeros((p, p)) if root is None else root,
-        mean, covariance,
-    )  # fmt: skip
+        mean,
+        covariance,
+    )
     interpolate(bed.gps_time, clocks, bed.layout, states, same, following, epochs)
     return mean, covariance
 
@@ -38,7 +43,8 @@ def interpolated(bed, gps_time, mixing, design=None, trend=None, root=None):
 def dense(bed, mixing):
     "What all columns and the covariance of the signal at ASKED are by the joint covariance"
     n, r, c = bed.columns.shape
-    d, h = bed.layout.size, bed.observing
+    d = bed.layout.size
+    h = bed.observing
     joint = bed.joint([*bed.gps_time, *ASKED])
     for i in range(len(ASKED)):
         here = slice((n + i) * d, (n + i + 1) * d)
@@ -64,9 +70,13 @@ def test_signals_are_those_of_the_joint_covariance(bed):
 def test_the_trend_adds_what_the_signal_does_not_absorb(bed):
     "Mean + A x, and (A - B S A_l) C (A - B S A_l)^T beside the signal's covariance"
     rng = np.random.default_rng(2)
-    q, r, p = len(ASKED), 3, 2
-    mixing, design = rng.normal(size=(q, r, 5)), rng.normal(size=(q, r, p))
-    trend, root = rng.normal(size=p), np.triu(rng.normal(size=(p, p)))
+    q = len(ASKED)
+    r = 3
+    p = 2
+    mixing = rng.normal(size=(q, r, 5))
+    design = rng.normal(size=(q, r, p))
+    trend = rng.normal(size=p)
+    root = np.triu(rng.normal(size=(p, p)))
     mean, covariance = interpolated(bed, ASKED, mixing, design, trend, root)
     for i, (columns, signal) in enumerate(dense(bed, mixing)):
         lacking = (design[i] - columns[:, :p]) @ root
@@ -76,7 +86,8 @@ def test_the_trend_adds_what_the_signal_does_not_absorb(bed):
 
 def test_one_process_of_one_quantity_takes_the_same_way():
     "The shortcut for a single process gives what two quantities of it give"
-    n, gps_time = 9, START + np.arange(9) * 4.0
+    n = 9
+    gps_time = START + np.arange(9) * 4.0
     asked = START + np.linspace(-5.0, 40.0, 31)
     unit = np.ones((n, 1, 1))
     signal = Signal(0.3 * unit, Covariance("matern52", 11.0))
@@ -93,7 +104,8 @@ def test_one_process_of_one_quantity_takes_the_same_way():
 
 def test_the_order_of_epochs_does_not_matter():
     "Asked backward or at random, each epoch gets bit for bit the same: the search leaves no trace"
-    bed, rng = BEDS[0], np.random.default_rng(4)
+    bed = BEDS[0]
+    rng = np.random.default_rng(4)
     asked = START + np.sort(rng.uniform(-20.0, 90.0, 60))
     mixing = rng.normal(size=(60, 2, 5))
     mean, covariance = interpolated(bed, asked, mixing)

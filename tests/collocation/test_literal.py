@@ -75,12 +75,19 @@ def test_squared_rms_is_a_parabola_in_c0_that_starts_at_least_squares(seed):
 def test_equals_the_printed_equations():
     "Trend and signal are Eq. 13 and 15 written out with inverses, two signals, to 1e-9"
     rng = np.random.default_rng(1)
-    n, q = 9, 20
-    gps_time, asked = START + rng.uniform(0, SPAN, n), START + rng.uniform(0, SPAN, q)
-    design, asked_design = rng.normal(size=(n, 3, 6)), rng.normal(size=(q, 3, 6))
-    partials, asked_partials = rng.normal(size=(2, n, 3, 3)), rng.normal(size=(2, q, 3, 3))
-    variance, base, times = rng.uniform(0.1, 1, (2, n, 3)), rng.uniform(0, 1, (2, 3)), (30.0, 80.0)
-    misclosure, noise = rng.normal(size=(n, 3)), Noise(np.broadcast_to(0.01 * np.eye(3), (n, 3, 3)))
+    n = 9
+    q = 20
+    gps_time = START + rng.uniform(0, SPAN, n)
+    asked = START + rng.uniform(0, SPAN, q)
+    design = rng.normal(size=(n, 3, 6))
+    asked_design = rng.normal(size=(q, 3, 6))
+    partials = rng.normal(size=(2, n, 3, 3))
+    asked_partials = rng.normal(size=(2, q, 3, 3))
+    variance = rng.uniform(0.1, 1, (2, n, 3))
+    base = rng.uniform(0, 1, (2, 3))
+    times = (30.0, 80.0)
+    misclosure = rng.normal(size=(n, 3))
+    noise = Noise(np.broadcast_to(0.01 * np.eye(3), (n, 3, 3)))
     signals = [LiteralSignal(*row) for row in zip(partials, variance, base, times, strict=True)]
     solved = collocate_literal(gps_time, misclosure, noise, design, signals)
     mean, _ = solved.predict(asked, asked_design, list(asked_partials))
@@ -91,7 +98,8 @@ def test_equals_the_printed_equations():
             column = 3 * (signal * n + i)
             b[3 * i : 3 * i + 3, column : column + 3] = partials[signal, i]
     weight = np.linalg.inv(b @ np.diag(variance.ravel()) @ b.T + 0.01 * np.eye(3 * n))
-    a, l_ = design.reshape(3 * n, 6), misclosure.ravel()
+    a = design.reshape(3 * n, 6)
+    l_ = misclosure.ravel()
     trend = np.linalg.inv(a.T @ weight @ a) @ a.T @ weight @ l_  # Eq. 13
     assert np.abs(solved.trend - trend).max() < 1e-9
     for e in range(q):

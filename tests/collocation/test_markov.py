@@ -13,7 +13,8 @@ class Survey:
 
     def __init__(self, seed, families=None, n=14, p=3, asked=30, groups=6):
         rng = np.random.default_rng(seed)
-        families = rng.choice(FAMILIES, 3) if families is None else families
+        if families is None:
+            families = rng.choice(FAMILIES, 3)
         times = 10 ** rng.uniform(0, 3, 3)
         self.covariances = [Covariance(f, t) for f, t in zip(families, times, strict=True)]
         self.gps_time = START + rng.uniform(0, SPAN, n)
@@ -58,7 +59,8 @@ def test_recursion_equals_the_dense_formula(seed, families):
     millisecond apart; epochs at, between, before and after; errors shared by several passes.
     """
     survey = Survey(seed, families)
-    solved, expected = survey.solve(), survey.solve(collocate_dense)
+    solved = survey.solve()
+    expected = survey.solve(collocate_dense)
     assert_same(solved, expected, 1e-9)
     for here, there in zip(survey.predict(solved), survey.predict(expected), strict=True):
         assert np.abs(here - there).max() < 1e-9
@@ -106,7 +108,8 @@ def test_nearly_singular_surveys_are_solved_to_the_last_digits(family, correlati
     values, vectors = np.linalg.eigh(joint)
     misclosure = vectors @ (np.sqrt(np.maximum(values, 0)) * rng.normal(size=16))
     misclosure += sigma * rng.normal(size=16)
-    one, many = np.ones((16, 1, 1)), np.ones((len(asked), 1, 1))
+    one = np.ones((16, 1, 1))
+    many = np.ones((len(asked), 1, 1))
     noise = Noise(sigma**2 * one)
     solved = collocate(
         gps_time, misclosure[:, None], noise, one[:, :, :0], [Signal(one, covariance)]
@@ -120,13 +123,15 @@ def test_nearly_singular_surveys_are_solved_to_the_last_digits(family, correlati
 def test_origin_of_time_and_order_of_observations_do_not_matter():
     "A day later and shuffled: the same result to 1e-9, save what rounding leaves of the times"
     survey = Survey(3)
-    survey.gps_time, survey.asked = np.round(survey.gps_time * 1024) / 1024, survey.asked
+    survey.gps_time = np.round(survey.gps_time * 1024) / 1024
+    survey.asked = survey.asked
     survey.asked = np.round(survey.asked * 1024) / 1024
     solved = survey.solve()
     before = survey.predict(solved)
     order = survey.rng.permutation(len(survey.gps_time))
     survey.gps_time = survey.gps_time[order] + 86_400.0
-    survey.misclosure, survey.design = survey.misclosure[order], survey.design[order]
+    survey.misclosure = survey.misclosure[order]
+    survey.design = survey.design[order]
     survey.mixing = [mixing[order] for mixing in survey.mixing]
     survey.noise = survey.noise.select(order)
     survey.asked = survey.asked + 86_400.0
@@ -158,9 +163,11 @@ def test_prediction_in_parts_equals_the_whole():
 
 def test_passes_do_not_average_the_survey_error_away():
     "Ten passes of a target surveyed to 2 cm leave 2 cm; of ten targets, 2 cm over root ten"
-    n, sigma = 10, 0.02
+    n = 10
+    sigma = 0.02
     one = np.ones((n, 1, 1))
-    own, nothing = Noise(1e-10 * one).own, np.full((n, 1, 1), 1e-9)
+    own = Noise(1e-10 * one).own
+    nothing = np.full((n, 1, 1), 1e-9)
     for group, expected in ((np.zeros(n, int), sigma), (np.arange(n), sigma / np.sqrt(n))):
         noise = Noise(own, group, np.full((n, 1), sigma))
         signal = Signal(nothing, Covariance("matern32", 30.0))
@@ -175,9 +182,11 @@ def test_without_observations_near_or_at_all_the_prior_remains():
     _, covariance = survey.predict(survey.solve())
     prior = sum(m @ m.swapaxes(1, 2) for m in survey.asked_mixing)
     assert np.abs(covariance[1:3] - prior[1:3]).max() < 1e-12
-    survey.gps_time, survey.misclosure = survey.gps_time[:0], survey.misclosure[:0]
+    survey.gps_time = survey.gps_time[:0]
+    survey.misclosure = survey.misclosure[:0]
     survey.mixing = [m[:0] for m in survey.mixing]
-    survey.noise, survey.design = survey.noise.select(slice(0)), survey.design[:0]
+    survey.noise = survey.noise.select(slice(0))
+    survey.design = survey.design[:0]
     mean, covariance = survey.predict(survey.solve())
     assert np.array_equal(mean, np.zeros_like(mean))
     assert np.abs(covariance - prior).max() < 1e-12

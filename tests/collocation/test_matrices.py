@@ -21,7 +21,8 @@ sizes = st.integers(1, 5)
 def test_products_are_those_of_matrices(rows, inner, columns):
     "A b, a^T b and x - a b^T to the last digits, in shapes of no, one and several elements"
     rng = np.random.default_rng(rows + 10 * inner)
-    a, b = rng.normal(size=(rows, inner)), rng.normal(size=(inner, columns))
+    a = rng.normal(size=(rows, inner))
+    b = rng.normal(size=(inner, columns))
     np.testing.assert_allclose(multiply(a, b), a @ b, atol=1e-14)
     np.testing.assert_allclose(multiply_transposed(a.T.copy(), b), a @ b, atol=1e-14)
     x = rng.normal(size=(rows, columns))

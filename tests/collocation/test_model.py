@@ -24,7 +24,8 @@ START = 413_200.0  # s of week
 def test_clocks_are_gps_time_where_a_signal_has_none():
     "One column for each signal; none without signals"
     gps_time = START + np.arange(4.0)
-    mixing, covariance = np.ones((4, 1, 1)), Covariance("exponential", 5.0)
+    mixing = np.ones((4, 1, 1))
+    covariance = Covariance("exponential", 5.0)
     signals = [Signal(mixing, covariance), Signal(mixing, covariance, np.arange(4.0) ** 2)]
     clocks = signal_clocks(signals, gps_time)
     np.testing.assert_array_equal(clocks, np.column_stack([gps_time, [0.0, 1.0, 4.0, 9.0]]))
@@ -102,7 +103,8 @@ class Passes:
 def test_what_is_left_out_is_judged_by_the_others(by, rows):
     "Residuals and covariance are those of universal kriging from all other rows"
     case = Passes(6)
-    mixing, design = case.signal.mixing.reshape(30, 3), case.design.reshape(30, 2)
+    mixing = case.signal.mixing.reshape(30, 3)
+    design = case.design.reshape(30, 2)
     time = np.repeat(case.gps_time, 3)
     total = (mixing @ mixing.T) * case.signal.covariance(time[:, None] - time)
     total += written_out(case.noise)
@@ -110,7 +112,8 @@ def test_what_is_left_out_is_judged_by_the_others(by, rows):
     a = design[others]
     system = np.block([[total[np.ix_(others, others)], a], [a.T, np.zeros((2, 2))]])
     wanted = np.vstack([total[np.ix_(others, rows)], design[rows].T])
-    weights, flat = np.linalg.solve(system, wanted), case.misclosure.ravel()
+    weights = np.linalg.solve(system, wanted)
+    flat = case.misclosure.ravel()
     residual, covariance = case.solve(by).leave_out(np.array(rows))
     np.testing.assert_allclose(residual, flat[rows] - weights[:-2].T @ flat[others], atol=1e-9)
     expected = total[np.ix_(rows, rows)] - weights.T @ wanted
@@ -120,7 +123,8 @@ def test_what_is_left_out_is_judged_by_the_others(by, rows):
 def test_rows_that_alone_carry_a_column_determine_it():
     "A parameter of one row is not determined without it, but every other row may go"
     design = np.zeros((6, 1, 2))
-    design[:, 0, 0], design[4, 0, 1] = 1.0, 1.0
+    design[:, 0, 0] = 1.0
+    design[4, 0, 1] = 1.0
     noise = Noise(np.full((6, 1, 1), 1e-4))
     solved = collocate(START + np.arange(6.0), np.zeros((6, 1)), noise, design, [])
     assert [solved.determined_without([i]) for i in range(6)] == [True] * 4 + [False, True]
@@ -141,7 +145,10 @@ def test_without_a_trend_any_row_can_go():
 @pytest.mark.parametrize("columns", [3, 1])
 def test_parameters_that_misclosures_do_not_determine_are_refused(columns):
     "More parameters than misclosures, or two of the same effect: named with both numbers"
-    design = np.ones((2, 1, columns)) if columns == 3 else np.zeros((2, 1, 1))
+    if columns == 3:
+        design = np.ones((2, 1, columns))
+    else:
+        design = np.zeros((2, 1, 1))
     noise = Noise(np.ones((2, 1, 1)))
     with pytest.raises(ValueError, match=f"{columns} trend parameters are not determined by 2 "):
         collocate(START + np.arange(2.0), np.zeros((2, 1)), noise, design, [])
@@ -179,7 +186,8 @@ def believing_rows(seed, p=2, n=7):
     rng = np.random.default_rng(seed)
     time = START + np.sort(rng.uniform(0.0, 100.0, n))
     drift = Signal(0.1 * rng.normal(size=(n, 3, 3)), Covariance("matern32", 30.0), time - START)
-    design, misclosure = rng.normal(size=(n, 3, p)), rng.normal(0.0, 0.3, (n, 3))
+    design = rng.normal(size=(n, 3, p))
+    misclosure = rng.normal(0.0, 0.3, (n, 3))
     rows = SparseRows(time[:, None], misclosure, noise_of(seed, n), design, [drift])
     return rows, rng.uniform(0.05, 0.3, p)
 
@@ -201,7 +209,8 @@ def test_what_is_believed_of_the_trend_is_a_part_of_the_covariance(seed, solver)
     rows, sigma = believing_rows(seed)
     solved = solved_by(solver, rows, np.diag(1 / sigma))
     (drift,), n = rows.signals, rows.misclosure.size
-    time, mixing = np.repeat(drift.clock, 3), drift.mixing.reshape(n, 3)
+    time = np.repeat(drift.clock, 3)
+    mixing = drift.mixing.reshape(n, 3)
     total = (mixing @ mixing.T) * drift.covariance(time[:, None] - time) + rows.noise.matrix
     spread = rows.design.reshape(n, -1) * sigma
     total += spread @ spread.T

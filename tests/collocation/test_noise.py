@@ -36,7 +36,8 @@ def test_separate_and_common_parts_are_all_of_it():
 
 def test_a_target_seen_once_costs_no_column():
     "Three columns for each target of several passes, none for one that is known perfectly"
-    own, group = np.tile(np.eye(3), (5, 1, 1)), np.array([0, 1, 1, 2, 2])
+    own = np.tile(np.eye(3), (5, 1, 1))
+    group = np.array([0, 1, 1, 2, 2])
     shared = np.array([[0.01] * 3, [0.02] * 3, [0.0] * 3])
     noise = Noise(own, group, shared)
     assert noise.common.shape == (15, 3)
@@ -47,7 +48,8 @@ def test_a_target_seen_once_costs_no_column():
 
 def test_noise_of_some_epochs_is_that_part_of_all():
     "Chosen by number or by mask, a target that is left with one pass shares nothing more"
-    noise, kept = noise_of(5), np.array([True, False] * 4)
+    noise = noise_of(5)
+    kept = np.array([True, False] * 4)
     rows = np.flatnonzero(np.repeat(kept, 3))
     for choice in (kept, np.flatnonzero(kept)):
         part = noise.select(choice)
@@ -58,7 +60,8 @@ def test_noise_of_some_epochs_is_that_part_of_all():
 
 def test_inserted_epochs_share_nothing():
     "Between two passes of a target they add their own covariance; all else stays what it was"
-    noise, own = noise_of(9), np.tile(0.01 * np.eye(3), (2, 1, 1))
+    noise = noise_of(9)
+    own = np.tile(0.01 * np.eye(3), (2, 1, 1))
     for alone in (noise, Noise(noise.own)):
         total = alone.insert(3, own).matrix.reshape(10, 3, 10, 3)
         kept = np.delete(np.arange(10), [3, 4])

@@ -20,7 +20,8 @@ every_bed = pytest.mark.parametrize("bed", BEDS, ids=lambda bed: "-".join(bed.fa
 
 def smoothed_dense(bed):
     "V^-1, and the covariance (n d, n d) of the states given all observations"
-    joint, h = bed.joint(bed.gps_time), bed.observing
+    joint = bed.joint(bed.gps_time)
+    h = bed.observing
     weight = np.linalg.inv(bed.total)
     return weight, joint - joint @ h.T @ weight @ h @ joint
 
@@ -43,10 +44,13 @@ def test_filtered_states_know_the_past_alone(bed):
     recursion, covariances = bed.filtered()
     n, r, c = bed.columns.shape
     states = filter_columns(recursion, bed.columns)[1]
-    joint, h, d = bed.joint(bed.gps_time), bed.observing, bed.layout.size
+    joint = bed.joint(bed.gps_time)
+    h = bed.observing
+    d = bed.layout.size
     noise = block_diag(*bed.noise)
     for i in range(n):
-        seen, here = slice(0, (i + 1) * r), slice(i * d, (i + 1) * d)
+        seen = slice(0, (i + 1) * r)
+        here = slice(i * d, (i + 1) * d)
         cross = joint[here] @ h[seen].T
         total = h[seen] @ joint @ h[seen].T + noise[seen, seen]
         gain = np.linalg.solve(total, cross.T).T
@@ -121,7 +125,9 @@ def test_two_equal_observations_without_noise_stop_the_filter():
 def test_a_single_epoch_has_no_next_one():
     "Of one epoch there is a covariance and none with what follows"
     bed = Bed(2)
-    bed.mixing, bed.noise, bed.steps = bed.mixing[:1], bed.noise[:1], bed.steps[:1]
+    bed.mixing = bed.mixing[:1]
+    bed.noise = bed.noise[:1]
+    bed.steps = bed.steps[:1]
     recursion, covariances = bed.filtered()
     blocks, _, same, following = smooth_covariance(recursion, bed.steps, covariances)
     h = bed.observing[:2, : bed.layout.size]

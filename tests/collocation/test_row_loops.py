@@ -37,7 +37,8 @@ def written_out(layout, pattern, cells, sides):
     for i in range(n):
         for e in range(sides.cell.shape[1]):
             for j, s in enumerate(layout.signal):
-                d, local = layout.states[s], np.sum(layout.signal[:j] == s)
+                d = layout.states[s]
+                local = np.sum(layout.signal[:j] == s)
                 for end in range(2):
                     node = cells[sides.cell[i, e], s, end]
                     if node >= 0:
@@ -54,7 +55,8 @@ def test_states_are_observed_and_told_of_rows(bed):
     loops, sides, observing = bed
     rng = np.random.default_rng(1)
     for part, h in zip(sides, observing, strict=True):
-        x, y = rng.normal(size=(h.shape[2], 3)), rng.normal(size=(*h.shape[:2], 3))
+        x = rng.normal(size=(h.shape[2], 3))
+        y = rng.normal(size=(*h.shape[:2], 3))
         seen = np.zeros((*part.sigma.shape, x.shape[1]))
         observe(*loops, part, x, seen, False)
         assert np.abs(seen - h @ x).max() < 1e-9 * np.abs(seen).max()
@@ -67,7 +69,8 @@ def test_information_is_the_square_of_what_rows_see(bed):
     "H^T R^-1 H in the lower triangle, and nothing of it outside the pattern"
     loops, sides, observing = bed
     pattern = loops[1]
-    values, total = pattern.zeros, 0.0
+    values = pattern.zeros
+    total = 0.0
     for part, h in zip(sides, observing, strict=True):
         add_information(*loops, part, values)
         total = total + np.einsum("nrs,nrt->st", h, h)
@@ -84,7 +87,8 @@ def test_covariances_of_rows_come_from_blocks_of_the_inverse(bed):
     loops, sides, observing = bed
     pattern = loops[1]
     root = np.random.default_rng(2).normal(size=(pattern.states, pattern.states))
-    symmetric, values = root + root.T, pattern.zeros
+    symmetric = root + root.T
+    values = pattern.zeros
     for rows, columns, where in blocks(pattern):
         values[where] = symmetric[rows, columns]
     for part, h in zip(sides, observing, strict=True):

@@ -32,7 +32,8 @@ def test_white_columns_are_those_of_the_recursion(seed):
 def test_coloured_columns_are_a_root_of_the_covariance(seed):
     "L of unit columns has L L^T = V, and whitening takes it back"
     bed = Bed(seed, n=12, r=1)
-    root, back = np.empty((12, 12)), np.empty((12, 12))
+    root = np.empty((12, 12))
+    back = np.empty((12, 12))
     whiten_columns(scalar_recursion(bed), np.eye(12), root, True)
     np.testing.assert_allclose(root @ root.T, bed.total, atol=1e-9)
     np.testing.assert_allclose(root, np.tril(root), atol=1e-12)
@@ -42,7 +43,8 @@ def test_coloured_columns_are_a_root_of_the_covariance(seed):
 
 def test_drawn_values_have_the_stated_covariance():
     "20 000 coloured draws vary and covary as V says, to 4 standard errors"
-    bed, number = Bed(7, n=6, r=1), 20_000
+    bed = Bed(7, n=6, r=1)
+    number = 20_000
     drawn = np.empty((6, number))
     whiten_columns(
         scalar_recursion(bed), np.random.default_rng(1).normal(size=(6, number)), drawn, True
@@ -65,7 +67,10 @@ def passes(n, targets, rng):
 def test_errors_in_common_are_whitened(seed, dense):
     "Innovations of I + U U^T are those of its Cholesky factor, whether U is sparse or full"
     rng = np.random.default_rng(seed)
-    shared = rng.normal(size=(15, 3)) if dense else passes(15, 3, rng)
+    if dense:
+        shared = rng.normal(size=(15, 3))
+    else:
+        shared = passes(15, 3, rng)
     columns = rng.normal(size=(15, 4))
     lower = np.linalg.cholesky(np.eye(15) + shared @ shared.T)
     innovations, growth = common_innovations(shared, columns)

@@ -20,7 +20,8 @@ from tests.beds.linked_rows import Street
 def test_the_likelihood_changes_as_its_differences_do(family):
     "With scale and correlation time a ten thousandth larger it changes as two solutions differ"
     street = Street(family, 40.0)
-    scaled, slower = [], []
+    scaled = []
+    slower = []
     for part in street.rows:
         drift, *others = part.signals
         larger = Signal(1.0001 * drift.mixing, drift.covariance, drift.clock)

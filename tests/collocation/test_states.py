@@ -54,7 +54,8 @@ def test_without_signals_there_is_no_state():
 @pytest.mark.parametrize("bed", BEDS, ids=lambda bed: "-".join(bed.families))
 def test_time_carries_by_the_matrix_exponential(bed, lag):
     "F is exp(G dt) and Q what keeps the stationary covariance: P = F P F^T + Q, to 1e-12"
-    f, q = transitions(bed, lag), noises(bed, lag)
+    f = transitions(bed, lag)
+    q = noises(bed, lag)
     for s, (family, covariance) in enumerate(zip(bed.families, bed.covariances, strict=True)):
         d = covariance.states
         expected = carried(family, covariance.rate * lag)
@@ -78,7 +79,8 @@ def test_all_states_are_carried_at_once(bed, transposed):
     carry(bed.layout, blocks, moved, transposed)
     np.testing.assert_allclose(moved, f @ x, atol=1e-12)
     a = rng.normal(size=(bed.layout.size, bed.layout.size))
-    square, before = a @ a.T, (a @ a.T).copy()
+    square = a @ a.T
+    before = (a @ a.T).copy()
     result = carry_square(bed.layout, blocks, square, transposed)
     np.testing.assert_allclose(result, f @ square @ f.T, atol=1e-11)
     np.testing.assert_array_equal(square, before)
@@ -111,7 +113,8 @@ def test_observations_see_the_first_state_of_each_process():
         rng = np.random.default_rng(3)
         r = bed.mixing.shape[1]
         h = bed.observing[:r, : bed.layout.size]
-        x, y = rng.normal(size=(bed.layout.size, 3)), rng.normal(size=(r, 3))
+        x = rng.normal(size=(bed.layout.size, 3))
+        y = rng.normal(size=(r, 3))
         np.testing.assert_allclose(observe(bed.layout.first, bed.mixing[0], x), h @ x, atol=1e-13)
         back = x.copy()
         send_back(bed.layout.first, bed.mixing[0], y, back)
@@ -124,7 +127,8 @@ def test_a_process_knows_itself_by_its_covariance_function():
         covariance = Covariance(family, 12.0)
         layout = Layout.of([Signal(np.ones((1, 1, 1)), covariance)])
         for lag in LAGS:
-            f, p = np.zeros((1, 3, 3)), np.zeros((1, 3, 3))
+            f = np.zeros((1, 3, 3))
+            p = np.zeros((1, 3, 3))
             fill_transition(layout, np.array([lag]), f)
             fill_noise(layout, np.array([np.inf]), p)
             d = covariance.states

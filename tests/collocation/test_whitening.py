@@ -6,7 +6,8 @@ import pytest
 from mlscorr.collocation import FAMILIES, Covariance, Signal, factor
 
 START = 413_200.0  # s of week
-N, SHARED = 90, 4
+N = 90
+SHARED = 4
 
 
 @pytest.fixture(scope="module", params=FAMILIES)
@@ -91,7 +92,8 @@ def test_draws_have_the_covariance_that_they_are_drawn_from(bed, tails):
 def test_the_zero_of_time_does_not_matter(bed):
     "Another zero of time gives the same products to rounding"
     signals = [Signal(np.ones((3, 1, 1)), Covariance("matern32", 10.0))]
-    time, columns = np.array([0.0, 2.0, 7.0]), np.eye(3)
+    time = np.array([0.0, 2.0, 7.0])
+    columns = np.eye(3)
     some, others = (
         factor(time + zero, signals, np.full(3, 0.1)).whiten(columns).squares
         for zero in (0.0, START)

@@ -93,7 +93,8 @@ def written_out(time, xyz, table):
 
 
 def filled(time, xyz, table, is_gap=NO_GAP):
-    increments, inside = np.zeros((len(time), 3)), np.zeros(len(time), bool)
+    increments = np.zeros((len(time), 3))
+    inside = np.zeros(len(time), bool)
     fill_increments(time, xyz, EPOCHS, 0.005, is_gap, table, increments, inside)
     return increments, inside
 
@@ -101,7 +102,8 @@ def filled(time, xyz, table, is_gap=NO_GAP):
 @pytest.mark.parametrize("seed", range(4))
 def test_increments_are_those_of_the_formula(seed):
     "To 1e-10 m at 500 m from the origin, at random times and at epochs"
-    rng, table = np.random.default_rng(seed), table_of(seed)
+    rng = np.random.default_rng(seed)
+    table = table_of(seed)
     time = np.append(rng.uniform(EPOCHS[0], EPOCHS[-1], 200), EPOCHS[::10])
     xyz = rng.uniform(-500.0, 500.0, (len(time), 3))
     increments, inside = filled(time, xyz, table)
@@ -115,13 +117,16 @@ def test_points_without_a_pose_are_left_untouched():
     is_gap[100] = True
     middle = (EPOCHS[100] + EPOCHS[101]) / 2
     time = np.array([START - 1.0, middle, EPOCHS[100], EPOCHS[101], START + 10.0])
-    increments, inside = np.full((5, 3), 7.0), np.zeros(5, bool)
+    increments = np.full((5, 3), 7.0)
+    inside = np.zeros(5, bool)
     fill_increments(time, np.zeros((5, 3)), EPOCHS, 0.005, is_gap, table_of(3), increments, inside)
     assert inside.tolist() == [False, False, True, True, False]
     assert (increments[~inside] == 7.0).all() and (increments[inside] != 7.0).all()
 
 
-SCALE, OFFSET = np.array([0.001, 0.002, 0.0005]), np.array([10.0, -20.0, 3.0])  # m
+# m
+SCALE = np.array([0.001, 0.002, 0.0005])
+OFFSET = np.array([10.0, -20.0, 3.0])
 
 
 def moved(integers, time, table, constant=0.0):
@@ -135,7 +140,8 @@ def moved(integers, time, table, constant=0.0):
 @pytest.mark.parametrize("seed", range(3))
 def test_integers_move_by_the_nearest_whole_increment(seed):
     "Half a scale step from the increment of the floats, each axis with its own scale"
-    rng, table = np.random.default_rng(seed), table_of(seed)
+    rng = np.random.default_rng(seed)
+    table = table_of(seed)
     time = rng.uniform(EPOCHS[0], EPOCHS[-1], 300)
     integers = rng.integers(-100_000, 100_000, (300, 3))
     after, counts = moved(integers, time, table)

@@ -40,7 +40,8 @@ def test_apply_equals_inverse_then_forward_georeferencing(before, after):
 def test_order_and_chunks_do_not_matter(gap):
     "Sorted, shuffled and chunked clouds get the same coordinates to the last bit"
     recorded = drive(gap=gap)
-    correction, cloud = Correction(recorded, with_errors(recorded)), cloud_of(recorded)
+    correction = Correction(recorded, with_errors(recorded))
+    cloud = cloud_of(recorded)
     whole = correction.apply(cloud).xyz
     order = np.argsort(cloud.gps_time)
     assert np.array_equal(correction.apply(cloud[order]).xyz, whole[order])
@@ -51,7 +52,8 @@ def test_order_and_chunks_do_not_matter(gap):
 def test_a_zero_correction_moves_nothing():
     "The recorded pair corrected to itself changes no bit of integers, and floats below 1e-13 m"
     recorded = drive()
-    correction, cloud = Correction(recorded, recorded, MOUNTING, MOUNTING), cloud_of(recorded)
+    correction = Correction(recorded, recorded, MOUNTING, MOUNTING)
+    cloud = cloud_of(recorded)
     assert np.abs(correction.apply(cloud).xyz - cloud.xyz).max() < 1e-13  # m
     integers = np.rint((cloud.xyz - CORNER) / SCALE).astype(np.int32).T.copy()
     kept = integers.copy()
@@ -81,7 +83,8 @@ def test_points_outside_and_in_gaps_stay_where_they_are():
 def test_integers_get_the_correction_to_half_a_scale_step(constant):
     "Scaled integers end within half a millimetre of the float path, in the file's own time too"
     recorded = drive()
-    correction, cloud = Correction(recorded, with_errors(recorded)), cloud_of(recorded)
+    correction = Correction(recorded, with_errors(recorded))
+    cloud = cloud_of(recorded)
     integers = np.rint((cloud.xyz - CORNER) / SCALE).astype(np.int32).T.copy()
     stored = PointCloud(integers.T * SCALE + CORNER, cloud.gps_time, cloud.intensity)
     expected = correction.apply(stored).xyz
@@ -110,10 +113,13 @@ def test_trajectories_of_different_epochs_make_no_correction():
 
 def test_points_of_two_scanners_move_by_the_mounting_of_theirs():
     "Both views of things in one array: each point gets what its scanner's correction adds"
-    recorded, cloud = drive(), cloud_of(drive())
-    new, n = with_errors(recorded), len(cloud) // 2 * 2
+    recorded = drive()
+    cloud = cloud_of(drive())
+    new = with_errors(recorded)
+    n = len(cloud) // 2 * 2
     corrections = [Correction(recorded, new), Correction(recorded, new, MOUNTING, OTHER)]
-    xyz, gps_time = cloud.xyz[:n].reshape(-1, 2, 3), cloud.gps_time[:n].reshape(-1, 2)
+    xyz = cloud.xyz[:n].reshape(-1, 2, 3)
+    gps_time = cloud.gps_time[:n].reshape(-1, 2)
     scanner = np.tile([0, 1], (n // 2, 1))
     moved = increments_by_scanner(corrections, xyz, gps_time, scanner)
     for number, correction in enumerate(corrections):
@@ -126,7 +132,8 @@ def test_points_without_a_time_each_are_refused(points, times):
     """Fewer points than times, or more, are refused: foreign memory is no correction."""
     recorded = drive()
     correction = Correction(recorded, with_errors(recorded))
-    xyz, gps_time = np.zeros((points, 3)), np.full(times, START + 1.0)
+    xyz = np.zeros((points, 3))
+    gps_time = np.full(times, START + 1.0)
     integers = np.zeros((3, points), np.int32)
     for move in (
         lambda: correction.increments(xyz, gps_time),

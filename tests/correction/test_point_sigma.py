@@ -30,8 +30,14 @@ def drive(n=40, sigmas=True):
     heading = 0.3 + 0.05 * time
     angles = attitude_from_angles(0.02 * np.sin(time), 0.03 * np.cos(time), heading)
     position = CORNER + np.outer(time, [6.0, 3.0, 0.1])
-    position_sigma = np.tile([0.01, 0.02, 0.03], (n, 1)) if sigmas else None
-    attitude_sigma = np.tile([1e-4, 2e-4, 4e-4], (n, 1)) if sigmas else None
+    if sigmas:
+        position_sigma = np.tile([0.01, 0.02, 0.03], (n, 1))
+    else:
+        position_sigma = None
+    if sigmas:
+        attitude_sigma = np.tile([1e-4, 2e-4, 4e-4], (n, 1))
+    else:
+        attitude_sigma = None
     return Trajectory(START + time, position, angles, position_sigma, attitude_sigma)
 
 
@@ -137,7 +143,8 @@ def with_sigmas(path):
 
 def assert_only_sigmas_added(target, plain, sigma):
     "Every byte of a point equals the plain corrected copy's; then follow the sigmas to 0.1 mm"
-    old, new = laspy.read(plain), laspy.read(target)
+    old = laspy.read(plain)
+    new = laspy.read(target)
     raw = [las.points.array.view(np.uint8).reshape(len(las.points), -1) for las in (old, new)]
     assert np.array_equal(raw[0], raw[1][:, :-6])
     described = [name for name in old.point_format.dimension_names if name != "ExtraBytes"]
@@ -158,7 +165,8 @@ def test_corrected_copies_carry_the_sigmas(point_format, suffix, tmp_path):
     "Old and new point formats, with extra bytes of their own, get three fields that laspy reads"
     path = write_street(tmp_path / f"in{suffix}", point_format)
     correction, sigma = with_sigmas(path)
-    plain, target = tmp_path / f"plain{suffix}", tmp_path / f"out{suffix}"
+    plain = tmp_path / f"plain{suffix}"
+    target = tmp_path / f"out{suffix}"
     write_corrected(cloud_of(path), plain, correction)
     write_corrected(cloud_of(path), target, correction, sigma=sigma)
     assert_only_sigmas_added(target, plain, sigma)
@@ -168,7 +176,8 @@ def test_corrected_copies_carry_the_sigmas(point_format, suffix, tmp_path):
 @pytest.mark.parametrize("name", ["las_with_several_extra_byte_bloc.laz", "sample_c.las"])
 def test_real_files_carry_the_sigmas(name, tmp_path):
     "Real files keep every field and get three"
-    path, target = shared("data", "las_samples", name), tmp_path / name
+    path = shared("data", "las_samples", name)
+    target = tmp_path / name
     correction, sigma = with_sigmas(path)
     write_corrected(cloud_of(path), tmp_path / f"plain-{name}", correction)
     write_corrected(cloud_of(path), target, correction, sigma=sigma)

@@ -72,9 +72,11 @@ def assert_same(one, other):
         assert one == other
         return
     for field in fields(one):
-        a, b = getattr(one, field.name), getattr(other, field.name)
+        a = getattr(one, field.name)
+        b = getattr(other, field.name)
         if isinstance(a, Rotation):
-            a, b = a.as_quat(), b.as_quat()
+            a = a.as_quat()
+            b = b.as_quat()
         np.testing.assert_array_equal(a, b)
 
 

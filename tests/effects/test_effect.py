@@ -73,7 +73,9 @@ class Case:
 
     def partials(self):
         "Derivatives (n, 3) or (n, 3, 3) of the map points by what the effects change"
-        times, angle, distance = self.returns.gps_time, self.returns.angle, self.returns.range
+        times = self.returns.gps_time
+        angle = self.returns.angle
+        distance = self.returns.range
         pose = self.trajectory.at(times)
         direction = self.mounting.boresight.apply(beam(angle))
         across = self.mounting.boresight.apply(beam(angle + np.pi / 2))
@@ -94,7 +96,8 @@ class Case:
 
     def shift(self, name, magnitude, phase=0.0, time=0.0, width=1.0):
         "Analytic shift (n, 3) of every point: partial derivative times the effect's size there"
-        by, returns = self.partials(), self.returns
+        by = self.partials()
+        returns = self.returns
         size = np.array(magnitude)
         if name in ("lever_arm", "boresight"):
             return -by[name] @ (size if name == "lever_arm" else np.radians(size))
@@ -207,12 +210,16 @@ def test_an_effect_changes_what_its_stage_declares_and_nothing_else(name):
     "Every other field is the same object as before, and the input is as it was"
     effect = make_effect(name, **SMALL[name])
     value = VALUES[effect.stage]
-    before = {f.name: np.copy(getattr(value, f.name)) for f in fields(value)
-              if isinstance(getattr(value, f.name), np.ndarray)}  # fmt: skip
+    before = {
+        f.name: np.copy(getattr(value, f.name))
+        for f in fields(value)
+        if isinstance(getattr(value, f.name), np.ndarray)
+    }
     recorded = effect.apply(value, REFERENCE, np.random.default_rng(1))
     assert type(recorded) is type(value)
-    changed = {f.name for f in fields(value)
-               if getattr(recorded, f.name) is not getattr(value, f.name)}  # fmt: skip
+    changed = {
+        f.name for f in fields(value) if getattr(recorded, f.name) is not getattr(value, f.name)
+    }
     assert changed
     assert changed <= CHANGES[effect.stage]
     for field, array in before.items():

@@ -54,11 +54,9 @@ def test_a_file_registers_its_effects(tmp_path):
 @pytest.mark.long
 def test_simulate_and_plan_take_the_file_of_an_effect(tmp_path):
     "Recorded heights are 0.1 m off, the plan says what size shows; without the file all is unknown"
-    file, scenario, out = (
-        written(tmp_path, "lift", "np.array([0, 0, 1])"),
-        tmp_path / "s.toml",
-        tmp_path,
-    )
+    file = written(tmp_path, "lift", "np.array([0, 0, 1])")
+    scenario = tmp_path / "s.toml"
+    out = tmp_path
     short = (
         "[drive]\nduration = 6.0\n[targets]\ncontrol = 4\ncheck = 1\n"
         "[[scanner]]\nlines_per_second = 40\npoints_per_line = 200\n"
@@ -80,12 +78,17 @@ def test_simulate_and_plan_take_the_file_of_an_effect(tmp_path):
     assert 0.0 < size["detectable"] < 1.0
 
 
-@pytest.mark.parametrize(("text", "said"), [
-    ("x = (", "line 1"), ("1 / 0", "ZeroDivisionError: division by zero"),
-    ("x = 1", "registers no effect"), ("raise SystemExit(0)", "SystemExit: 0"),
-    (CLASS.format(name="a+b", body="0.0"), "'a\\+b' can't name an effect"),
-    (CLASS.format(name="none", body="0.0"), "none of the answers none, noise and unknown"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("x = (", "line 1"),
+        ("1 / 0", "ZeroDivisionError: division by zero"),
+        ("x = 1", "registers no effect"),
+        ("raise SystemExit(0)", "SystemExit: 0"),
+        (CLASS.format(name="a+b", body="0.0"), "'a\\+b' can't name an effect"),
+        (CLASS.format(name="none", body="0.0"), "none of the answers none, noise and unknown"),
+    ],
+)
 def test_a_file_that_cannot_be_used_is_refused(tmp_path, text, said):
     "With the line or the error that it raises, and no traceback"
     file = tmp_path / "bad.py"
@@ -117,12 +120,16 @@ def test_a_simulator_whose_effect_moves_everything_is_refused(tmp_path):
     assert "Is its unit right" in signatures(g.rows, g.survey, [kind])[1]["everything"]
 
 
-@pytest.mark.parametrize(("name", "body", "said"), [
-    ("nothing", "np.zeros(3)", "No row of this survey depends on it"),
-    ("everything", "np.array([0.0, 0.0, 1e5])", "Is its unit right"),
-    ("nan", "np.array([0.0, 0.0, np.nan])", "not a number"),
-    ("raises", "value.speed", "AttributeError"), ("leaves", "exit(0)", "SystemExit"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "body", "said"),
+    [
+        ("nothing", "np.zeros(3)", "No row of this survey depends on it"),
+        ("everything", "np.array([0.0, 0.0, 1e5])", "Is its unit right"),
+        ("nan", "np.array([0.0, 0.0, np.nan])", "not a number"),
+        ("raises", "value.speed", "AttributeError"),
+        ("leaves", "exit(0)", "SystemExit"),
+    ],
+)
 def test_an_effect_that_cannot_be_applied_is_left_out(tmp_path, name, body, said):
     "It changes nothing, everything, into no numbers, or raises: the reason is said"
     file = written(tmp_path, name, body)

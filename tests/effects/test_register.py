@@ -52,7 +52,8 @@ def words(page):
 
 def test_the_simulator_applies_it():
     "5 mm at 1 m/s lift the recorded heights by that times the speed squared, and nothing else"
-    clean, lifted = drive(), drive([{"name": "squat", "magnitude": 0.005}])
+    clean = drive()
+    lifted = drive([{"name": "squat", "magnitude": 0.005}])
     speed = np.gradient(clean.trajectory.position, clean.trajectory.gps_time, axis=0)
     up = 0.005 * (speed**2).sum(axis=1)
     shift = lifted.trajectory.position - clean.trajectory.position
@@ -111,7 +112,8 @@ def test_it_acts_after_the_others_of_its_stage_and_is_written_and_read(tmp_path)
 
 def test_streams_of_the_library_stay_what_they_are(monkeypatch):
     "A registered random effect has a stream of its own and leaves every other, and the next, alone"
-    rng, other = np.random.default_rng(5), np.random.default_rng(5)
+    rng = np.random.default_rng(5)
+    other = np.random.default_rng(5)
     streams = effect_streams(rng)
     monkeypatch.setattr(catalogue, "_registered", {})
     without = effect_streams(other)

@@ -21,7 +21,8 @@ def test_every_effect_has_a_sentence_for_each_direction(kind):
 def test_a_vector_is_said_by_the_parts_that_differ_from_zero():
     "Parts beyond two sigmas alone; all when there is none, and a dash when none is known"
     kind = effect_class("lever_arm")
-    right, up = SizeEstimate(-0.093, 0.004, "m"), SizeEstimate(0.019, 0.017, "m")
+    right = SizeEstimate(-0.093, 0.004, "m")
+    up = SizeEstimate(0.019, 0.017, "m")
     text = kind.describe({"right": right, "up": up})
     assert text.endswith("the scanner really sits 93 mm ± 4 mm farther left.")
     text = kind.describe({"forward": SizeEstimate(-0.01, 0.02, "m"), "up": up})

@@ -30,7 +30,8 @@ def columns_of(equations, seed):
 def test_what_was_added_to_the_misclosures_is_found(tied):
     "Columns times known sizes of centimetres, within three sigmas, and highly significant"
     equations, parameters = tied
-    columns, sizes = columns_of(equations, 1), np.array([0.03, -0.02])
+    columns = columns_of(equations, 1)
+    sizes = np.array([0.03, -0.02])
     changed = with_added(equations, columns @ sizes)
     added = AddedUnknowns.of(changed, parameters, columns, np.ones(2))
     assert (np.abs(added.correction - sizes) < 3 * added.sigma).all()
@@ -42,7 +43,8 @@ def test_what_was_added_to_the_misclosures_is_found(tied):
 def test_the_response_is_what_the_trend_takes_of_a_unit(tied):
     "The trend without the unknowns differs by response times size from that of clean misclosures"
     equations, parameters = tied
-    columns, sizes = columns_of(equations, 2), np.array([0.03, -0.02])
+    columns = columns_of(equations, 2)
+    sizes = np.array([0.03, -0.02])
     added = AddedUnknowns.of(equations, parameters, columns, np.ones(2))
     changed = with_added(equations, columns @ sizes)
     before, after = (each.solve(parameters).trend for each in (equations, changed))

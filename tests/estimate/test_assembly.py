@@ -21,7 +21,8 @@ WEAK = np.array([1.0, 1.0, 1.0, 0.1, 0.1, 0.1])  # m, rad
 @pytest.mark.long
 def test_passes_of_one_target_share_its_survey_error():
     "Many passes average the extraction, not the survey: sigma never falls below the survey's"
-    rng, passes = np.random.default_rng(1), 25
+    rng = np.random.default_rng(1)
+    passes = 25
     case = Case(EPOCHS, CONSTANT, [100.0], rng)
     sure = replace(case.control, sigma=np.full((1, 3), 0.02))
     observations = case.observations[np.zeros(passes, int)]
@@ -36,7 +37,8 @@ def test_passes_of_one_target_share_its_survey_error():
 def test_partials_are_what_a_pose_moves():
     "Moved by 1 mm and turned by 1e-6 rad, the targets move as B says, to 1e-9 m"
     case = smooth_case(3, n=6)
-    equations, times = case.equations(), case.observations.gps_time
+    equations = case.equations()
+    times = case.observations.gps_time
     pose = case.recorded.at(times)
     body = pose.attitude.inv().apply(case.observations.position - pose.position)
     for axis in range(3):

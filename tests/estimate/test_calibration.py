@@ -37,7 +37,8 @@ def test_what_is_not_determined_is_named_with_its_sigma(calibration):
 def test_a_lever_arm_that_lacks_something_forward_may_be_a_clock(calibration):
     "10 cm at 5 m/s are 20 ms; up and right no clock explains, nor is what is within 3 sigmas said"
     for axis, sigma, number in ((1, 0.01, 1), (1, 0.05, 0), (2, 0.01, 0)):
-        lacks, covariance = -0.1 * np.eye(6)[axis], sigma**2 * np.eye(6)
+        lacks = -0.1 * np.eye(6)[axis]
+        covariance = sigma**2 * np.eye(6)
         estimate = MountingEstimate.about([RECORDED], lacks, covariance, 1.0)
         warnings = replace(calibration, lsc=estimate).warnings
         sentence = (
@@ -48,7 +49,8 @@ def test_a_lever_arm_that_lacks_something_forward_may_be_a_clock(calibration):
 
 def test_speeds_that_tell_a_clock_from_a_lever_arm_are_said():
     "A way half at 5 and half at 15 m/s is driven at 10 ± 5 m/s, and a diagnosis tells by that"
-    lacks, covariance = -0.1 * np.eye(6)[1], 0.01**2 * np.eye(6)
+    lacks = -0.1 * np.eye(6)[1]
+    covariance = 0.01**2 * np.eye(6)
     estimate = MountingEstimate.about([RECORDED], lacks, covariance, 1.0)
     speed = np.repeat([5.0, 15.0], [300, 100])  # m/s, over 1500 m each
     place = np.outer(np.append(0.0, np.cumsum(speed)), [1.0, 0.0, 0.0])

@@ -158,7 +158,8 @@ def test_few_rows_with_ties_are_weighed_as_they_are_solved():
     objective = Objective.of(few)
     for family in (*FAMILIES, INTEGRATED):
         parameters = objective.parameters(family, objective.initial)
-        weighed, believed = few.weigh(parameters), few.believed(parameters)
+        weighed = few.weigh(parameters)
+        believed = few.believed(parameters)
         solved = collocate_rows(few.rows(parameters), believed=believed)
         assert weighed.log_likelihood == pytest.approx(solved.log_likelihood, abs=0.01)
 

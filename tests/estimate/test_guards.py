@@ -52,7 +52,10 @@ def two_passes(case):
     "The same drive with 60 s less in the middle: a gap of the trajectory"
     keep = (EPOCHS < 70.0) | (EPOCHS > 130.0)
     old = case.recorded
-    sigma = None if old.position_sigma is None else old.position_sigma[keep]
+    if old.position_sigma is None:
+        sigma = None
+    else:
+        sigma = old.position_sigma[keep]
     return Trajectory(old.gps_time[keep], old.position[keep], old.attitude[keep], sigma)
 
 
@@ -85,10 +88,13 @@ def test_a_long_gap_between_control_points_is_told():
     assert np.diff(guards.gap) == pytest.approx(130.0)
 
 
-@pytest.mark.parametrize(("times", "text"), [
-    ([100.0, 150.0], "Only 2 control points take part"),
-    (np.full(8, 100.0), "All 8 control points were seen within 0.0 s"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("times", "text"),
+    [
+        ([100.0, 150.0], "Only 2 control points take part"),
+        (np.full(8, 100.0), "All 8 control points were seen within 0.0 s"),
+    ],
+)
 def test_too_little_control_is_told(times, text):
     "A correction is given, and a sentence on what it can't know"
     case = Case(EPOCHS, CONSTANT, times, np.random.default_rng(9))
@@ -147,7 +153,8 @@ def test_components_are_determined_below_half_of_their_variance():
 def found(times, trajectory=None):
     "Guards of equations under the parameters that are believed before the misclosures"
     case = Case(EPOCHS, CONSTANT, times, np.random.default_rng(3))
-    case.recorded = case.recorded if trajectory is None else trajectory(case)
+    if trajectory is not None:
+        case.recorded = trajectory(case)
     equations = case.equations()
     objective = Objective.of(equations)
     parameters = objective.parameters("matern32", objective.initial)
@@ -196,13 +203,22 @@ def test_a_signal_that_fades_in_a_gap_is_told():
     assert not any("No control" in line for line in guard_warnings(guards, equations, long))
 
 
-@pytest.mark.parametrize("times, asked, expected", [
-    (even(2), 1, ["2 control points at 2 epochs are too few for a trend of order 1, which needs 3",
-                  "Only 2 control points take part"]),
-    ([100.0], 0, ["Only 1 control point takes part"]),
-    ([100.0, 100.2, 100.4], 0, ["All 3 control points were seen within 0.4 s"]),
-    (even(6), 0, []),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "times, asked, expected",
+    [
+        (
+            even(2),
+            1,
+            [
+                "2 control points at 2 epochs are too few for a trend of order 1, which needs 3",
+                "Only 2 control points take part",
+            ],
+        ),
+        ([100.0], 0, ["Only 1 control point takes part"]),
+        ([100.0, 100.2, 100.4], 0, ["All 3 control points were seen within 0.4 s"]),
+        (even(6), 0, []),
+    ],
+)
 def test_sparse_control_is_told_in_numbers(times, asked, expected):
     "A lowered order, fewer points than show a fault, or all at one epoch; enough say nothing"
     equations = Case(EPOCHS, CONSTANT, times, np.random.default_rng(4)).equations()

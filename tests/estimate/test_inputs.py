@@ -12,7 +12,8 @@ from tests.beds.pos_errors import CONSTANT, EPOCHS, START, Case, even, rms, smoo
 
 def test_sigma_columns_of_zero_are_no_statement():
     "No POS is perfect: the sigmas that are believed stand in for it, and a warning says so"
-    rng, zero = np.random.default_rng(4), np.zeros((len(EPOCHS), 3))
+    rng = np.random.default_rng(4)
+    zero = np.zeros((len(EPOCHS), 3))
     case = Case(EPOCHS, CONSTANT, even(12), rng, sigma=zero, attitude_sigma=zero)
     estimate = case.estimate()
     assert rms(case.remaining(estimate)) < 0.006  # m
@@ -116,10 +117,13 @@ def test_one_axis_of_zero_is_filled_with_the_others(axis):
     assert notes[0].startswith("5 of 2001")
 
 
-@pytest.mark.parametrize("pos", [
-    Pos(position_sigma=-0.01),
-    Pos(attitude_sigma=np.array([1e-4, -1e-4, 1e-4])),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "pos",
+    [
+        Pos(position_sigma=-0.01),
+        Pos(attitude_sigma=np.array([1e-4, -1e-4, 1e-4])),
+    ],
+)
 def test_negative_beliefs_are_refused(pos):
     "Both beliefs are named in m and deg"
     with pytest.raises(ValueError, match=r"believed sigmas .* m and .* deg; none may be negative"):

@@ -102,7 +102,10 @@ def test_together_they_are_better_than_alone(joint, alone):
 def test_scanners_that_share_nothing_come_out_as_alone(ties, share):
     "No common control, no common plane, a perfect POS: the same to a share of a sigma"
     site = scanner_site(5, targets=12, between=0, share=False, drift=1e-3)
-    both = together(site) if ties else estimate_mounting(site.trajectory, RECORDED, site.matched)
+    if ties:
+        both = together(site)
+    else:
+        both = estimate_mounting(site.trajectory, RECORDED, site.matched)
     for number, part in enumerate(separate(site, ties)):
         of_it = both.lsc.of(number)
         assert (np.abs(of_it.correction - part.lsc.correction) < share * part.lsc.sigma).all()
@@ -128,7 +131,8 @@ def test_a_scanner_that_saw_no_target_and_nothing_twice_is_held_by_the_other(sit
 def test_planes_that_both_saw_on_one_pass_tell_the_one_beside_the_other_alone(sites):
     "Without control or a second visit to 5 mm and 10 mdeg; both lever arms stay open by 5 cm"
     site = sites[0]
-    none, ties = site.matched[[]], site.ties[site.ties.scanner[:, 0] != site.ties.scanner[:, 1]]
+    none = site.matched[[]]
+    ties = site.ties[site.ties.scanner[:, 0] != site.ties.scanner[:, 1]]
     start = believed_mounting(site.trajectory, RECORDED, none)
     both = calibration_with_ties(start, none, ties)
     assert not both.determined[[2, 8]].any()
@@ -146,7 +150,8 @@ def test_ranges_of_one_scanner_are_told_from_those_of_the_other():
         beam /= np.linalg.norm(beam, axis=1, keepdims=True)
         return place - 0.03 * beam * (scanner == 1)[:, None]
 
-    matched, ties = site.matched, site.ties
+    matched = site.matched
+    ties = site.ties
     position = shortened(matched.observations.position, matched.gps_time, matched.scanner)
     matched = replace(matched, observations=replace(matched.observations, position=position))
     views = ties.place.reshape(-1, 3), ties.gps_time.ravel(), ties.scanner.ravel()

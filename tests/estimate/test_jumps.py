@@ -8,7 +8,9 @@ from mlscorr.frames import attitude_from_angles
 from mlscorr.simulate import DEMO, simulate
 from mlscorr.survey import ControlPoints, Matched, Pos, TargetObservations, Trajectory
 
-START, CORNER = 345_600.0, np.array([532_000.0, 3_374_000.0, 40.0])  # s, m
+# s, m
+START = 345_600.0
+CORNER = np.array([532_000.0, 3_374_000.0, 40.0])
 TIME = np.arange(0.0, 120.0, 0.02)  # s
 LIMIT = 0.2  # m/s
 SPREAD = 0.1  # s; resampling spreads a return of GNSS over some epochs
@@ -31,7 +33,8 @@ def outage(begin, end):
 
 def filtered(rng):
     "Two outages, the second too small for a step that shows by itself; sigma converges for 2 s"
-    error, sigma = slow(rng, 0.005), np.full((len(TIME), 3), 0.012)
+    error = slow(rng, 0.005)
+    sigma = np.full((len(TIME), 3), 0.012)
     for begin, end, size in ((20.0, 40.0, 0.5), (70.0, 80.0, 0.05)):
         error += outage(begin, end)[:, None] * size * rng.choice([-1.0, 1.0], 3)
         after = np.where(end + SPREAD < TIME, np.exp(-(TIME - end) / 0.7), 0.0)
@@ -70,9 +73,12 @@ def corrected(error, sigma, rng, pos=None):
 
 def controlled(recorded, error, rng, pos=None):
     "Correction by 13 targets along a drive, to 3 mm"
-    n, ends = 13, recorded.gps_time[[0, -1]]
+    n = 13
+    ends = recorded.gps_time[[0, -1]]
     times = np.linspace(ends[0] + 1.0, ends[1] - 1.0, n)
-    name, kind, size = tuple(f"T{i:02d}" for i in range(n)), ("circle",) * n, np.full(n, 0.6)
+    name = tuple(f"T{i:02d}" for i in range(n))
+    kind = ("circle",) * n
+    size = np.full(n, 0.6)
     up = np.tile([0.0, 0.0, 1.0], (n, 1))
     centre = recorded.at(times).position + np.array([8.0, 0.0, -1.0])
     true = np.column_stack([np.interp(times, recorded.gps_time, e) for e in error.T])

@@ -37,8 +37,12 @@ from tests.beds.places import EXAMPLES, MLSCORR
 
 START = 413_200.0  # s of week
 CORNER = np.array([523_000.0, 3_378_000.0, 40.0])  # m, UTM
-NOISE, SURVEYED = 0.003, 0.002  # m, one sigma of extraction and of the control points
-POSITION, ATTITUDE = 0.01, np.radians([0.005, 0.005, 0.01])  # what the POS states
+# m, one sigma of extraction and of the control points
+NOISE = 0.003
+SURVEYED = 0.002
+# what the POS states
+POSITION = 0.01
+ATTITUDE = np.radians([0.005, 0.005, 0.01])
 RECORDED = Mounting(
     np.array([0.1, -0.6, 0.4]), Rotation.from_euler("xyz", [90, 0, 35], degrees=True)
 )
@@ -135,7 +139,8 @@ def sites():
 def test_the_partials_are_those_of_georeferencing():
     "Differences of Eq. 1 by lever arm and by turns about the body axes agree with Eq. 16-18"
     site = Site(1)
-    times, step = site.observations.gps_time, 1e-4
+    times = site.observations.gps_time
+    step = 1e-4
     seen = to_scanner(site.recorded, RECORDED, site.observations.position, times)
     partials = mounting_partials(site.recorded, RECORDED, site.observations.position, times)
     for axis in range(6):
@@ -242,7 +247,8 @@ def test_the_order_of_the_targets_does_not_matter():
 @pytest.mark.long
 def test_one_straight_pass_does_not_determine_the_lever_arm():
     "On one heading a lever arm looks like a constant error of the POS; its sigma is no better"
-    straight, both = Site(5, passes=1, swing=0.0).calibrate(), Site(5).calibrate()
+    straight = Site(5, passes=1, swing=0.0).calibrate()
+    both = Site(5).calibrate()
     assert straight.determined.tolist() == [False] * 3 + [True] * 3
     assert (straight.lsc.sigma[:2] > 1.5 * both.lsc.sigma[:2]).all()
     assert "does not determine lever arm right" in straight.warnings[0]
@@ -291,7 +297,8 @@ def test_a_wrong_control_point_is_named_and_left_out():
 @pytest.mark.long
 def test_a_large_site_is_calibrated_with_parameters_from_a_part_of_it():
     "With 105 targets seen twice the sigmas are smaller, and the truth lies within four of them"
-    large, small = Site(9, targets=105), Site(9)
+    large = Site(9, targets=105)
+    small = Site(9)
     calibration = large.calibrate()
     assert np.abs((calibration.lsc.correction - LACKS) / calibration.lsc.sigma).max() < 4
     assert (calibration.lsc.sigma < small.calibrate().lsc.sigma).all()
@@ -330,7 +337,8 @@ boresight = [90.0, 0.0, 35.0]
 
 def test_a_copied_survey_file_keeps_all_but_the_mounting(tmp_path):
     "Comments and order stay, paths lead to the same files from the new folder, patterns too"
-    old, new = tmp_path / "a [1]", tmp_path / "results" / "b"
+    old = tmp_path / "a [1]"
+    new = tmp_path / "results" / "b"
     old.mkdir()
     new.mkdir(parents=True)
     (old / "survey.toml").write_text(SURVEY)
@@ -349,7 +357,8 @@ def test_a_copied_survey_file_keeps_all_but_the_mounting(tmp_path):
 
 def test_a_sigma_says_in_the_file_what_it_rests_on(tmp_path):
     """A comment stands beside the sigmas of a mounting, and goes when they are written without."""
-    old, new = tmp_path / "survey.toml", tmp_path / "new.toml"
+    old = tmp_path / "survey.toml"
+    new = tmp_path / "new.toml"
     old.write_text(SURVEY)
     mounting = replace(RECORDED, covariance=1e-6 * np.eye(6))
     write_survey_copy(old, new, tmp_path, [mounting], notes=["as the POS states"])
@@ -363,7 +372,8 @@ def test_sigmas_without_a_correlation_were_measured():
 
     Both count in the sigmas of points, whoever found them.
     """
-    arm, turn = [0.01, 0.02, 0.03], [0.5, 0.5, 1.0]
+    arm = [0.01, 0.02, 0.03]
+    turn = [0.5, 0.5, 1.0]
     sigma = np.append(arm, np.radians(turn))
     section = {"lever_arm": [0.1, -0.6, 0.4], "boresight": [90.0, 0.0, 35.0]}
     both = {"lever_arm_sigma": arm, "boresight_sigma": turn}
@@ -380,7 +390,8 @@ def test_sigmas_without_a_correlation_were_measured():
 @pytest.mark.parametrize("correlation", [False, True])
 def test_a_changed_part_leaves_no_sigma_of_the_one_before(correlation, tmp_path):
     "What a tape measured of the other part holds; a calibration's sigmas go with either"
-    old, new = tmp_path / "survey.toml", tmp_path / "new.toml"
+    old = tmp_path / "survey.toml"
+    new = tmp_path / "new.toml"
     lines = "lever_arm_sigma = [0.01, 0.01, 0.01]\nboresight_sigma = [0.1, 0.1, 0.1]\n"
     lines += f"correlation = {np.eye(6).tolist()}\n" * correlation
     old.write_text(SURVEY + lines)
@@ -453,7 +464,8 @@ def test_the_command_writes_the_calibration(commanded):
         check = content[method]["check"]
         assert check["n"] >= 2 and max(check["before"]["rmse"]) > 0.05
         assert max(check["after"]["rmse"]) < 0.03  # m
-    found, truth = content["lsc"], ([0.08, -0.05, 0.10], [0.0, 0.0, 0.5])
+    found = content["lsc"]
+    truth = ([0.08, -0.05, 0.10], [0.0, 0.0, 0.5])
     for part, lacks in zip(("lever_arm", "boresight"), truth, strict=True):
         error = np.subtract(found[part]["correction"], lacks)
         assert (np.abs(error) < 4 * np.array(found[part]["sigma"])).all()
@@ -465,7 +477,8 @@ def test_the_survey_it_writes_can_be_calibrated_again(street, commanded):
     "survey.toml holds recorded + c and names the new clouds, which lack nothing any more"
     _, out = commanded
     content = json.loads((out / "calibration.json").read_text())
-    old, new = mlscorr.read_survey(street), mlscorr.read_survey(out)
+    old = mlscorr.read_survey(street)
+    new = mlscorr.read_survey(out)
     change = new.mounting.lever_arm - old.mounting.lever_arm
     assert np.allclose(change, content["lsc"]["lever_arm"]["correction"], atol=1e-5)
     turn = (new.mounting.boresight * old.mounting.boresight.inv()).as_rotvec(degrees=True)
@@ -522,7 +535,8 @@ def test_a_survey_without_mounting_is_refused(street, tmp_path):
     "Without [mounting] there is nothing to calibrate, and the sentence says what to add"
     folder = shutil.copytree(street, tmp_path / "survey")
     text = (folder / "survey.toml").read_text()
-    start, end = text.index("[mounting]"), text.index("[control]")
+    start = text.index("[mounting]")
+    end = text.index("[control]")
     (folder / "survey.toml").write_text(text[:start] + text[end:])
     with pytest.raises(ValueError, match=r"has no \[mounting\].*Add that section"):
         mlscorr.calibrate(mlscorr.read_survey(folder))
@@ -601,7 +615,8 @@ def test_a_search_that_is_cut_off_counts_no_step_twice(monkeypatch):
 )
 def test_a_mounting_in_one_line_stays_readable(lines, has_room, tmp_path):
     "Sigmas are written, and behind the line what they rest on: TOML has no comment inside of it"
-    old, new = tmp_path / "survey.toml", tmp_path / "new.toml"
+    old = tmp_path / "survey.toml"
+    new = tmp_path / "new.toml"
     head, _, _ = SURVEY.partition("[mounting]")
     text = lines.format("lever_arm = [0.1, -0.6, 0.4]", "boresight = [90.0, 0.0, 35.0]")
     old.write_text(f"{text}\n{head}")

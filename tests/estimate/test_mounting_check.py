@@ -29,7 +29,8 @@ def checked(seed, degrees, number=120, scanners=1):
         body = pose.attitude.inv().apply(place - pose.position)
         return pose.position + pose.attitude.apply(lacking.apply(body))
 
-    ties, matched = street.ties, street.matched
+    ties = street.ties
+    matched = street.matched
     place = turned(ties.place.reshape(-1, 3), ties.gps_time.ravel()).reshape(-1, 2, 3)
     misclosure = np.einsum("ni,ni->n", ties.direction, place[:, 1] - place[:, 0])
     ties = replace(ties, place=place, misclosure=misclosure)
@@ -37,7 +38,8 @@ def checked(seed, degrees, number=120, scanners=1):
     matched = replace(matched, observations=replace(matched.observations, position=position))
     mountings = [RECORDED] * scanners
     views = np.random.default_rng(seed).integers(scanners, size=(len(ties), 2))
-    ties, of_other = replace(ties, scanner=views), mountings if scanners > 1 else ()
+    ties = replace(ties, scanner=views)
+    of_other = mountings if scanners > 1 else ()
     estimate = with_ties(estimate_correction(street.trajectory, matched), ties, of_other)
     return find_mounting_error(estimate, matched, mountings)
 
@@ -74,7 +76,8 @@ def test_scanners_that_are_wrong_alike_are_named(degrees):
 
 def test_a_lever_arm_is_named_where_it_exceeds_its_sigma_and_alone():
     "As two passes of a good POS tell of 9 cm; up, which they don't tell, is not named"
-    lacks, sigma = [-0.087, 0.004, 0.094, 0.0, 0.0, 0.0], [0.011, 0.011, 0.129, 4e-4, 3e-4, 2e-4]
+    lacks = [-0.087, 0.004, 0.094, 0.0, 0.0, 0.0]
+    sigma = [0.011, 0.011, 0.129, 4e-4, 3e-4, 2e-4]
     covariance = np.diag(np.square(sigma))
     check = AddedUnknowns(np.array(lacks), covariance, np.zeros((0, 6)), np.zeros(0), 68.6, 22.5)
     (sentence,) = mounting_warnings(check)

@@ -47,7 +47,8 @@ def test_each_mounting_has_its_own_part(estimate):
 def test_one_correction_after_another_is_their_combination():
     "Both ways of 2 and 3 degrees lead to the same mountings, to rounding"
     first, second = (np.repeat([0.1, np.radians(degrees)], 3) for degrees in (2.0, -3.0))
-    first, second = np.tile(first, 2) * np.arange(1, 13) / 12, np.tile(second, 2)
+    first = np.tile(first, 2) * np.arange(1, 13) / 12
+    second = np.tile(second, 2)
     apart = corrected_mountings(corrected_mountings(RECORDED, first), second)
     both = corrected_mountings(RECORDED, combined_correction(first, second))
     for one_by_one, at_once in zip(apart, both, strict=True):

@@ -34,7 +34,8 @@ def test_left_out_misclosures_are_those_of_an_estimate_without_the_target(number
     estimate = case.estimate()
     equations = estimate.equations
     alone = np.arange(16) == number
-    one, others = equations.select(alone), equations.select(~alone)
+    one = equations.select(alone)
+    others = equations.select(~alone)
     signals = pose_signals(one.stated, estimate.parameters, one.partials)
     mixings = [signal.mixing for signal in signals]
     design = others.pose_design(one.gps_time)[:, :3]
@@ -67,13 +68,17 @@ def test_a_shift_needs_no_slope():
     assert share[0] > share[1]
 
 
-@pytest.mark.parametrize("times, asked, order", [
-    (even(8), 3, 3),
-    (even(4), 3, 2),
-    (even(2), 1, 0),
-    (np.repeat(even(3), 3), 3, 1),
-    (even(8), 0, 0),
-], ids=["plenty", "four targets", "two targets", "three epochs", "a shift"])  # fmt: skip
+@pytest.mark.parametrize(
+    "times, asked, order",
+    [
+        (even(8), 3, 3),
+        (even(4), 3, 2),
+        (even(2), 1, 0),
+        (np.repeat(even(3), 3), 3, 1),
+        (even(8), 0, 0),
+    ],
+    ids=["plenty", "four targets", "two targets", "three epochs", "a shift"],
+)
 def test_an_order_leaves_one_epoch_and_one_target_over(times, asked, order):
     "k targets at e epochs carry an order of min(k, e) - 2 at most, and never less than a shift"
     equations = Case(EPOCHS, CONSTANT, times, np.random.default_rng(1)).equations()
@@ -109,8 +114,12 @@ def test_the_likelihood_is_that_of_a_trend_with_a_prior(equations, alternatives)
     n = 3 * len(equations.names)
     total = equations.noise.matrix.copy()
     for signal in signals:
-        clock = equations.gps_time if signal.clock is None else signal.clock
-        time, mixing = np.repeat(clock, 3), signal.mixing.reshape(n, -1)
+        if signal.clock is None:
+            clock = equations.gps_time
+        else:
+            clock = signal.clock
+        time = np.repeat(clock, 3)
+        mixing = signal.mixing.reshape(n, -1)
         total += (mixing @ mixing.T) * signal.covariance(time[:, None] - time)
     design = polynomial_design(equations.gps_time, equations.span, 0).reshape(n, -1)
     wide = total + row.parameters.trend_sigma**2 * design @ design.T

@@ -64,14 +64,18 @@ def test_its_sigma_is_honest(outages):
 @pytest.mark.long
 def test_a_solution_that_is_not_fixed_errs_by_what_it_states():
     "0.4 m from 50 to 110 s and from 150 to 190 s: less is left than linear interpolation leaves"
-    left, plain, within = [], [], []
+    left = []
+    plain = []
+    within = []
     for seed in range(4):
         rng = np.random.default_rng(seed)
-        error, sigma = walk(rng, 0.0, 0.0), np.full((len(TIME), 3), 0.02)
+        error = walk(rng, 0.0, 0.0)
+        sigma = np.full((len(TIME), 3), 0.02)
         for begin, end in ((50.0, 110.0), (150.0, 190.0)):
             inside = (begin <= TIME) & (end > TIME)
             waves = np.sin(TIME[inside, None] / 25.0 + rng.uniform(0, 6, 3))
-            error[inside], sigma[inside] = 0.4 * rng.normal(size=3) + 0.2 * waves, 0.4
+            error[inside] = 0.4 * rng.normal(size=3) + 0.2 * waves
+            sigma[inside] = 0.4
         trajectory, matched = survey(rng, error, EVEN)
         trajectory = replace(trajectory, position_sigma=sigma)
         for fit, parts in ((fit_linear, plain), (corrected_by_estimate, left)):
@@ -109,7 +113,8 @@ def test_control_in_a_smoothed_outage_leaves_the_rest_alone():
 @pytest.mark.long
 def test_nothing_that_control_does_not_tell_makes_the_head_surer_than_the_tail():
     "A constant error and sigma: 40 s before the first control are as open as 40 s after the last"
-    error, ends = np.tile([0.1, -0.05, 0.03], (len(TIME), 1)), []
+    error = np.tile([0.1, -0.05, 0.03], (len(TIME), 1))
+    ends = []
     for times in (np.linspace(40.0, 237.0, 10), np.linspace(2.9, 199.9, 10)):
         trajectory, matched = survey(np.random.default_rng(0), error, times)
         stated = np.full((len(TIME), 3), 0.5)  # m
@@ -117,7 +122,8 @@ def test_nothing_that_control_does_not_tell_makes_the_head_surer_than_the_tail()
         estimate = estimate_correction(trajectory, matched)
         sigma = np.linalg.norm(estimate.correction.corrected.position_sigma, axis=1)
         ends.append(sigma[[0, -1]])
-    head, tail = ends[0][0], ends[1][1]
+    head = ends[0][0]
+    tail = ends[1][1]
     assert 0.7 < head / tail < 1.4
     assert head < 0.05  # m, where an error was the same for 200 s
 

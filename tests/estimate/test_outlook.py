@@ -31,8 +31,10 @@ def gapped():
 
 def observed_at(equations, row):
     "The equations with a target that is seen at an epoch as the first control point is"
-    n, stated = len(equations.names), equations.stated
-    at, own = np.insert(np.arange(len(equations.gps_time)), n, 0), equations.noise.own[[0]]
+    n = len(equations.names)
+    stated = equations.stated
+    at = np.insert(np.arange(len(equations.gps_time)), n, 0)
+    own = equations.noise.own[[0]]
     epoch = equations.stated_epochs.at(np.array([row]))
     added = {
         name: np.insert(getattr(stated, name), n, getattr(epoch, name), axis=0)
@@ -47,9 +49,12 @@ def observed_at(equations, row):
         misclosure=np.insert(equations.misclosure, n, 0.0, axis=0),
         partials=equations.partials[at],
         stated=replace(stated, rotation=turned, **added),
-        noise=Noise(np.insert(noise.own, n, own, axis=0), np.insert(noise.group, n, len(
-            noise.shared)), np.vstack([noise.shared, noise.shared[noise.group[0]]])),
-    )  # fmt: skip
+        noise=Noise(
+            np.insert(noise.own, n, own, axis=0),
+            np.insert(noise.group, n, len(noise.shared)),
+            np.vstack([noise.shared, noise.shared[noise.group[0]]]),
+        ),
+    )
 
 
 def test_a_target_leaves_what_a_solution_with_it_leaves(gapped):
@@ -63,8 +68,7 @@ def test_a_target_leaves_what_a_solution_with_it_leaves(gapped):
     )
     partials = equations.partials.copy()
     partials[:n] = partials[0]
-    alike = replace(equations, partials=partials,
-                    noise=Noise(own, equations.noise.group, shared))  # fmt: skip
+    alike = replace(equations, partials=partials, noise=Noise(own, equations.noise.group, shared))
     rows = np.arange(0, len(alike.trajectory), 50)
     row = int(np.searchsorted(alike.trajectory.gps_time, START + 120.0))
     outlook = Outlook.of(alike, [family], rows, [[row]])

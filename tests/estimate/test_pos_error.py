@@ -179,7 +179,8 @@ def test_two_control_points_in_an_outage_leave_what_gnss_held(datum):
 
     A shift of any size would carry centimetres of the outage's drift there: 2.3 times as much.
     """
-    ratios, far = [], (EPOCHS < 60.0) | (EPOCHS > 111.0)
+    ratios = []
+    far = (EPOCHS < 60.0) | (EPOCHS > 111.0)
     for seed in range(6):
         rng = np.random.default_rng(seed)
         error, sigma = filtered_outage(rng)
@@ -198,15 +199,18 @@ def test_a_wrong_control_point_is_found_and_named(size, sigma, share):
 
     Always where the POS is good to 2 cm, in 3 of 4 surveys where it drifts by 10 cm.
     """
-    named, others = [], 0
+    named = []
+    others = 0
     for seed in range(4):
         rng = np.random.default_rng(seed)
         times = np.sort(rng.uniform(2.0, LENGTH - 2.0, 16))
         stated = np.full((len(EPOCHS), 3), sigma)
         case = Case(EPOCHS, waves(rng, size), times, rng, stated)
-        number, vector = rng.integers(16), rng.normal(size=3)
+        number = rng.integers(16)
+        vector = rng.normal(size=3)
         case.spoil(number, 0.5 * vector / np.linalg.norm(vector))
-        estimate, wrong = case.estimate(), case.control.name[number]
+        estimate = case.estimate()
+        wrong = case.control.name[number]
         names = [outlier.name for outlier in estimate.outliers]
         named.append(wrong in names)
         others += len(set(names) - {wrong})
@@ -251,7 +255,8 @@ def test_the_stated_sigma_is_honest(name, request):
 
 def moved(case, days, offset):
     "The same survey at another time and place"
-    offset, time = np.asarray(offset), 86_400.0 * days
+    offset = np.asarray(offset)
+    time = 86_400.0 * days
 
     def shift(trajectory):
         gps_time = trajectory.gps_time + time
@@ -307,10 +312,14 @@ def test_targets_at_the_same_time_are_solved(gps_time):
     At one epoch nothing tells a shift from drift: what is left of 0.5 m is more, and in sigma.
     """
     rng = np.random.default_rng(3)
-    times = np.full(8, 100.0) if gps_time == "one" else np.repeat(even(4), 2)
+    if gps_time == "one":
+        times = np.full(8, 100.0)
+    else:
+        times = np.repeat(even(4), 2)
     case = Case(EPOCHS, CONSTANT, times, rng)
     estimate = case.estimate()
-    left, sigma = case.remaining(estimate), estimate.correction.corrected.position_sigma
+    left = case.remaining(estimate)
+    sigma = estimate.correction.corrected.position_sigma
     assert rms(left) < (0.1 if gps_time == "one" else 0.05)  # m
     assert (np.abs(left) < 3 * sigma).all()
 
@@ -336,7 +345,8 @@ def test_sigma_that_lies_costs_little(wrong):
 def real_windows(length=248.0):
     "Real POS errors (E, N, H; m) in windows, and the sigma(t) that a POS would state"
     table = np.loadtxt(shared("data", "real_pos_error", "OB_GINS_TXT.err"))
-    gps_time, error = table[:, 0], table[:, [2, 1, 3]] * [1.0, 1.0, -1.0]
+    gps_time = table[:, 0]
+    error = table[:, [2, 1, 3]] * [1.0, 1.0, -1.0]
     lost = (gps_time - 357_900.0) % 150.0
     lost = np.where((gps_time >= 357_900.0) & (lost < 60.0), lost, 0.0)
     growth = np.outer(lost**2, [3.33e-4, 3.33e-4, 1.92e-4])
@@ -352,7 +362,10 @@ def test_real_drift_is_corrected_better_than_by_a_polynomial():
 
     16 targets evenly in each third window of 248 s; medians of the RMS over the windows.
     """
-    raw, fitted, corrected, normalised = [], [], [], []
+    raw = []
+    fitted = []
+    corrected = []
+    normalised = []
     for seed, (epochs, error, sigma) in list(enumerate(real_windows()))[::3]:
         times = np.linspace(epochs[0] + 2, epochs[-1] - 2, 16)
         case = Case(epochs, error, times, np.random.default_rng(seed), sigma)

@@ -97,7 +97,8 @@ def gaussian(curvature, centre):
 def test_the_covariance_about_a_mode_is_the_inverse_curvature():
     "Of a quadratic it is exact, correlations included"
     root = np.random.default_rng(3).normal(size=(3, 3))
-    curvature, centre = root @ root.T + np.eye(3), np.array([0.3, -0.2, 0.5])
+    curvature = root @ root.T + np.eye(3)
+    centre = np.array([0.3, -0.2, 0.5])
     covariance = gaussian(curvature, centre).covariance("matern32", centre, 7.0)
     np.testing.assert_allclose(covariance, np.linalg.inv(curvature), rtol=1e-6)
 
@@ -111,7 +112,8 @@ def test_nothing_is_known_less_than_before(curvature):
 
 def test_each_family_has_a_mode(equations):
     "Four families, the best first, each of the height that its parameters have"
-    modes, objective = most_probable(equations), Objective.of(equations)
+    modes = most_probable(equations)
+    objective = Objective.of(equations)
     assert sorted(chosen.family for chosen, _ in modes) == sorted((*FAMILIES, INTEGRATED))
     values = [value for _, value in modes]
     assert values == sorted(values, reverse=True)

@@ -100,10 +100,12 @@ def test_the_last_epoch_of_an_outage_has_its_own_sigma():
     assert len(history.steps) == len(history.restarts) == 0 and len(history.returns) == 1
     last = np.searchsorted(case.recorded.gps_time, history.returns) - 1
     posterior = choose_parameters(equations, points=8)
-    mean, square = 0.0, 0.0
+    mean = 0.0
+    square = 0.0
     for chosen, weight in posterior.mixture:
         pose, spread = predict_under(equations, chosen, last)
-        mean, square = mean + weight * pose, square + weight * (variances(spread) + pose**2)
+        mean = mean + weight * pose
+        square = square + weight * (variances(spread) + pose**2)
     pose, spread = predict_pose_error(equations, posterior)
     assert variances(spread[last]) == pytest.approx(square - mean**2, rel=1e-6)
     assert pose[last] == pytest.approx(mean, abs=1e-9)

@@ -11,7 +11,8 @@ from mlscorr.estimate.prior import NAMES, SPLIT, mounting_prior
 from mlscorr.survey import Pos
 from tests.beds.pos_errors import CONSTANT, EPOCHS, Case, even, outage_case
 
-STEADY, GROWING = "steady", "growing"
+STEADY = "steady"
+GROWING = "growing"
 
 
 def equations_of(kind, pos=None, n=5, prior=position_prior):
@@ -19,7 +20,10 @@ def equations_of(kind, pos=None, n=5, prior=position_prior):
     if kind == GROWING:
         case = outage_case(1, n)
     else:
-        sigma = np.full((len(EPOCHS), 3), 0.02) if kind == STEADY else None
+        if kind == STEADY:
+            sigma = np.full((len(EPOCHS), 3), 0.02)
+        else:
+            sigma = None
         case = Case(EPOCHS, CONSTANT, even(n), np.random.default_rng(1), sigma)
     return position_equations(case.recorded, case.matched, pos or Pos(), 0, prior)
 
@@ -32,7 +36,9 @@ def start(prior, name):
 def spread(prior, name):
     "One sigma of a parameter's logarithm, None where it is fixed"
     free = [NAMES[i] for i in prior.free]
-    return prior.spread[free.index(name)] if name in free else None
+    if name in free:
+        return prior.spread[free.index(name)]
+    return None
 
 
 @pytest.mark.parametrize("n", [3, 5, 9])
@@ -55,7 +61,8 @@ def test_without_sigmas_the_believed_time_holds():
 
 def test_the_attitude_follows_the_drift_in_a_correction_alone():
     "Its time is free about 120 s in a calibration, where targets tell of the gyros"
-    correction, calibration = position_prior(equations_of(None)), mounting_prior(equations_of(None))
+    correction = position_prior(equations_of(None))
+    calibration = mounting_prior(equations_of(None))
     assert correction.attitude_follows and spread(correction, "attitude_time") is None
     assert not calibration.attitude_follows
     assert start(calibration, "attitude_time") == pytest.approx(120.0)

@@ -15,7 +15,8 @@ STRONG = np.log(SETTINGS.strong_evidence)
 
 def bumped_case(count, times=None):
     "A POS that errs by millimetres, but by decimetres for 14 s at some of 20 targets"
-    rng, places = np.random.default_rng(count), even(20)[1::4]
+    rng = np.random.default_rng(count)
+    places = even(20)[1::4]
     error = waves(rng, 0.002)
     for centre in places[:count]:
         share = np.clip((EPOCHS - centre + 7.0) / 14.0, 0.0, 1.0)[:, None]

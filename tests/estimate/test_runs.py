@@ -35,7 +35,8 @@ def seen_again(case, bump):
     targets seen again: Trajectory, Matched and true - recorded position (n, 3). The first time it
     lacks a bump (n, 3), too.
     """
-    rng, pause = np.random.default_rng(5), EPOCHS[-1] + 100.0
+    rng = np.random.default_rng(5)
+    pause = EPOCHS[-1] + 100.0
     first = case.true.position - case.recorded.position
     error = np.concatenate([first + bump, 0.7 * first[:, [1, 2, 0]]])
     true = case.true.select(np.tile(np.arange(len(EPOCHS)), 2))

@@ -29,7 +29,8 @@ def distorted(site, ranges, scale):
         )
         return georeference(site.trajectory, RECORDED, beam, gps_time)
 
-    matched, ties = site.matched, site.ties
+    matched = site.matched
+    ties = site.ties
     position = record(matched.observations.position, matched.gps_time)
     matched = replace(matched, observations=replace(matched.observations, position=position))
     place = record(ties.place.reshape(-1, 3), ties.gps_time.ravel()).reshape(-1, 2, 3)
@@ -103,9 +104,11 @@ def test_a_scanner_that_is_right_changes_nothing():
 def test_the_partials_are_differences_of_georeferenced_points():
     "A range longer by 0.1 mm, an angle by a hundred thousandth, move points as the partials say"
     site = tied_site(1)
-    times, place = site.matched.gps_time, site.matched.observations.position
+    times = site.matched.gps_time
+    place = site.matched.observations.position
     beam = to_scanner(site.trajectory, RECORDED, place, times)
-    angle, radius = np.arctan2(beam[:, 1], beam[:, 0]), np.hypot(beam[:, 0], beam[:, 1])
+    angle = np.arctan2(beam[:, 1], beam[:, 0])
+    radius = np.hypot(beam[:, 0], beam[:, 1])
     longer = beam * (1 + 1e-4 / np.linalg.norm(beam, axis=1, keepdims=True))
     turned = np.column_stack(
         [*(radius * f(angle * (1 + 1e-5)) for f in (np.cos, np.sin)), beam[:, 2]]

@@ -24,9 +24,11 @@ from tests.beds.pos_errors import (
 @pytest.mark.long
 def test_two_wrong_control_points_do_not_hide_each_other():
     "Two of 16 wrong by 0.5 m at once, in any directions: both named in 3 of 4 surveys, no other"
-    both, others = 0, 0
+    both = 0
+    others = 0
     for seed in range(4):
-        rng, case = np.random.default_rng([seed, 1]), smooth_case(seed)
+        rng = np.random.default_rng([seed, 1])
+        case = smooth_case(seed)
         numbers = rng.choice(16, 2, replace=False)
         for number in numbers:
             vector = rng.normal(size=3)
@@ -46,7 +48,8 @@ def test_a_fifth_of_the_control_points_may_be_wrong():
     "Three of 16 wrong: the result is that of the 13 good ones, to a millimetre"
     differences = []
     for seed in range(2):
-        rng, case = np.random.default_rng([seed, 3]), smooth_case(seed, sigma=0.05)
+        rng = np.random.default_rng([seed, 3])
+        case = smooth_case(seed, sigma=0.05)
         numbers = rng.choice(np.arange(1, 15), 3, replace=False)
         good = np.setdiff1d(np.arange(16), numbers)
         clean = estimate_correction(case.recorded, case.matched[good])
@@ -75,7 +78,8 @@ def test_neighbours_wrong_together_are_rejected_or_told():
 @pytest.mark.long
 def test_a_target_that_is_wrong_in_one_of_two_passes_is_found_among_many():
     "Of 60 targets, each seen again 120 s later, the second look at one is off by 0.3 m: it goes"
-    rng, first = np.random.default_rng(3), np.linspace(3.0, 117.0, 60)
+    rng = np.random.default_rng(3)
+    first = np.linspace(3.0, 117.0, 60)
     error = np.tile([0.1, -0.05, 0.03], (len(lying_pos.TIME), 1))
     looks = lying_pos.survey(rng, error, np.append(first, first + 120.0))
     names = 2 * looks[1].observations.name[:60]

@@ -32,6 +32,7 @@ def test_steps_of_derivatives_suit_their_spread():
 
 def test_gross_sizes_span_misread_targets_to_wrong_setups():
     "0.1 to 2.5 m in equal ratios; scales of the search halve"
-    sizes, scales = SETTINGS.gross_sizes, SETTINGS.scale_factors
+    sizes = SETTINGS.gross_sizes
+    scales = SETTINGS.scale_factors
     np.testing.assert_allclose(np.diff(np.log(sizes)), np.log(5.0))
     np.testing.assert_allclose(np.diff(np.log2(scales)), -1.0)

@@ -65,9 +65,12 @@ def test_drift_that_a_smoother_ties_down_is_a_walk_that_is_known_at_its_end():
     asked = np.linspace(history.starts[0], history.returns[0], 9)[1:-1]
     stated = stated_sigma(trajectory, Pos(), asked)
     velocity, walk = pose_signals(stated, replace(PARAMETERS, family=INTEGRATED), partials(7))[:2]
-    since, whole = asked - history.starts[0], history.returns[0] - history.starts[0]
-    s, t = np.minimum.outer(since, since), np.maximum.outer(since, since)
-    position, at_end = s**2 * (3 * t - s) / 6, since**2 * (3 * whole - since) / 6
+    since = asked - history.starts[0]
+    whole = history.returns[0] - history.starts[0]
+    s = np.minimum.outer(since, since)
+    t = np.maximum.outer(since, since)
+    position = s**2 * (3 * t - s) / 6
+    at_end = since**2 * (3 * whole - since) / 6
     ends = np.array([[whole**3 / 3, whole**2 / 2], [whole**2 / 2, whole]])
     across = np.column_stack([at_end, since**2 / 2])
     tied = {

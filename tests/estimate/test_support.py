@@ -11,7 +11,8 @@ from mlscorr.survey import Pos
 from tests.beds.lying_pos import START, TIME, survey, walk
 
 EVEN = np.linspace(3.0, 237.0, 16)
-EARLY, LATE = "before the first", "past the last"
+EARLY = "before the first"
+LATE = "past the last"
 
 
 def support_of(seed, outage, times):
@@ -93,7 +94,8 @@ def test_times_at_which_nothing_was_scanned_are_not_extrapolated():
     assert np.ravel(spans) == pytest.approx([99.9, 101.0, 179.0, 180.0], abs=0.15)
     assert not any("extrapolated" in sentence for sentence in estimate.warnings)
     assert estimate.guards.gap[1] - estimate.guards.gap[0] < 8.0
-    sigma, places = largest_sigma(estimate.correction.corrected), place_control(estimate)
+    sigma = largest_sigma(estimate.correction.corrected)
+    places = place_control(estimate)
     times = np.array([sigma["time"], *(place.gps_time for place in places)]) - START
     assert len(places) == 3 and (times > 99.8).all() and (times < 180.2).all()
 

@@ -87,9 +87,12 @@ def test_a_gross_error_shows_at_its_target_most():
     "0.3 m at one of seven targets: its statistic is the largest and beyond the critical value"
     for number in (1, 3, 5):
         case = Case(
-            EPOCHS, CONSTANT, even(7), np.random.default_rng(number),
+            EPOCHS,
+            CONSTANT,
+            even(7),
+            np.random.default_rng(number),
             np.full((len(EPOCHS), 3), 0.01),
-        )  # fmt: skip
+        )
         case.spoil(number, [0.3, 0.0, 0.0])
         equations = case.equations()
         objective = Objective.of(equations)

@@ -24,7 +24,8 @@ def equations(survey):
 def test_partials_are_what_a_changed_pose_does_to_the_misclosure(survey, equations):
     "A correction of metres and milliradians at each view changes n . (c1 - c2) as B says: 0.1 mm"
     rng = np.random.default_rng(3)
-    trajectory, ties = survey.trajectory, survey.ties
+    trajectory = survey.trajectory
+    ties = survey.ties
     pose = np.hstack([rng.normal(size=(1, 3)), 1e-4 * rng.normal(size=(1, 3))])
     there = trajectory.gps_time <= trajectory.passes[0, 1]
     correction = Correction.by_pose_error(trajectory, np.where(there[:, None], pose, 0.0))

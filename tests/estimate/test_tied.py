@@ -125,7 +125,8 @@ def test_ties_that_contradict_each_other_are_not_used():
 @pytest.mark.long
 def test_what_ties_of_a_second_share_is_held_down_by_their_weights():
     "An error of 1 cm per second harms a tenth less by weights, though more is left of the ties"
-    harm, residual = np.zeros((4, 2)), np.zeros((4, 2))
+    harm = np.zeros((4, 2))
+    residual = np.zeros((4, 2))
     for row, seed in enumerate((1, 2, 3, 4)):
         survey = tied_passes(seed, shared=0.01)
         alone = estimate_correction(survey.trajectory, survey.matched)
@@ -155,7 +156,8 @@ def test_ties_that_choose_parameters_follow_the_time_in_which_they_were_seen():
     survey = tied_passes(1, number=6000)
     equations = estimate_correction(survey.trajectory, survey.matched).equations
     ties = TieEquations.of(survey.trajectory, equations.pos, survey.ties, equations.stated)
-    chosen, views = [], []
+    chosen = []
+    views = []
     for longer in (1, 10, 100):
         slower = replace(ties, gps_time=longer * ties.gps_time)
         few = sample(replace(equations, ties=slower))

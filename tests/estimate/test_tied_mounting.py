@@ -54,7 +54,8 @@ def test_ties_tell_nothing_of_a_difference_between_coordinates(alone, tied):
 
 def test_partials_are_what_a_changed_mounting_does_to_the_misclosure(site, alone):
     "Differences of georeferenced misclosures by each component agree with a tie's row of A"
-    equations, step = alone.equations, 1e-4
+    equations = alone.equations
+    step = 1e-4
     about = georeferenced_ties(equations, [RECORDED], [RECORDED], site.ties)
     for axis in range(6):
         ends = [

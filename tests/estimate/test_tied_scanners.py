@@ -19,7 +19,8 @@ from tests.beds.tied_passes import LENGTH, NOISE, ORIGIN, SPEED, START, drift, t
 
 pytestmark = pytest.mark.long
 
-SEED, NUMBER = 3, 600
+SEED = 3
+NUMBER = 600
 ARM = np.array([0.1, -0.6, 0.4])  # m
 LEFT, RIGHT = (Mounting(ARM, Rotation.from_euler("Z", a, degrees=True)) for a in (35, -35))
 LACKS = np.append([0.01, -0.02, 0.015], np.radians([0.1, -0.05, 0.15]))  # m, rad

@@ -29,7 +29,9 @@ def said(survey, change=lambda cloud: cloud):
 
 
 def backwards(cloud):
-    first, last = 357_700.0, 357_708.0  # s
+    # s
+    first = 357_700.0
+    last = 357_708.0
     return PointCloud(cloud.xyz, first + last - cloud.gps_time, cloud.intensity)
 
 

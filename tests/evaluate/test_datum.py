@@ -31,7 +31,8 @@ def about(place, matrix):
 
 
 def turned(place, angle):
-    c, s = np.cos(angle), np.sin(angle)
+    c = np.cos(angle)
+    s = np.sin(angle)
     return about(place, [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 

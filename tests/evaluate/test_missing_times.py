@@ -15,8 +15,9 @@ def test_points_without_a_time_are_not_outside_the_trajectory(late, tmp_path):
     "Where 1 % of the points have -1 that is said; points past the trajectory's end are, too"
     times = write_survey(tmp_path, -1.0, step=31)
     las = laspy.read(tmp_path / "pass.las")
-    las.gps_time = np.where((np.arange(len(times)) >= len(times) - late) & (times > 0),
-                            times + 20.0, times)  # fmt: skip
+    las.gps_time = np.where(
+        (np.arange(len(times)) >= len(times) - late) & (times > 0), times + 20.0, times
+    )
     las.write(tmp_path / "pass.las")
     with pytest.warns(UserWarning, match="gps_time -1"):
         survey = mlscorr.read_survey(tmp_path)

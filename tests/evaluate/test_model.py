@@ -77,7 +77,8 @@ def test_one_target_left_out_is_not_corrected():
 def test_the_global_test_and_gap_are_those_of_the_guards():
     "Statistic within limits, start and end of the longest stretch without control"
     estimate = smooth_case(12, n=6).estimate()
-    section, guards = model_section(estimate), estimate.guards
+    section = model_section(estimate)
+    guards = estimate.guards
     assert section["longest_gap"] == list(guards.longest_gap)
     low, high = section["global_test"]["limits"]
     assert section["global_test"]["passed"] == (low <= section["global_test"]["statistic"] <= high)

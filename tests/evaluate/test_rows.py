@@ -19,7 +19,8 @@ def residuals(n, seed=1):
 
 def row(name="T01", role="control", pass_number=1, used=None, reason=None, observed=True):
     "A row of a surveyed point that was observed 30 cm off and corrected to 1 mm"
-    used = role == "control" and reason is None if used is None else used
+    if used is None:
+        used = role == "control" and reason is None
     seen = PLACE - 0.3 if observed else UNKNOWN
     vectors = (PLACE, seen, np.full(3, 0.004), np.full(3, 0.3), np.full(3, 0.001), UNKNOWN)
     return TargetRow(name, pass_number, 413_200.5, role, *vectors, used, reason)
@@ -41,7 +42,8 @@ def test_squares_are_those_of_mean_and_scatter(n, seed):
 def test_order_and_sign_matter_where_they_should():
     "Turned round, means change sign and RMSE, lengths and scatter don't"
     values = residuals(7)
-    once, back = Statistics.of(values), Statistics.of(-values[::-1])
+    once = Statistics.of(values)
+    back = Statistics.of(-values[::-1])
     np.testing.assert_allclose(back.mean[:3], -once.mean[:3])
     np.testing.assert_allclose(back.mean[3:], once.mean[3:])
     np.testing.assert_allclose(back.rmse, once.rmse)
@@ -77,37 +79,52 @@ def test_the_table_has_a_line_for_each_axis():
     statistics = Statistics.of(residuals(5))
     assert statistics.table.shape == (5, 5)
     np.testing.assert_array_equal(statistics.table[:, 0], statistics.rmse)
-    np.testing.assert_array_equal(statistics.table[2], [
-        statistics.rmse[2], statistics.mean[2], statistics.std[2],
-        statistics.minimum[2], statistics.maximum[2],
-    ])  # fmt: skip
+    np.testing.assert_array_equal(
+        statistics.table[2],
+        [
+            statistics.rmse[2],
+            statistics.mean[2],
+            statistics.std[2],
+            statistics.minimum[2],
+            statistics.maximum[2],
+        ],
+    )
 
 
 def test_a_score_tells_before_after_and_left_out():
     "Its number is that after the correction; left-out ones stand beside it, or not at all"
     before, after, left = (Statistics.of(residuals(n)) for n in (8, 8, 5))
-    plain, full = Score(before, after).document(), Score(before, after, left).document()
+    plain = Score(before, after).document()
+    full = Score(before, after, left).document()
     assert plain["n"] == full["n"] == 8 and "leave_one_out" not in plain
     assert full["leave_one_out"]["n"] == 5
     assert full["before"] == before.document() and full["after"] == after.document()
 
 
-@pytest.mark.parametrize("role, used, reason, group", [
-    ("control", True, None, "control"),
-    ("control", False, "outlier", "unused"),
-    ("check", False, "check point", "check"),
-    ("check", False, None, "check"),
-    ("check", False, "no pose", "unused"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "role, used, reason, group",
+    [
+        ("control", True, None, "control"),
+        ("control", False, "outlier", "unused"),
+        ("check", False, "check point", "check"),
+        ("check", False, None, "check"),
+        ("check", False, "no pose", "unused"),
+    ],
+)
 def test_rows_belong_to_a_group(role, used, reason, group):
     "Control that took part, check points for no other reason than that, and all else"
     assert row(role=role, used=used, reason=reason).group == group
 
 
-@pytest.mark.parametrize("given_row", [
-    row(), row("C1", "check", reason="check point"), row(observed=False, reason="hidden"),
-    TargetRow.unobserved("T09", None, "control", PLACE, "No target was found.", scanned=False),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "given_row",
+    [
+        row(),
+        row("C1", "check", reason="check point"),
+        row(observed=False, reason="hidden"),
+        TargetRow.unobserved("T09", None, "control", PLACE, "No target was found.", scanned=False),
+    ],
+)
 def test_a_row_comes_back_from_its_document(given_row):
     "Written as JSON and read, it is the same to the last bit, unknown vectors included"
     text = json.dumps(given_row.document(), allow_nan=False)
@@ -126,14 +143,16 @@ def test_a_point_without_observation_knows_its_place_alone():
 
 
 ROWS = [
-    row("T01"), row("T01", pass_number=2),
+    row("T01"),
+    row("T01", pass_number=2),
     row("T02", reason="outlier: 40 against 16"),
-    row("T03", reason="too far off"), row("T03", pass_number=2),
+    row("T03", reason="too far off"),
+    row("T03", pass_number=2),
     TargetRow.unobserved("T04", None, "control", PLACE, "hidden"),
     TargetRow.unobserved("T05", None, "control", PLACE, "far away", scanned=False),
     row("C1", "check", reason="check point"),
     TargetRow.unobserved("C2", None, "check", PLACE, "hidden too"),
-]  # fmt: skip
+]
 
 
 def test_points_are_counted_once_whatever_their_passes():
@@ -158,6 +177,9 @@ def test_counts_stand_in_the_report_under_their_names():
     "n_surveyed, n_seen, n_scored, n_unseen, and each unseen one with its reason"
     document = PointCounts.of(ROWS, "control").document()
     assert document == {
-        "n_surveyed": 5, "n_seen": 3, "n_scored": 2, "n_unseen": 1,
+        "n_surveyed": 5,
+        "n_seen": 3,
+        "n_scored": 2,
+        "n_unseen": 1,
         "unseen": [{"name": "T04", "reason": "hidden"}],
-    }  # fmt: skip
+    }

@@ -23,7 +23,8 @@ class Leaning:
     "A correction that grows with time, by m/s from the first point on"
 
     def __init__(self, start, rate):
-        self.start, self.rate = start, rate
+        self.start = start
+        self.rate = rate
 
     def apply(self, cloud):
         return replace(cloud, xyz=cloud.xyz + np.outer(cloud.gps_time - self.start, self.rate))
@@ -46,7 +47,8 @@ def test_the_right_shift_leaves_nothing(matched):
 
 def test_each_target_is_corrected_at_its_own_time(matched):
     "A correction that grows by 1 cm a second leaves what it lacks at each target's second"
-    start, rate = matched.gps_time.min(), np.array([0.01, 0.0, -0.01])
+    start = matched.gps_time.min()
+    rate = np.array([0.01, 0.0, -0.01])
     left = misclosures(matched, Leaning(start, rate))
     expected = SHIFT - np.outer(matched.gps_time - start, rate)
     np.testing.assert_allclose(left, expected, atol=1e-9)
@@ -63,7 +65,8 @@ def test_a_score_is_of_both_sides_of_a_correction(matched):
 def test_left_out_ones_that_are_not_known_do_not_count(matched):
     "Rows with any NaN are left, and the others have their own statistics"
     left = np.full((16, 3), 0.02)
-    left[[3, 8]], left[5, 1] = np.nan, np.nan
+    left[[3, 8]] = np.nan
+    left[5, 1] = np.nan
     result = score(matched, Moved(SHIFT), left)
     assert result.left_out.n == 13
     np.testing.assert_allclose(result.left_out.rmse[:3], 0.02)

@@ -20,6 +20,7 @@ def test_the_number_of_check_points_is_that_of_the_standard(more, conformant):
 def test_check_points_must_be_twice_as_accurate(ratio, told):
     "A survey of 0.45 of the product's error passes without a word, one of 0.55 is told"
     assert SETTINGS.accuracy_ratio == 2.0
-    residuals, sigma = np.tile([0.02, 0.02, 0.02], (40, 1)), np.full((40, 3), 0.02 * ratio)
+    residuals = np.tile([0.02, 0.02, 0.02], (40, 1))
+    sigma = np.full((40, 3), 0.02 * ratio)
     statement = positional_accuracy(residuals, sigma, 40)["statement"]
     assert any("twice as accurate" in sentence for sentence in statement) == told

@@ -12,4 +12,6 @@ IS_FULL = SHARE > 0
 
 def tries(few, many):
     "Number of faults to try"
-    return max(few, round(SHARE * many)) if IS_FULL else few
+    if IS_FULL:
+        return max(few, round(SHARE * many))
+    return few

@@ -62,7 +62,9 @@ class Stage:
     """A process that forks runs, and the folder into whose folder runs/ they write."""
 
     def __init__(self, shim, survey, folder):
-        self.survey, self.folder, self.runs = survey, folder, folder / "runs"
+        self.survey = survey
+        self.folder = folder
+        self.runs = folder / "runs"
         self.runs.mkdir()
         self.input = content(survey)
         self.process = subprocess.Popen(

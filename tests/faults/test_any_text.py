@@ -81,7 +81,10 @@ def test_a_trajectory_is_read_as_it_was_written(tmp_path, epochs, seed, states):
     place = rng.uniform([2e5, 1e5, -100], [8e5, 9e6, 4000])
     position = place + np.cumsum(rng.normal(0, 0.05, (epochs, 3)), axis=0)
     angles = rng.uniform([-0.5, -0.5, 0.0], [0.5, 0.5, 6.28], (epochs, 3))
-    sigmas = rng.uniform(0.001, 1.0, (2, epochs, 3)) if states else (None, None)
+    if states:
+        sigmas = rng.uniform(0.001, 1.0, (2, epochs, 3))
+    else:
+        sigmas = (None, None)
     written = Trajectory(times, position, attitude_from_angles(*angles.T), *sigmas)
     path = tmp_path / "trajectory.csv"
     write_trajectory_csv(path, written)

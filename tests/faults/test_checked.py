@@ -65,7 +65,8 @@ def test_what_a_check_passes_of_mutated_files_is_corrected(name, tiny, tmp_path,
     "Changed bytes and cells of any input: passed and corrected, or a fault of both"
     folder = shutil.copytree(tiny, tmp_path / "survey")
     whole = (folder / name).read_bytes()
-    rng, outcomes = np.random.default_rng(29), Counter()
+    rng = np.random.default_rng(29)
+    outcomes = Counter()
     for _ in range(tries(1, 40)):
         (folder / name).write_bytes(mutated(whole, rng, BYTES if name.endswith("las") else TEXT))
         said = verdicts(folder)

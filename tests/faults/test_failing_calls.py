@@ -71,7 +71,8 @@ def check_again(stage, command, before, whole, left):
 @pytest.mark.long
 def test_a_failing_call_leaves_all_or_nothing(stage, kept, record_property):
     "Whatever call fails: one sentence with the cause, the old results or the new, and no .part"
-    rng, outcomes = np.random.default_rng(18), Counter()
+    rng = np.random.default_rng(18)
+    outcomes = Counter()
     for _ in range(tries(3, 400)):
         overwrites = bool(rng.integers(2))
         command, before, whole = prepared(stage, kept, overwrites)
@@ -90,7 +91,8 @@ def test_a_failing_call_leaves_all_or_nothing(stage, kept, record_property):
 
 def test_a_kill_in_a_call_leaves_all_or_nothing(stage, kept, record_property):
     "Killed or interrupted in any call: old results or new, and the next run clears the rest away"
-    rng, outcomes = np.random.default_rng(18), Counter()
+    rng = np.random.default_rng(18)
+    outcomes = Counter()
     for _ in range(tries(2, 200)):
         command, before, whole = prepared(stage, kept, bool(rng.integers(2)))
         number = SIGNALS[rng.integers(len(SIGNALS))]
@@ -103,14 +105,16 @@ def test_a_kill_in_a_call_leaves_all_or_nothing(stage, kept, record_property):
 @pytest.mark.skipif(not IS_FULL, reason="in make faults: moments are those of a clock")
 def test_a_kill_at_any_moment_leaves_all_or_nothing(stage, kept, record_property):
     "From the first read byte to the last written one, in whole runs"
-    rng, outcomes = np.random.default_rng(18), Counter()
+    rng = np.random.default_rng(18)
+    outcomes = Counter()
     stage.clear()
     start = time.perf_counter()
     stage.run("correct", stage.survey, "--no-report")
     length = time.perf_counter() - start
     for _ in range(tries(0, 200)):
         command, before, whole = prepared(stage, kept, bool(rng.integers(2)))
-        number, moment = SIGNALS[rng.integers(len(SIGNALS))], rng.uniform(0.0, length)
+        number = SIGNALS[rng.integers(len(SIGNALS))]
+        moment = rng.uniform(0.0, length)
 
         def kill(process, number=number, moment=moment):
             time.sleep(moment)
@@ -134,7 +138,10 @@ def check_ended(ended, number, before, whole):
         assert ended.code == -number
         return "killed"
     assert ended.code == 130 and left == ended.left, ended
-    said = "all results were written before" if left == whole else "nothing was written"
+    if left == whole:
+        said = "all results were written before"
+    else:
+        said = "nothing was written"
     assert ended.stderr.endswith(f"Interrupted; {said}.\n")
     return f"interrupted; {said}"
 
@@ -143,7 +150,8 @@ def check_ended(ended, number, before, whole):
 @pytest.mark.parametrize(("command", "call"), COMMANDS if IS_FULL else COMMANDS[:1])
 def test_every_command_says_that_the_disk_is_full(command, call, shim, tiny, tmp_path):
     "As users run them: exit code 5, one sentence, nothing left, the input intact"
-    before, runs = content(tiny), tmp_path / "runs"
+    before = content(tiny)
+    runs = tmp_path / "runs"
     runs.mkdir()
     fault = {"FOLDER": f"{runs}/", "CALL": call, "NUMBER": "2", "ERRNO": str(errno.ENOSPC)}
     env = os.environ | {f"FAULT_{name}": value for name, value in fault.items()}

@@ -26,7 +26,9 @@ def test_good_surveys_hear_no_warning(monkeypatch, record_property):
     monkeypatch.setattr(sys, "path", [str(BENCHMARKS), *sys.path])
     from feature_surveys import feature_survey
 
-    number, told, unmade = tries(1, 200), {}, Counter()
+    number = tries(1, 200)
+    told = {}
+    unmade = Counter()
     for seed in range(number):
         with warnings.catch_warnings(action="ignore"):
             rng = np.random.default_rng([18, seed])

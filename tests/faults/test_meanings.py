@@ -17,7 +17,8 @@ import mlscorr
 from tests.faults.sizes import IS_FULL, tries
 
 FOOT = 0.3048  # m
-PLACE, ANGLES = ("easting", "northing", "height"), ("roll", "pitch", "heading")
+PLACE = ("easting", "northing", "height")
+ANGLES = ("roll", "pitch", "heading")
 OUTSIDE = "None of the sampled times .* lie inside the trajectory .*(days|UTC)"
 BESIDE = "deg off the scan plane .*(gps_time wrong|another scanner)"
 HEADING = "heading of .*trajectory.csv differs from the course"
@@ -221,7 +222,9 @@ def checked(folder):
 @pytest.mark.skipif(not IS_FULL, reason="in make faults")
 def test_a_check_names_them_before(tiny, tmp_path, record_property):
     "What a correction says of a file's meaning, a check says too, or the cause in its own words"
-    rng, number, unnamed = np.random.default_rng(19), 0, Counter()
+    rng = np.random.default_rng(19)
+    number = 0
+    unnamed = Counter()
     for kind, (draw, expected) in (READ | ESTIMATED).items():
         shutil.rmtree(tmp_path / "survey", ignore_errors=True)
         folder = shutil.copytree(tiny, tmp_path / "survey")
@@ -241,7 +244,9 @@ def test_what_a_file_means_is_named(kinds, tiny, tmp_path, record_property):
     "Times, axes, units, frames, heights: the sentence says which of them is likely wrong"
     if kinds is ESTIMATED and not IS_FULL:
         pytest.skip("in make faults; the sentences have tests of their own")
-    rng, number, unnamed = np.random.default_rng(18), 0, Counter()
+    rng = np.random.default_rng(18)
+    number = 0
+    unnamed = Counter()
     for _ in range(tries(1, 700 // (len(READ) + len(ESTIMATED)))):
         for kind, (draw, expected) in kinds.items():
             shutil.rmtree(tmp_path / "survey", ignore_errors=True)

@@ -96,7 +96,8 @@ def records(path):
 def test_mutated_clouds_are_copied_or_refused(suffix, point_format, tmp_path, record_property):
     "A copy by a correction of zero has the records of its input, whatever the input is"
     whole = write_street(tmp_path / f"in{suffix}", point_format, POINTS).read_bytes()
-    path, target = tmp_path / f"bad{suffix}", tmp_path / f"out{suffix}"
+    path = tmp_path / f"bad{suffix}"
+    target = tmp_path / f"out{suffix}"
     zero = correction(START + np.linspace(-1.0, 21.0, 50))
     rng = np.random.default_rng(18)
 
@@ -105,7 +106,8 @@ def test_mutated_clouds_are_copied_or_refused(suffix, point_format, tmp_path, re
         write_corrected(CloudFile(bad, points, 0.0, "week"), target, zero)
         return records(bad), records(target)
 
-    refused, number = 0, tries(20, 3750)
+    refused = 0
+    number = tries(20, 3750)
     for _ in range(number):
         path.write_bytes(mutated(whole, rng, BYTES))
         pair = outcome(path, copy)
@@ -128,7 +130,8 @@ def test_mutated_texts_are_read_or_refused(name, read, street, tmp_path, record_
     whole = b"".join((street / name).read_bytes().splitlines(keepends=True)[:60])
     path = tmp_path / name
     rng = np.random.default_rng(18)
-    refused, number = 0, tries(80, 2000)
+    refused = 0
+    number = tries(80, 2000)
     for _ in range(number):
         path.write_bytes(mutated(whole, rng, TEXT))
         refused += outcome(path, read) is None

@@ -104,7 +104,10 @@ def test_a_link_that_leads_nowhere_is_refused_before_the_work(link, out, tmp_pat
 @pytest.mark.parametrize("linked", [False, True])
 def test_a_link_to_another_disk_is_a_folder_like_any_other(linked, tmp_path):
     "The folder that a link leads to, there or on another disk, gets the results at once"
-    place = Path("/dev/shm") / f"mlscorr-{os.getpid()}" if linked else tmp_path / "there"
+    if linked:
+        place = Path("/dev/shm") / f"mlscorr-{os.getpid()}"
+    else:
+        place = tmp_path / "there"
     place.mkdir()
     try:
         (tmp_path / "out").symlink_to(place)
@@ -144,7 +147,8 @@ def rewrite(path):
 @pytest.mark.parametrize("change", [replace, rewrite, Path.unlink, lambda p: p.write_text("long")])
 def test_an_input_that_changes_while_it_is_read_stops_the_run(change, tmp_path):
     "Replaced, rewritten, removed or grown: nothing appears, and the file is named"
-    path, out = tmp_path / "pass-1.laz", tmp_path / "out"
+    path = tmp_path / "pass-1.laz"
+    out = tmp_path / "out"
     path.write_text("old text")
     inputs = [input_file("cloud", path)]
     check_unchanged(inputs)
@@ -161,7 +165,8 @@ def test_an_input_that_changes_while_it_is_read_stops_the_run(change, tmp_path):
 )
 def test_other_rights_and_links_of_an_input_leave_a_run_alone(touch, tmp_path):
     "A backup that links what is read, or a change of its rights, changes nothing of its content"
-    path, out = tmp_path / "pass-1.laz", tmp_path / "out"
+    path = tmp_path / "pass-1.laz"
+    out = tmp_path / "out"
     path.write_text("old text")
     inputs = [input_file("cloud", path)]
     time.sleep(0.02)  # s, the finest step of a file's time
@@ -218,7 +223,8 @@ def test_an_interruption_says_whether_results_stand(has_results, capsys):
 def test_a_document_that_finds_no_room_leaves_the_one_before(tmp_path):
     "As project.json on a full disk: it is the old one, and nothing lies beside it"
     resource = pytest.importorskip("resource", reason="Windows limits no sizes of files")
-    path, limits = tmp_path / "project.json", resource.getrlimit(resource.RLIMIT_FSIZE)
+    path = tmp_path / "project.json"
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     output.write_json(path, {"name": "old"})
     resource.setrlimit(resource.RLIMIT_FSIZE, (4096, limits[1]))
     try:

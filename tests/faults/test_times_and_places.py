@@ -16,7 +16,8 @@ START = 357_700.0  # s of week
 
 def recorded(folder, late):
     "An SBET of 60 s, late against its smrmsg"
-    sbet, smrmsg = np.zeros((6001, 17)), np.zeros((61, 10))
+    sbet = np.zeros((6001, 17))
+    smrmsg = np.zeros((61, 10))
     sbet[:, 0] = START + late + 0.01 * np.arange(6001)
     sbet[:, 1:4] = np.radians(30.4926), np.radians(117.3333), 40.0
     smrmsg[:, 0] = START + np.arange(61)

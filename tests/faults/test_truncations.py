@@ -61,7 +61,8 @@ def chunk_bounds(layout):
 
 def cloud_bounds(layout):
     "Bytes where header, VLRs, points or chunks, and EVLRs start"
-    start, step = len(layout.head), layout.record_length
+    start = len(layout.head)
+    step = layout.record_length
     bounds = [4, 96, 227, layout.field("H", 94)[0], *np.ravel(layout.vlrs), start]
     if layout.is_compressed:
         bounds += chunk_bounds(layout)
@@ -77,7 +78,9 @@ def cloud_bounds(layout):
 def test_no_cut_of_a_cloud_goes_unseen(name, point_format, tmp_path, record_property):
     "Header, VLRs, each chunk, chunk table, EVLRs: wherever it ends, the file is refused by name"
     path = write_street(tmp_path / name, point_format, points=110_000)
-    layout, rng, fates = read_layout(path), np.random.default_rng(18), Counter()
+    layout = read_layout(path)
+    rng = np.random.default_rng(18)
+    fates = Counter()
     for size in cuts(layout.size, cloud_bounds(layout), tries(10, 150), rng):
         os.truncate(path, size)
         fates[fate(path, read_layout)] += 1
@@ -93,7 +96,9 @@ def test_a_cut_text_is_refused_warned_of_or_a_whole_one(
     lines that are left, whose number the first screen says
     """
     text = b"".join((street / name).read_bytes().splitlines(keepends=True)[:40])
-    path, rng, fates = tmp_path / name, np.random.default_rng(18), Counter()
+    path = tmp_path / name
+    rng = np.random.default_rng(18)
+    fates = Counter()
     path.write_bytes(text)
     cells = [i for i, byte in enumerate(text) if byte in b",\n="]
     cells = [*rng.choice(cells, tries(10, len(cells)), replace=False), text.rindex(b"\n")]
@@ -114,8 +119,11 @@ def test_a_cut_sbet_or_accuracy_is_refused(cut_file, tmp_path, record_property):
     an SBET that ends earlier is that of a shorter drive
     """
     sbet, crs, accuracy = recorded(tmp_path, 0.0)
-    path, width = tmp_path / cut_file, {"a.sbet": 136, "a.out": 80}[cut_file]
-    size, rng, fates = (tmp_path / cut_file).stat().st_size, np.random.default_rng(18), Counter()
+    path = tmp_path / cut_file
+    width = {"a.sbet": 136, "a.out": 80}[cut_file]
+    size = (tmp_path / cut_file).stat().st_size
+    rng = np.random.default_rng(18)
+    fates = Counter()
     bounds = width * np.array([0, 1, 2, 30, size // width - 4, size // width])
     for cut in cuts(size, bounds, tries(10, 100), rng):
         os.truncate(path, cut)

@@ -21,7 +21,8 @@ AGAIN = NextData("the same road again", "two passes share errors")
 
 def inference(label="none", whole=0.1, labels=("none",), lead=""):
     "Of a verdict, with the gap (mm) of all rows together"
-    none, empty = np.zeros(0), np.zeros((0, 2))
+    none = np.zeros(0)
+    empty = np.zeros((0, 2))
     where = Where(whole, whole, BAND, (), none, none, empty, none, "")
     verdict = GapVerdict(label, 0.34, labels, 0.6, lead, False)
     cause = Cause(label, 0.34, (), (), np.zeros(3))
@@ -33,9 +34,21 @@ def closure(effect="none", before=0.1, after=0.1, shrink=0.0, over=1.0):
     sigmas = OverSigma(("H",), (over,), (over,), (1.9,))
     gap = Gap(before, after, BAND)
     return Closure(
-        effect, 0.3, "systematic", "mm", before, after, shrink, (shrink, shrink), BAND, "", True,
-        np.zeros((1, 2)), gap, sigmas,
-    )  # fmt: skip
+        effect,
+        0.3,
+        "systematic",
+        "mm",
+        before,
+        after,
+        shrink,
+        (shrink, shrink),
+        BAND,
+        "",
+        True,
+        np.zeros((1, 2)),
+        gap,
+        sigmas,
+    )
 
 
 @pytest.mark.parametrize(
@@ -50,7 +63,8 @@ def closure(effect="none", before=0.1, after=0.1, shrink=0.0, over=1.0):
 )
 def test_nothing_needs_to_be_done_where_all_is_as_stated(whole, before, over, rms_mm, excess):
     "Gap, errors over their sigma, accuracy: each can stand against it, in sentence and advice"
-    found, closed = inference(whole=whole), closure(before=before, over=over)
+    found = inference(whole=whole)
+    closed = closure(before=before, over=over)
     assert excess_of(found, closed, [Agreement("target", 9, rms_mm, 20.6)]) == excess
     assert advice_of(found, closed, [], excess) == [ADVICE[excess]]
     assert ("Nothing is wrong" in sentence_of(found, excess)) == (not excess)
@@ -59,7 +73,8 @@ def test_nothing_needs_to_be_done_where_all_is_as_stated(whole, before, over, rm
 
 def test_nothing_is_larger_than_a_default():
     "Where nobody stated the sigma of the POS, 9 cm and 7 sigmas are no excess, but drift"
-    found, closed = inference(), closure(over=7.3)
+    found = inference()
+    closed = closure(over=7.3)
     far = [Agreement("target", 9, 91.6, 20.6)]
     assert excess_of(found, closed, far) == "stated"
     assert excess_of(found, closed, far, is_stated=False) == ""

@@ -17,7 +17,8 @@ START = 413200.0  # s
 def split(by, low, high, share=0.2, rows=0.2):
     "Eight bins alike, and the range in which a cause acts"
     edges = np.linspace(low, high, 9)
-    alike, band = np.full(8, 0.125), np.tile([-3.0, 4.0], (8, 1))
+    alike = np.full(8, 0.125)
+    band = np.tile([-3.0, 4.0], (8, 1))
     extent = Extent(low, high, share, rows)
     names = tuple("abcdefgh")
     return Split(by, edges, names, np.full(8, 50), np.ones(8), np.ones(8), alike, band, extent)

@@ -70,7 +70,8 @@ def test_an_effect_is_not_taken_for_drift(bed):
 def test_what_is_stated_stays_as_it_is(bed):
     "With a sigma in [pos], or with sigma columns in the trajectory, there is nothing to find"
     g, survey, signs = bed
-    rows, rng = drift(g, 10.0), np.random.default_rng(0)
+    rows = drift(g, 10.0)
+    rng = np.random.default_rng(0)
     assert likely_scale(rows, g.survey, signs, rng) == 1.0
     epochs = np.ones((len(survey.trajectory), 3))
     stated = replace(survey.trajectory, position_sigma=0.02 * epochs, attitude_sigma=1e-4 * epochs)

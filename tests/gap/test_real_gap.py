@@ -43,7 +43,8 @@ def drive(real):
 def test_the_real_pos_is_worse_in_its_outages(real, drive):
     "Two real outages: position_noise is named, in windows that are them; without, none is likely"
     pos_drive, one = drive
-    pos_measure, rng = real("pos_measure"), np.random.default_rng(1)
+    pos_measure = real("pos_measure")
+    rng = np.random.default_rng(1)
     cycles, quiet = pos_drive.spans(one, 2)
 
     def told(span):
@@ -62,7 +63,8 @@ def test_the_real_pos_is_worse_in_its_outages(real, drive):
 def test_outage_drift_in_the_simulator_shrinks_the_real_gap(real, drive):
     "The gap lies in outages; drift in the simulator takes most of it on outages not chosen on"
     pos_drive, one = drive
-    pos_measure, rng = real("pos_measure"), np.random.default_rng(2)
+    pos_measure = real("pos_measure")
+    rng = np.random.default_rng(2)
     choice = [pos_drive.BELIEF, {**pos_drive.BELIEF, "odometer": False}]
     models = pos_drive.outage_models(one, 2, choice, draws=1)
     cycles, _ = pos_drive.spans(one, 8)
@@ -129,9 +131,11 @@ def test_an_example_without_its_data_says_where_it_was_looked_for(script, tmp_pa
     "One sentence with the folder and the way out, nothing else, and nothing is written"
     run = subprocess.run(
         [sys.executable, REAL / script],
-        capture_output=True, text=True, cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
         env={**os.environ, "MLSCORR_SHARED": str(tmp_path / "shared")},
-    )  # fmt: skip
+    )
     assert run.returncode == 0
     assert not run.stderr
     assert len(run.stdout.splitlines()) == 1

@@ -47,14 +47,16 @@ def test_scatter_has_its_stated_variance_with_light_and_heavy_tails(small):
 def test_no_survey_error_is_as_large_as_that_of_an_outlier(small):
     "Of 8000 coordinates with heavy tails none is off by more than 4 sigma, and some come near"
     rows = replace(small.rows, noise=np.zeros(len(small.rows)))
-    use, rng = (rows.channel == "target") & (rows.survey > 0), np.random.default_rng(1)
+    use = (rows.channel == "target") & (rows.survey > 0)
+    rng = np.random.default_rng(1)
     drawn = [scatter(rows, rng)[use] / np.sqrt(rows.survey[use]) for _ in range(200)]
     assert 3.5 < np.max(np.abs(drawn)) < SETTINGS.outlier + 1e-9
 
 
 def test_odd_patches_are_rougher_or_lose_more_and_no_length_changes(small):
     "Up to an eighth of the rows of both channels"
-    rows, shares = small.rows, []
+    rows = small.rows
+    shares = []
     for seed in range(20):
         odd = odd_patches(rows, np.random.default_rng(seed))
         assert not odd[rows.metric].any()

@@ -73,6 +73,7 @@ def test_the_shipped_decision_was_learned_on_the_evidence_of_today():
 
 def test_calibration_is_the_distance_of_stated_from_reached():
     "Stated 0.9: nine of ten right is 0, five of ten 0.4"
-    stated, number = np.full(10, 0.9), np.arange(10)
+    stated = np.full(10, 0.9)
+    number = np.arange(10)
     assert calibration_error(stated, number < 9) == pytest.approx(0.0, abs=1e-12)
     assert calibration_error(stated, number < 5) == pytest.approx(0.4)

@@ -16,7 +16,10 @@ def trajectory(sigma=None):
     "A drive of 200 s to the north; sigma (m) of the easting as a function of elapsed time"
     elapsed = np.arange(0.0, 200.0, 0.1)
     path = ORIGIN + np.outer(elapsed, [0.0, SPEED, 0.0])
-    sigmas = None if sigma is None else np.outer(sigma(elapsed), [1.0, 0.0, 0.0])
+    if sigma is None:
+        sigmas = None
+    else:
+        sigmas = np.outer(sigma(elapsed), [1.0, 0.0, 0.0])
     still = attitude_from_angles(0.0, 0.0, np.zeros(len(elapsed)))
     return Trajectory(START + elapsed, path, still, sigmas)
 
@@ -214,7 +217,9 @@ def test_smooth_drift_of_two_metres_between_targets_ten_metres_apart(seed):
 
 def test_origin_and_time_zero_do_not_matter():
     "Only differences count: local coordinates and times give the same names and probabilities"
-    control, seen, drive = control_points(PLACES), observations(PLACES + 0.4), trajectory()
+    control = control_points(PLACES)
+    seen = observations(PLACES + 0.4)
+    drive = trajectory()
     near = match(
         replace(seen, position=seen.position - ORIGIN, gps_time=seen.gps_time - START),
         replace(control, position=control.position - ORIGIN),

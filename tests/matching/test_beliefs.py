@@ -15,8 +15,10 @@ from tests.matching.test_association import PLACES, control_points, observations
 @pytest.fixture
 def chain():
     "Ten targets on a straight drive whose POS states 0.2 m of easting"
-    drive, seen = trajectory(lambda t: np.full(len(t), 0.2)), observations(PLACES)
-    control, pos = control_points(PLACES), Pos()
+    drive = trajectory(lambda t: np.full(len(t), 0.2))
+    seen = observations(PLACES)
+    control = control_points(PLACES)
+    pos = Pos()
     pairs = find_pairs(seen, control, 1.0)
     stated = stated_sigma(drive, pos, seen.gps_time)
     return build_chain(seen, control, drive.at(seen.gps_time), stated, pairs, pos)
@@ -24,7 +26,8 @@ def chain():
 
 def test_beliefs_are_all_combinations(chain):
     "Each scale of the stated sigma or slow bias with each unstated error and correlation time"
-    scales, unstated = SETTINGS.sigma_scales, SETTINGS.unstated_sigmas
+    scales = SETTINGS.sigma_scales
+    unstated = SETTINGS.unstated_sigmas
     drifts = [0.2 * scale for scale in scales]
     drifts += [np.hypot(0.2, bias) for bias in SETTINGS.slow_biases]
     assert len(chain.gain) == len(drifts) * len(unstated) * len(SETTINGS.time_shares)
@@ -37,10 +40,12 @@ def test_beliefs_are_all_combinations(chain):
 
 def test_drift_starts_anew_at_a_step_of_the_path():
     "Across a step of 2 m in 0.1 s the constant goes on, and s tells nothing of what follows"
-    drive, seen = trajectory(), observations(PLACES)
+    drive = trajectory()
+    seen = observations(PLACES)
     path = drive.position.copy()
     path[drive.gps_time > 357_750.0, 0] += 2.0
-    drive, pos = replace(drive, position=path), Pos()
+    drive = replace(drive, position=path)
+    pos = Pos()
     pairs = find_pairs(seen, control_points(PLACES), 10.0)
     stated = stated_sigma(drive, pos, seen.gps_time)
     pose = drive.at(seen.gps_time)

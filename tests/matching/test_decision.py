@@ -10,7 +10,8 @@ from mlscorr.matching.decision import decide, moved_share_by_others
 def decided(sound, moved, control, first=None, count=2):
     "Decision on pairs of observations with one pair each"
     n = len(control)
-    same, nothing = np.ones(n, bool), np.zeros((n, 3))
+    same = np.ones(n, bool)
+    nothing = np.zeros((n, 3))
     first = np.arange(n + 1) if first is None else first
     pairs = CandidatePairs(np.asarray(first), np.array(control), nothing, same)
     share = np.full(len(sound), SETTINGS.moved_share)
@@ -59,7 +60,8 @@ def test_many_points_that_seem_wrong_are_left_to_the_estimate():
 def test_what_two_passes_find_elsewhere_is_no_drift():
     "Three of 12 points that are off in both of two passes were moved, however many they are"
     control = np.repeat(np.arange(12), 2)
-    sound, moved = np.where(control < 3, 0.005, 0.9999), np.where(control < 3, 0.994, 0.0)
+    sound = np.where(control < 3, 0.005, 0.9999)
+    moved = np.where(control < 3, 0.994, 0.0)
     decision = decided(sound, moved, control, count=12)
     assert decision.column[:6].tolist() == [-1] * 6 and decision.column[6] == 3
 

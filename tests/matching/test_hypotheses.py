@@ -64,7 +64,9 @@ def test_displacement_is_the_constant_and_the_drift():
     now.mean[:] = [0.2, 0.5, 0.0]
     now.covariance[:] = [[0.04, 0.1, 0.0], [0.1, 1.0, 0.0], [0.0, 0.0, 0.1]]
     value, variance = displacement(now, chain, 1)
-    sigma, gain = SETTINGS.constant_sigma, 0.4  # m
+    # m
+    sigma = SETTINGS.constant_sigma
+    gain = 0.4
     assert value == pytest.approx(np.full((1, 3), 0.2 * sigma + 0.5 * gain))
     spread = 0.04 * sigma**2 + 0.2 * sigma * gain + gain**2 + 0.05**2  # m^2
     assert variance == pytest.approx(np.full((1, 3), spread))

@@ -42,7 +42,8 @@ def drift(along, size=3.0, rng=None):
     "A smooth drift of up to size (m) in all directions, by sines of 100 to 200 s"
     rng = np.random.default_rng(0) if rng is None else rng
     seconds = along[:, None, None] / SPEED
-    periods, phases = rng.uniform(100, 200, (3, 3)), rng.uniform(0, 2 * np.pi, (3, 3))
+    periods = rng.uniform(100, 200, (3, 3))
+    phases = rng.uniform(0, 2 * np.pi, (3, 3))
     value = np.sin(2 * np.pi * seconds / periods + phases).sum(axis=1)
     return size * value / np.linalg.norm(value, axis=1).max()
 
@@ -194,13 +195,16 @@ def by_enumeration(chain):
 def density(chain, choice, signal):
     "Density of the misclosures under one assignment; zero where it uses a point twice in a visit"
     rows = np.flatnonzero(choice < 4)
-    pair, is_moved = 2 * rows + choice[rows] % 2, choice[rows] >= 2
-    control, time = chain.pairs.control[pair], chain.gps_time[rows]
+    pair = 2 * rows + choice[rows] % 2
+    is_moved = choice[rows] >= 2
+    control = chain.pairs.control[pair]
+    time = chain.gps_time[rows]
     twice = (control[:, None] == control) & (abs(time[:, None] - time) <= 2.0)
     alike = chain.pairs.same[pair]
     if (twice.sum() > len(rows)) or (is_moved & ~alike).any():
         return 0.0
-    moved, exchanged = SETTINGS.moved_share, SETTINGS.exchanged_share
+    moved = SETTINGS.moved_share
+    exchanged = SETTINGS.exchanged_share
     share = np.where(is_moved, moved, np.where(alike, (1 - moved) * (1 - exchanged), exchanged))
     weight = np.prod(share) * np.exp(chain.otherwise[choice == 4].sum())
     own = np.diag(0.05**2 + 0.01**2 + SETTINGS.moved_sigma**2 * is_moved)
@@ -229,7 +233,8 @@ def test_marginals_stay_as_they_were_written_down(name):
     cause, seed, sigma = json.loads(name)
     made = matching_study.make(seed, cause, sigma)
     seen = made.observations[np.argsort(made.observations.gps_time, kind="stable")]
-    pos, pose = Pos(), made.trajectory.at(seen.gps_time)
+    pos = Pos()
+    pose = made.trajectory.at(seen.gps_time)
     stated = stated_sigma(made.trajectory, pos, seen.gps_time)
     pairs = find_pairs(seen, made.control, SEARCH_RADIUS)
     found = marginals(build_chain(seen, made.control, pose, stated, pairs, pos))

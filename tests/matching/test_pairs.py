@@ -7,7 +7,8 @@ from tests.matching.test_association import PLACES, control_points, observations
 
 def test_pairs_are_those_within_the_search_radius():
     "150 m hold the neighbours 100 m off too, one metre the own point alone"
-    seen, control = observations(PLACES + 0.3), control_points(PLACES)
+    seen = observations(PLACES + 0.3)
+    control = control_points(PLACES)
     wide, narrow = (find_pairs(seen, control, radius) for radius in (150.0, 1.0))
     assert wide.control[wide.of(2)].tolist() == [1, 2, 3]
     assert narrow.control.tolist() == list(range(10))

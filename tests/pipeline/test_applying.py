@@ -61,7 +61,8 @@ def test_the_written_survey_is_consistent(site, applied):
     "Trajectory, mounting and clouds agree: taking nothing more out would move no point"
     described = tomllib.loads((applied[0] / "survey.toml").read_text())
     assert described["trajectory"]["file"] == "trajectory.csv"
-    before, after = mlscorr.read_survey(site), mlscorr.read_survey(applied[0])
+    before = mlscorr.read_survey(site)
+    after = mlscorr.read_survey(applied[0])
     turn = (after.mounting.boresight * before.mounting.boresight.inv()).as_rotvec(degrees=True)
     assert np.allclose(turn, WRONG["boresight"], atol=1e-5)  # deg
     times = after.trajectory.gps_time[5:-5]
@@ -109,7 +110,8 @@ def test_a_mounting_is_known_as_well_as_the_calibration_knows_it(site, tmp_path)
     path = tmp_path / "calibration.json"
     path.write_text(json.dumps(calibration()))
     with warnings.catch_warnings(action="ignore"):
-        survey, found = mlscorr.read_survey(site), read_effects(path)
+        survey = mlscorr.read_survey(site)
+        found = read_effects(path)
         mlscorr.apply(survey, found).write(tmp_path / "out")
         known = mlscorr.read_survey(tmp_path / "out").mounting
     sigma = np.append([0.01, 0.03, 0.02], np.radians([0.01, 0.02, 0.03]))

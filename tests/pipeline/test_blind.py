@@ -18,7 +18,8 @@ from tests.beds import own_effects
 
 pytestmark = pytest.mark.long
 
-CASES, SEED = 2, 5
+CASES = 2
+SEED = 5
 
 
 @pytest.fixture(scope="module")
@@ -143,7 +144,8 @@ def test_effects_of_a_file_are_drawn_diagnosed_and_scored(tmp_path):
         return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
 
     seed = run(sys.executable, "-c", code, "squat.py").stdout.strip()
-    blind, own = (sys.executable, "-m", "mlscorr", "blind"), ("--effects", "squat.py")
+    blind = (sys.executable, "-m", "mlscorr", "blind")
+    own = ("--effects", "squat.py")
     run(*blind, "make", "out", "--cases", "1", "--seed", seed, "--workers", "1", *own)
     key = json.loads((tmp_path / "out" / "key.json").read_text())
     assert key["plan"]["effects"] == ["squat"]

@@ -250,8 +250,10 @@ def test_a_cloud_in_feet_is_named(survey):
     numbers = np.frombuffer(data, "<f8", 12, 131)  # scale, offset and box
     data[131:227] = (numbers / 0.3048).tobytes()
     (survey / "pass-1.laz").write_bytes(data)
-    assert any("beside it with its coordinates taken as feet" in s
-               for s in sentences(mlscorr.check(survey)))  # fmt: skip
+    assert any(
+        "beside it with its coordinates taken as feet" in s
+        for s in sentences(mlscorr.check(survey))
+    )
 
 
 def test_what_lies_beside_the_cloud_is_counted(survey):

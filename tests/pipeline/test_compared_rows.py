@@ -23,11 +23,16 @@ OFFSET = 0.02  # s
 def made(folder, offset=0.0, seed=3, **scanner):
     "A survey of one scene; its clock is off"
     scanner = {"lines_per_second": 75, "points_per_line": 200} | scanner
-    effects = [{"name": "time_offset", "magnitude": offset}] if offset else []
+    if offset:
+        effects = [{"name": "time_offset", "magnitude": offset}]
+    else:
+        effects = []
     scenario = Scenario(
-        drive={"duration": 20.0}, targets={"control": 10, "check": 2}, scanner=[scanner],
+        drive={"duration": 20.0},
+        targets={"control": 10, "check": 2},
+        scanner=[scanner],
         effects=effects,
-    )  # fmt: skip
+    )
     simulate(scenario, np.random.default_rng(seed)).write(folder)
     return folder
 
@@ -36,7 +41,8 @@ def made(folder, offset=0.0, seed=3, **scanner):
 def folders(tmp_path_factory):
     "What was recorded with a late clock, its simulation, and that of 18 of 20 ms"
     path = tmp_path_factory.mktemp("own")
-    real, first = made(path / "real", OFFSET), made(path / "first")
+    real = made(path / "real", OFFSET)
+    first = made(path / "first")
     return real, first, made(path / "next", 0.9 * OFFSET)
 
 

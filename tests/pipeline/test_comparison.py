@@ -104,7 +104,8 @@ def test_few_check_points_are_backed_by_cross_validation(compared):
 def test_a_left_out_point_is_predicted_from_the_others_alone(compared):
     "The cross-validated residuals of the shift are those of means without the point in turn"
     control = compared.matched_control
-    left, variance = control.misclosure, np.mean(control.variance, axis=1)
+    left = control.misclosure
+    variance = np.mean(control.variance, axis=1)
     residuals = [
         left[i] - np.average(np.delete(left, i, 0), axis=0, weights=1 / np.delete(variance, i))
         for i in range(len(left))
@@ -142,7 +143,8 @@ def test_the_row_of_correct_uses_what_two_passes_saw(tmp_path):
     compared = compare(tmp_path / "survey")
     with warnings.catch_warnings(action="ignore"):
         corrected = mlscorr.correct(mlscorr.read_survey(tmp_path / "survey"))
-    row, lsc = compared.row("correct"), compared.row("lsc")
+    row = compared.row("correct")
+    lsc = compared.row("lsc")
     assert row["check"]["rmse"] == pytest.approx(corrected.check["after"]["rmse"], abs=1e-12)
     assert row["details"]["ties"] == int(corrected.estimate.ties.used.sum()) > 50
     assert row["check"]["rmse_3d"] != lsc["check"]["rmse_3d"]
@@ -163,7 +165,8 @@ def test_check_points_have_no_influence_on_any_method(street, compared, tmp_path
     rewrite_control(folder, move)
     other = compare(folder)
     for name in NAMES:
-        before, after = compared.row(name), other.row(name)
+        before = compared.row(name)
+        after = other.row(name)
         assert (after["control"]["rmse"] is None) == (before["control"]["rmse"] is None)
         if before["control"]["rmse"] is not None:
             assert after["control"]["rmse"] == pytest.approx(before["control"]["rmse"], abs=1e-9)
@@ -245,7 +248,8 @@ def test_the_command_writes_page_document_and_clouds(commanded):
 def test_a_shifted_cloud_keeps_all_but_its_coordinates(street, commanded, compared):
     "The cloud of the shift is the recorded one plus the shift, to half of the file's resolution"
     source = read_survey(street).clouds[0]
-    before, after = laspy.read(source.path), laspy.read(commanded[1] / "shift" / source.path.name)
+    before = laspy.read(source.path)
+    after = laspy.read(commanded[1] / "shift" / source.path.name)
     moved = after.xyz - before.xyz - compared.corrections["shift"].shift
     assert np.abs(moved).max() < 0.5 * before.header.scales.max() + 1e-9
     assert np.array_equal(before.gps_time, after.gps_time)
@@ -257,7 +261,8 @@ def test_a_transformation_of_nothing_changes_no_coordinate(street, tmp_path):
     source = read_survey(street).clouds[0]
     target = tmp_path / "raw.laz"
     assert write_corrected(source, target, RAW) == 0
-    before, after = laspy.read(source.path), laspy.read(target)
+    before = laspy.read(source.path)
+    after = laspy.read(target)
     for name in "XYZ":
         assert np.array_equal(before[name], after[name])
 

@@ -82,7 +82,8 @@ def test_the_effect_that_acts_is_named_with_its_size(diagnosed):
 
 def test_what_was_diagnosed_can_be_taken_out_of_these_clouds(late, diagnosed):
     "gap.json knows them: the clock offset goes out of this survey"
-    survey, found = mlscorr.read_survey(late), read_effects(diagnosed / "gap.json")
+    survey = mlscorr.read_survey(late)
+    found = read_effects(diagnosed / "gap.json")
     assert [row["name"] for row in found.clouds] == [file.path.name for file in survey.clouds]
     assert mlscorr.apply(survey, found).effects == found.effects
 
@@ -218,7 +219,8 @@ def test_a_survey_is_planned_without_a_cloud(late, tmp_path):
     for cloud in folder.glob("*.laz"):
         cloud.unlink()
     text = (folder / "survey.toml").read_text()
-    start, end = text.index("[cloud]"), text.index("[trajectory]")
+    start = text.index("[cloud]")
+    end = text.index("[trajectory]")
     (folder / "survey.toml").write_text(text[:start] + text[end:])
     done = CliRunner().invoke(app, ["plan", str(folder), "-o", str(tmp_path / "out"), "--json"])
     assert done.exit_code == 0, done.output
@@ -228,7 +230,8 @@ def test_a_survey_is_planned_without_a_cloud(late, tmp_path):
     assert 1e-4 < offset["detectable"] < 0.02
     assert any({"lever_arm", "vertical_datum"} <= set(members) for members in plan["classes"])
     header, *lines = done.stderr[done.stderr.index("Smallest effect that shows") :].splitlines()
-    unit, usual = header.index("unit"), header.index("usual size")
+    unit = header.index("unit")
+    usual = header.index("usual size")
     for line in lines[: sum(map(len, plan["detectable"].values()))]:  # columns below their heads
         assert line[unit - 1] == line[usual - 1] == " " != line[unit]
     refused = CliRunner().invoke(app, ["diagnose", str(folder), "-o", str(tmp_path / "other")])

@@ -22,8 +22,21 @@ from tests.beds.places import MLSCORR
 
 CORNER = np.array([532_000.0, 3_374_000.0, 42.0])
 START = 413_200.0
-KEYS = ["name", "pass", "gps_time", "kind", "size", "size_sigma", "observed", "covariance",
-        "normal", "points", "score", "matched", "reason"]  # fmt: skip
+KEYS = [
+    "name",
+    "pass",
+    "gps_time",
+    "kind",
+    "size",
+    "size_sigma",
+    "observed",
+    "covariance",
+    "normal",
+    "points",
+    "score",
+    "matched",
+    "reason",
+]
 
 
 def run(*arguments):
@@ -125,7 +138,8 @@ def test_the_section_control_may_be_missing(street, tmp_path):
 def flat_plate(rng, size=0.6, scale=1.0, middle=(0.0, 6.0, 1.5), points=900):
     "A bright plate on a darker wall that a scanner passes in a second: PointCloud, Trajectory"
     time = START + np.sort(rng.uniform(0.0, 1.0, 40 * points))
-    x, z = 8.0 * (time - START - 0.5), rng.uniform(0.0, 4.0, len(time))
+    x = 8.0 * (time - START - 0.5)
+    z = rng.uniform(0.0, 4.0, len(time))
     xyz = np.column_stack([x, np.full(len(x), middle[1]), z])
     on_plate = (np.abs(x - middle[0]) < size / 2) & (np.abs(z - middle[2]) < size / 2)
     xyz[:, 1] += 0.003 * rng.standard_normal(len(x))
@@ -272,9 +286,12 @@ def leave_asphalt(path, targets):
 
 @pytest.mark.parametrize(
     ("size", "meant"),
-    [("600", "millimetres. Then give 0.6"), ("60", "centimetres. Then give 0.6"),
-     ("0.006", "decimal point misplaced")],
-)  # fmt: skip
+    [
+        ("600", "millimetres. Then give 0.6"),
+        ("60", "centimetres. Then give 0.6"),
+        ("0.006", "decimal point misplaced"),
+    ],
+)
 def test_a_size_in_the_wrong_unit_names_the_likely_one(street, tmp_path, size, meant):
     "Sizes that no target has are refused with the unit that is likely meant, exit code 3"
     folder = shutil.copytree(street, tmp_path / "survey")

@@ -48,7 +48,10 @@ def test_every_finding_is_a_line_on_stderr(examined):
     process, findings = examined
     lines = process.stderr.splitlines()
     for name, finding in findings.items():
-        mark = "ok" if finding["ok"] else "MISSING" if finding["needed"] else "without"
+        if finding["ok"]:
+            mark = "ok"
+        else:
+            mark = "MISSING" if finding["needed"] else "without"
         assert f"{mark:7s} {name}: {finding['found']}" in lines
     assert process.stdout.count("\n") == 1
 

@@ -51,7 +51,8 @@ def together(drives):
 
 def elsewhere(drive, seconds=0.0, way=bed.SHIFT * 0):
     "A FoundDrive without control, at another time and place"
-    trajectory, features = drive.survey.trajectory, drive.features
+    trajectory = drive.survey.trajectory
+    features = drive.features
     survey = replace(
         drive.survey,
         trajectory=replace(
@@ -160,13 +161,15 @@ def test_two_visits_move_alike_across_an_edge(together, by_areas):
         left = added(first) - (added(second) + bed.SHIFT)[away.argmin(axis=1)]
         return np.linalg.norm(left[away.min(axis=1) < 3.0], axis=1)
 
-    whole, parted = apart(together), apart(by_areas[1])
+    whole = apart(together)
+    parted = apart(by_areas[1])
     assert parted.max() < whole.max() + 0.005  # m
 
 
 def test_areas_are_tasks_of_workers(drives, by_areas, tmp_path):
     "By two workers each area is estimated to the same bytes, and a second run finds them done"
-    store, ended = TaskStore(tmp_path), []
+    store = TaskStore(tmp_path)
+    ended = []
     with engine(2, None) as workers:
         run = Run(store, workers, ended.append)
 
@@ -211,7 +214,8 @@ def test_pieces_hold_what_lies_in_their_area(drives):
 def test_an_area_where_nothing_was_seen_corrects_nothing(drives):
     "Without planes and control a drive through two areas stays as it is, and that is said"
     drive = drives[1]
-    areas, bare = cut(drives), replace(drive, features=drive.features[[]])
+    areas = cut(drives)
+    bare = replace(drive, features=drive.features[[]])
     ((corrected, state),) = drives_by_areas([bare], areas, 1, ORIGIN)
     assert state.state == "uncorrected" and np.abs(added(corrected)).max() < 1e-9
     assert {stretch.why for stretch in corrected.held[1].weak} == {"its pass has no control point"}
@@ -237,8 +241,10 @@ def test_a_drive_that_nothing_ties_leaves_the_others_as_they_are(drives, togethe
     third = replace(third, survey=replace(third.survey, name="third"))
     three = results([first, second, third])
     assert [three[name][1].state for name in ("first", "second", "third")] == [
-        "controlled", "tied", "uncorrected",
-    ]  # fmt: skip
+        "controlled",
+        "tied",
+        "uncorrected",
+    ]
     assert np.abs(added(three["third"][0])).max() < 1e-9
     for name in ("first", "second"):
         assert np.abs(added(three[name][0]) - added(together[name][0])).max() < 0.002  # m

@@ -80,7 +80,8 @@ def xyz(points):
 
 def test_points_are_counted_and_read_by_scanner(apart, merged):
     "Each scanner has its own points, as many as in its files, and all of the file is of one"
-    survey, other = mlscorr.read_survey(merged), mlscorr.read_survey(apart)
+    survey = mlscorr.read_survey(merged)
+    other = mlscorr.read_survey(apart)
     assert survey.points == other.points == laspy.read(merged / "merged.laz").header.point_count
     assert [cloud.point_source_ids for cloud in survey.clouds] == [(11,), (12,)]
     assert survey.scanner_numbers.tolist() == [0, 1]
@@ -115,7 +116,8 @@ def test_a_merged_cloud_is_corrected_as_two_files_are(apart, merged, tmp_path):
 def test_points_of_each_scanner_move_by_its_own_mounting(apart, merged, tmp_path):
     "Two mountings that are calibrated: the one file holds what the files of both would"
     for folder in (apart, merged):
-        survey, out = mlscorr.read_survey(folder), tmp_path / folder.parent.name
+        survey = mlscorr.read_survey(folder)
+        out = tmp_path / folder.parent.name
         moved = {
             name: Correction(
                 survey.trajectory,
@@ -187,7 +189,8 @@ def test_one_scanner_may_have_several_ids(merged, tmp_path):
     "Lines of one scanner: with all of its ids named it is one scanner, and the file is whole"
     folder = shutil.copytree(merged, tmp_path / "lines")
     text = (folder / "survey.toml").read_text()
-    start, end = text.rindex("[[scanner]]"), text.index("[control]")
+    start = text.rindex("[[scanner]]")
+    end = text.index("[control]")
     text = (text[:start] + text[end:]).replace("[11]", "[11, 12]")
     (folder / "survey.toml").write_text(text)
     survey = mlscorr.read_survey(folder)

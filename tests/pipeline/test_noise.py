@@ -48,7 +48,8 @@ def test_flagged_points_change_nothing_that_is_estimated(foggy, street, tmp_path
     points = len(is_noise)
     assert f"{FLAGGED} of {points} points read are flagged as noise" in result.stderr
 
-    before, after = laspy.read(folder / "pass-1.laz"), laspy.read(tmp_path / "foggy/pass-1.laz")
+    before = laspy.read(folder / "pass-1.laz")
+    after = laspy.read(tmp_path / "foggy/pass-1.laz")
     without = laspy.read(tmp_path / "clear" / "pass-1.laz")
     assert np.array_equal(after.points.array[~is_noise], without.points.array)
     for name in before.point_format.dimension_names:

@@ -109,7 +109,8 @@ def check_schema(value, schema, where="report"):
 def test_a_verdict_knows_the_sigma_of_what_it_rests_on(corrected):
     "Of check points that of targets and corrected position, of those left out that of their tests"
     result = corrected[0]
-    check, there = result.matched_check, result.trajectory.at(result.matched_check.gps_time)
+    check = result.matched_check
+    there = result.trajectory.at(result.matched_check.gps_time)
     variance = check.variance + there.position_sigma**2
     np.testing.assert_allclose(result._check.sigma, np.sqrt(variance.mean(axis=0)))
     sigma = np.vstack([test.sigma for test in result.estimate.tests])
@@ -119,7 +120,8 @@ def test_a_verdict_knows_the_sigma_of_what_it_rests_on(corrected):
 def test_before_and_after_are_of_the_same_control_points(corrected):
     "A point that was refused, 2 m off, counts neither before, nor after, nor left out in turn"
     result = corrected[0]
-    matched, estimate = result.matched_control, result.estimate
+    matched = result.matched_control
+    estimate = result.estimate
     used = np.arange(len(matched)) != 1
     surveyed = matched.surveyed.position + np.where(used[:, None], 0.0, 2.0)
     wrong = replace(matched, surveyed=replace(matched.surveyed, position=surveyed))
@@ -231,7 +233,8 @@ def test_the_cloud_keeps_all_but_its_coordinates(corrected):
     "Same number and order of points, every other field untouched, header scale and CRS as well"
     result, out, report = corrected
     source = result.survey.clouds[0].path
-    before, after = laspy.read(source), laspy.read(out / source.name)
+    before = laspy.read(source)
+    after = laspy.read(out / source.name)
     assert len(after) == len(before) == report["files"][0]["points"]
     for name in before.point_format.dimension_names:
         if name not in ("X", "Y", "Z"):
@@ -244,7 +247,8 @@ def test_the_points_move_as_the_correction_says(corrected):
     "The written coordinates are Correction.apply of the read ones, to the file's rounding"
     result, out, _ = corrected
     source = result.survey.clouds[0].path
-    before, after = laspy.read(source), laspy.read(out / source.name)
+    before = laspy.read(source)
+    after = laspy.read(out / source.name)
     cloud = PointCloud(before.xyz, np.asarray(before.gps_time), np.asarray(before.intensity))
     expected = result.estimate.correction.apply(cloud).xyz
     assert np.abs(after.xyz - expected).max() < 0.6e-3
@@ -274,7 +278,8 @@ def test_the_corrected_trajectory_can_be_read_again(corrected):
 @pytest.mark.long
 def test_further_files_hold_the_corrected_trajectory(commanded, corrected):
     "--trajectory writes an SBET with its smrmsg and TUM's quaternions, and the report lists them"
-    out, expected = commanded[1], corrected[0].trajectory
+    out = commanded[1]
+    expected = corrected[0].trajectory
     outputs = [file["name"] for file in read_json(out)["outputs"]]
     names = ["drive.sbet", "smrmsg_drive.out", "drive.tum"]
     assert outputs == ["trajectory.csv", *names, "targets.csv", "weak.csv", "weak.geojson"]
@@ -347,7 +352,8 @@ def test_a_check_point_that_is_still_found_changes_nothing_but_itself(corrected,
             getattr(moved.trajectory, name), getattr(corrected[0].trajectory, name)
         )
     assert moved.control == corrected[0].control
-    old, new = corrected[0].matched_check.observations, moved.matched_check.observations
+    old = corrected[0].matched_check.observations
+    new = moved.matched_check.observations
     assert old.name == new.name
     others = np.array([name != "T03" for name in old.name])
     assert np.array_equal(new.position[others], old.position[others])
@@ -393,7 +399,8 @@ def test_points_without_a_pose_stay_as_they_were_and_are_counted(in_part):
     "Before the trajectory and in its gap nothing moves, everywhere else something does"
     out = in_part[1]
     source = out.parent / "survey"
-    before, after = laspy.read(source / "pass-1.laz"), laspy.read(out / "pass-1.laz")
+    before = laspy.read(source / "pass-1.laz")
+    after = laspy.read(out / "pass-1.laz")
     inside = read_trajectory(source / "trajectory.csv").segment(before.gps_time) >= 0
     assert read_json(out)["coverage"]["points_outside_trajectory"] == (~inside).sum() > 0
     moved = (before.xyz != after.xyz).any(axis=1)
@@ -520,7 +527,8 @@ def test_a_real_drift_of_half_a_metre_is_corrected():
 def test_where_nothing_is_wrong_nothing_gets_worse():
     "practice_none: check points within 12 mm, and no axis more than 2 mm worse than before"
     check = correct_shared("practice_none").check
-    after, before = np.array(check["after"]["rmse"]), np.array(check["before"]["rmse"])
+    after = np.array(check["after"]["rmse"])
+    before = np.array(check["before"]["rmse"])
     assert after.max() <= 0.012
     assert (after - before).max() <= 0.002
 

@@ -187,7 +187,8 @@ def test_a_drive_without_points_is_a_failure(project, tmp_path):
     """By ids that no point has: it is named in red, in `faults`, by status and by the check, with
     the ids there are; all else is corrected, and the exit code is 4.
     """
-    folder, out = shutil.copytree(project.parent, tmp_path / "city"), tmp_path / "out"
+    folder = shutil.copytree(project.parent, tmp_path / "city")
+    out = tmp_path / "out"
     bed.share_tiles(folder)
     third = bed.PROJECT[bed.PROJECT.index('[[drive]]\nname = "second"') :]
     third = third.replace('"second"', '"third"').replace('"second/*', '"tiles/*')
@@ -345,7 +346,8 @@ def test_resume_does_what_is_missing_or_damaged(project, copy):
     A list and a project.toml that are newer, but say the same, change nothing. A cloud of a drive
     that is no more is named, a page that is not asked for is gone.
     """
-    out, before = copy, outputs(copy)
+    out = copy
+    before = outputs(copy)
     for path in (project, project.parent / "control.csv"):
         path.write_bytes(path.read_bytes())
     (out / "project.html").write_text("of the run before")
@@ -395,7 +397,8 @@ def test_a_cloud_that_cannot_be_opened_is_a_fault_of_its_own(project, tmp_path):
 @pytest.mark.long
 def test_an_edited_control_list_reads_no_cloud_again(project, copy, tmp_path):
     "A check point that becomes control changes the estimate and all that follows, nothing before"
-    folder, out = shutil.copytree(project.parent, tmp_path / "city"), copy
+    folder = shutil.copytree(project.parent, tmp_path / "city")
+    out = copy
     control = folder / "control.csv"
     control.write_text(control.read_text().replace(",check", ",control"))
     result = correct_project(folder, out, Options(page=False, resume=True))
@@ -410,7 +413,8 @@ def test_an_ended_run_is_resumed_to_the_same_bytes(project, corrected, tmp_path,
     "SIGKILL or Ctrl-C in the middle, then --resume: the same results as without"
     command = [*COMMAND, "correct", project, "-o", tmp_path / "out", "--no-report"]
     process = subprocess.Popen(list(map(str, command)), stderr=subprocess.PIPE, text=True)
-    log, due = tmp_path / "out" / "log.txt", time.monotonic() + 120
+    log = tmp_path / "out" / "log.txt"
+    due = time.monotonic() + 120
     while time.monotonic() < due and process.poll() is None:
         if log.exists() and "findings:" in log.read_text():
             break
@@ -447,7 +451,8 @@ def test_results_are_of_the_paths_and_the_crs_that_are_asked_for(project, tmp_pa
     """Resumed by another path, a cloud that is missing is written; in another CRS nothing stays
     of the one before.
     """
-    folder, out = shutil.copytree(project.parent, tmp_path / "city"), tmp_path / "out"
+    folder = shutil.copytree(project.parent, tmp_path / "city")
+    out = tmp_path / "out"
     correct_project(folder, out, QUICK)
     (out / "first" / "tile-2.laz").unlink()
     (tmp_path / "link").symlink_to(folder)

@@ -48,7 +48,8 @@ def test_files_of_earlier_reports_are_named(tmp_path):
     for name in ("page.html", "old.sbet", "new.csv", "notes.txt", "map.png"):
         (tmp_path / name).write_text(name)
     before = report("before", "old.sbet", "new.csv", "notes.txt")
-    same, now = report("now", "new.csv", "map.png"), report("now", "new.csv")
+    same = report("now", "new.csv", "map.png")
+    now = report("now", "new.csv")
     (tmp_path / "notes.txt").write_text("of somebody, by now")
     store = TaskStore(tmp_path / "tasks")
     for number, each in enumerate((before, same, now)):

@@ -97,8 +97,9 @@ def start(part, address):
     }
     return subprocess.Popen(
         [sys.executable, "-m", "dask", part, *options[part], "--no-dashboard"],
-        stderr=subprocess.DEVNULL, env=os.environ | paths,
-    )  # fmt: skip
+        stderr=subprocess.DEVNULL,
+        env=os.environ | paths,
+    )
 
 
 def start_cluster(address):
@@ -148,7 +149,8 @@ def test_tasks_that_fail_end_no_run(tmp_path, workers):
 
 def test_parts_that_are_needed_together_fail_by_name(tmp_path):
     "Of five two fail: both are named with the reason of the last, and the others are kept"
-    ends, numbers = [], (3, -1, 2, -2, 4)
+    ends = []
+    numbers = (3, -1, 2, -2, 4)
     with engine() as chosen:
         run = Run(TaskStore(tmp_path), chosen, ends.append)
         named = r"2 of 5 .* \(square--1, square--2\): -2 has no square here. --resume"
@@ -160,7 +162,8 @@ def test_parts_that_are_needed_together_fail_by_name(tmp_path):
 
 def test_long_tasks_are_begun_first(tmp_path):
     "What has most points, or most near targets, begins first; alike ones keep their order"
-    begun, points = [], {1: (5, 0.0), 2: (7, 0.0), 3: (5, 3.5), 4: (5, 0.0)}
+    begun = []
+    points = {1: (5, 0.0), 2: (7, 0.0), 3: (5, 3.5), 4: (5, 0.0)}
 
     def noted(number):
         begun.append(number)

@@ -59,7 +59,8 @@ def test_time_left_is_told_by_what_is_worked_on(tmp_path):
             progress.ended(Outcome(task, seconds=1.0))
         progress.due = 0.0
         progress.ended(Outcome(tasks[94], seconds=1.0))
-    rate, left = "95 %, 1e-06 M points/s", "5 s left of this stage, 0 failures so far"
+    rate = "95 %, 1e-06 M points/s"
+    left = "5 s left of this stage, 0 failures so far"
     assert told == [f"Reading headers: 95 of 100 files of 1 drive, {rate}, {left}"]
 
 

@@ -15,7 +15,8 @@ from tests.beds.object_store import object_store
 
 pytestmark = pytest.mark.long
 
-PROJECT, OUT = "s3://city/project.toml", "s3://city/out"
+PROJECT = "s3://city/project.toml"
+OUT = "s3://city/out"
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +75,8 @@ def test_a_connection_that_is_lost_fails_a_single_file(store, lost):
     "Read or written, one file is named with the reason, others are done, and --resume does it"
     store.files.rm("city/out/second/tile-1.laz")
     store.files.rm("city/out/first/tile-1.laz")
-    store.lost, store.lost_after = lost, 0
+    store.lost = lost
+    store.lost_after = 0
     try:
         result, written = resumed(store)
     finally:

@@ -26,7 +26,8 @@ def survey(street):
 
 def test_the_example_makes_its_picture(street, tmp_path):
     "The example draws a survey that it is given, and puts three pages together"
-    picture, out = tmp_path / "picture.png", tmp_path / "pages"
+    picture = tmp_path / "picture.png"
+    out = tmp_path / "pages"
     subprocess.check_output(
         [sys.executable, EXAMPLE, street, "--picture", picture, "--out", out], text=True
     )

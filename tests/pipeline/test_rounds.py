@@ -76,7 +76,8 @@ def test_what_no_simulator_can_take_is_told_and_the_results_are_written(survey, 
 def test_what_no_known_effect_explains_closes_nothing(survey):
     "The gap that the nearest effect leaves is that of no round: it was not put in"
     first = diagnose(read_survey(survey))
-    inference, closure = first.inference, first.closure
+    inference = first.inference
+    closure = first.closure
     cause = replace(inference.cause, effect="unknown", parameters=())
     verdict = replace(inference.verdict, label="unknown", lead="height error")
     inference = replace(inference, verdict=verdict, causes=(cause,))

@@ -173,7 +173,8 @@ def test_the_written_survey_has_each_calibrated_mounting(survey, commanded, corr
 def test_clouds_of_both_scanners_come_to_where_things_are(site, survey, corrected):
     "After calibration and correction points of every file lie within centimetres of the truth"
     result, out = corrected
-    truth, first = np.load(site / "truth.npz")["point_xyz"], 0
+    truth = np.load(site / "truth.npz")["point_xyz"]
+    first = 0
     for file in survey.clouds:
         las = laspy.read(out / file.path.name)
         apart = np.median(np.linalg.norm(las.xyz - truth[first : first + len(las)], axis=1))
@@ -219,7 +220,8 @@ def test_beams_are_judged_by_the_mounting_of_their_file(survey, corrected):
 def test_two_scanners_tie_a_pass_to_itself(commanded):
     "Calibrated, both see the walls of one pass within seconds, and most such ties hold"
     survey = replace(mlscorr.read_survey(commanded[0]), search_radius=0.1)  # m, for speed
-    there, collector = survey.trajectory.passes[0, 1], TieCollector(survey)
+    there = survey.trajectory.passes[0, 1]
+    collector = TieCollector(survey)
     for file in survey.clouds:
         for chunk in read_chunks(file):
             collector.add(file, chunk[chunk.gps_time < there])

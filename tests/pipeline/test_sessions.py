@@ -37,7 +37,8 @@ def cut(street, folder, rows):
         (folder / f"run-{number}.csv").write_text("\n".join([header, *epochs[part], ""]))
         entries = f'[[trajectory]]\nfile = "run-{number}.csv"\n\n{entries}'
     text = (folder / "survey.toml").read_text()
-    start, end = text.index("[trajectory]"), text.index("[", text.index("[trajectory]") + 1)
+    start = text.index("[trajectory]")
+    end = text.index("[", text.index("[trajectory]") + 1)
     (folder / "survey.toml").write_text(text[:start] + entries + text[end:])
     return folder
 

@@ -22,7 +22,9 @@ from mlscorr.survey import PointCloud
 from tests.beds.las_crs import add_crs
 from tests.beds.pof import pof_bytes, poq_bytes
 
-START, EAST, NORTH = 413_200.0, 532_000.0, 3_374_000.0
+START = 413_200.0
+EAST = 532_000.0
+NORTH = 3_374_000.0
 WEEK = 604_800.0 * 2300
 HEADER = "gps_time,easting,northing,height,roll,pitch,heading\n"
 CONTROL = "name,easting,northing,height,sigma_horizontal,sigma_vertical,kind,size,role\n"
@@ -43,7 +45,8 @@ def control(form="{},{:.3f},{:.3f},{:.3f},0.003,0.004,circle,0.6,{}", swap=False
 
 def write_cloud(path, crs=None, start=START + 2.0, standard=False):
     header = laspy.LasHeader(point_format=6, version="1.4")
-    header.scales, header.offsets = [0.001] * 3, [EAST, NORTH, 0.0]
+    header.scales = [0.001] * 3
+    header.offsets = [EAST, NORTH, 0.0]
     header.global_encoding.gps_time_type = laspy.header.GpsTimeType(int(standard))
     add_crs(header, crs)
     las = laspy.LasData(header)
@@ -58,7 +61,8 @@ def write_sbet(path, start=START, east=EAST):
     back = pyproj.Transformer.from_crs("EPSG:32650", "EPSG:4326", always_xy=True)
     longitude, latitude = back.transform(east + 5 * (times - start), np.full(len(times), NORTH))
     record = np.zeros((len(times), 17))
-    record[:, 0], record[:, 3] = times, 42.0
+    record[:, 0] = times
+    record[:, 3] = 42.0
     record[:, 1], record[:, 2] = np.radians(latitude), np.radians(longitude)
     record[:, 9] = np.radians(90.0)
     record.tofile(path)
@@ -475,14 +479,17 @@ ASKED = {  # what is written, words of the question, and the keys that are open
     "words of an office": (
         write(
             "control.csv",
-            CONTROL.replace(",size", "") + control("{},{:.3f},{:.3f},{:.3f},0.003,0.004,*,{}")
-            .replace("*", "Tafel 0,6 m", 1).replace("*", "Scheibe, 0.6")
-            .replace("Tafel 0,6 m", '"Tafel 0,6 m"').replace("Scheibe, 0.6", '"Scheibe, 0.6"'),
+            CONTROL.replace(",size", "")
+            + control("{},{:.3f},{:.3f},{:.3f},0.003,0.004,*,{}")
+            .replace("*", "Tafel 0,6 m", 1)
+            .replace("*", "Scheibe, 0.6")
+            .replace("Tafel 0,6 m", '"Tafel 0,6 m"')
+            .replace("Scheibe, 0.6", '"Scheibe, 0.6"'),
         ),
         ["no column size", '"circle 0.6"'],
         ['control.words."Scheibe, 0.6"', 'control.words."Tafel 0,6 m"'],
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize(("spoil", "words", "keys"), ASKED.values(), ids=ASKED)
@@ -529,8 +536,10 @@ def test_an_office_says_once_what_its_words_mean(folder):
     assert tomllib.loads(path.read_text())["control"]["words"] == words
     points = mlscorr.read_survey(path).surveyed
     assert list(zip(points.kind, points.size, strict=True)) == [
-        ("square", 0.5), ("circle", 0.6), ("circle", 0.6)
-    ]  # fmt: skip
+        ("square", 0.5),
+        ("circle", 0.6),
+        ("circle", 0.6),
+    ]
 
 
 def cut(folder, overlap=0.0, other=""):
@@ -559,7 +568,8 @@ def test_trajectories_that_follow_each_other_are_a_list(folder):
 
 def test_ids_that_take_turns_are_named(folder):
     "Two scanners in one file write in turns, strips do not: init says what [[scanner]] is for"
-    strips, turns = laspy.read(folder / "pass-1.las"), laspy.read(folder / "pass-2.las")
+    strips = laspy.read(folder / "pass-1.las")
+    turns = laspy.read(folder / "pass-2.las")
     strips.point_source_id = np.repeat([1, 2, 3, 4], 25)
     turns.point_source_id = np.arange(100) % 3 // 2
     strips.write(folder / "pass-1.las")
@@ -597,8 +607,13 @@ def test_what_is_said_decides(folder):
     "--set names one of two trajectories, and values that no file holds; text needs no quotes"
     (folder / "smoothed.csv").write_text(HEADER + trajectory())
     (folder / "control.csv").write_text("Pt,E,N,H\n" + control("{},{:.3f},{:.3f},{:.3f}"))
-    sets = ("trajectory.file = smoothed.csv", "control.kind=square", "control.size = 0.4",
-            "control.sigma = [0.01, 0.01]", "pos.position_sigma = 0.1")  # fmt: skip
+    sets = (
+        "trajectory.file = smoothed.csv",
+        "control.kind=square",
+        "control.size = 0.4",
+        "control.sigma = [0.01, 0.01]",
+        "pos.position_sigma = 0.1",
+    )
     arguments = [argument for line in sets for argument in ("--set", line)]
     out = folder / "other.toml"
     result = CliRunner().invoke(app, ["init", str(folder), "-o", str(out), *arguments])

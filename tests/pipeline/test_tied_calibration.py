@@ -34,7 +34,8 @@ def site(folder, boresight, control, back=True):
         described = (folder / "survey.toml").read_text()
         part = described[described.index("[control]") :].split("\n\n")[0]
         (folder / "survey.toml").write_text(described.replace(part, ""))
-    true, recorded = simulated.true_mountings[0], simulated.mounting
+    true = simulated.true_mountings[0]
+    recorded = simulated.mounting
     turn = (true.boresight * recorded.boresight.inv()).as_rotvec()
     return np.append(true.lever_arm - recorded.lever_arm, turn)
 
@@ -87,7 +88,8 @@ def test_the_document_has_the_misfit_of_each_two_passes(commanded):
 def test_degrees_of_boresight_are_found_without_any_control(uncontrolled):
     "A boresight off by 3 deg, planes off by half a metre: right and forward to 0.05 deg"
     lacks, result = uncontrolled
-    error, sigma = result.calibration.lsc.correction - lacks, result.calibration.lsc.sigma
+    error = result.calibration.lsc.correction - lacks
+    sigma = result.calibration.lsc.sigma
     assert np.degrees(np.abs(error[3:5])).max() < 0.05
     assert np.abs(error[:2]).max() < 0.03  # m
     known = result.calibration.determined

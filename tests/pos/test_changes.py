@@ -8,7 +8,9 @@ from mlscorr.pos import find_steps, runs
 from mlscorr.pos.changes import quick_changes, timely_sigma
 from mlscorr.survey import Trajectory
 
-START, CORNER = 413200.0, np.array([528000.0, 3379000.0, 20.0])  # s, m
+# s, m
+START = 413200.0
+CORNER = np.array([528000.0, 3379000.0, 20.0])
 TIME = np.arange(0.0, 120.0, 0.1)
 FLOATED = (TIME >= 40.0) & (TIME < 80.0)
 SIGMA = np.where(FLOATED, 0.4, 0.02)  # m

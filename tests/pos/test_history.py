@@ -7,7 +7,9 @@ from scipy.spatial.transform import Rotation
 from mlscorr.pos import drift_history, stated_sigma
 from mlscorr.survey import Pos, Trajectory
 
-START, CORNER = 413200.0, np.array([528000.0, 3379000.0, 20.0])  # s, m
+# s, m
+START = 413200.0
+CORNER = np.array([528000.0, 3379000.0, 20.0])
 TIME = np.arange(0.0, 200.0, 0.1)
 OUTAGE = (TIME >= 80.0) & (TIME < 120.0)
 
@@ -15,8 +17,12 @@ OUTAGE = (TIME >= 80.0) & (TIME < 120.0)
 def drive(sigma=None, error=None):
     "200 s to the north; sigma (n,) stands for all axes"
     path = CORNER + np.outer(TIME, [0.0, 10.0, 0.0])
-    path = path if error is None else path - error[:, None] * [1.0, 0.5, -0.5]
-    sigma = None if sigma is None else np.repeat(sigma[:, None], 3, axis=1)
+    if error is not None:
+        path = path - error[:, None] * [1.0, 0.5, -0.5]
+    if sigma is None:
+        sigma = None
+    else:
+        sigma = np.repeat(sigma[:, None], 3, axis=1)
     return Trajectory(START + TIME, path, Rotation.identity(len(TIME)), sigma)
 
 
@@ -132,8 +138,9 @@ def test_sigma_that_converges_after_its_fall_is_no_drift():
 def test_heights_that_vary_less_are_held_like_the_rest():
     "Sigma of the plan grows tenfold in an outage, of the height by half: all three are held"
     sigma = np.column_stack([0.02 + grown(0.2), 0.02 + grown(0.2), 0.04 + grown(0.02)])
-    trajectory = Trajectory(START + TIME, CORNER + np.outer(TIME, [0.0, 10.0, 0.0]),
-                            Rotation.identity(len(TIME)), sigma)  # fmt: skip
+    trajectory = Trajectory(
+        START + TIME, CORNER + np.outer(TIME, [0.0, 10.0, 0.0]), Rotation.identity(len(TIME)), sigma
+    )
     stated = stated_sigma(trajectory, Pos())
     assert stated.held[0] == pytest.approx([0.02, 0.02, 0.04])  # m
     assert stated.gnss[0] == pytest.approx([0.02, 0.02, 0.04])

@@ -16,7 +16,10 @@ POS = Pos(position_sigma=0.5, attitude_sigma=np.array([1e-4, 2e-4, 3e-4]))
 def drive(sigma=None, heading=0.0):
     "100 s northwards, perhaps with one sigma (n,) for E, N and H"
     elapsed = np.arange(0.0, 100.0, 0.1)
-    sigma = None if sigma is None else np.repeat(sigma(elapsed)[:, None], 3, axis=1)
+    if sigma is None:
+        sigma = None
+    else:
+        sigma = np.repeat(sigma(elapsed)[:, None], 3, axis=1)
     attitude = attitude_from_angles(0.0, 0.0, np.full(len(elapsed), heading))
     return Trajectory(START + elapsed, ORIGIN + elapsed[:, None] * [0, 10, 0], attitude, sigma)
 

@@ -9,7 +9,9 @@ from mlscorr.frames import attitude_from_angles
 from mlscorr.pos import find_steps
 from mlscorr.survey import Trajectory
 
-START, CORNER = 413200.0, np.array([528000.0, 3379000.0, 20.0])  # s, m
+# s, m
+START = 413200.0
+CORNER = np.array([528000.0, 3379000.0, 20.0])
 
 
 def city_drive(rate=10.0, seconds=300.0):
@@ -66,7 +68,8 @@ def test_a_car_that_stands_longer_than_it_drives_makes_no_steps():
     "After 400 s at rest, 300 s of starting, stopping and turning at 1 Hz show no fall-back but one"
     time = np.arange(0.0, 700.0, 0.1)
     driven = np.maximum(time - 400.0, 0.0)
-    speed, heading = 6.0 - 6.0 * np.cos(driven / 3.0), 0.8 * np.sin(driven / 5.0)
+    speed = 6.0 - 6.0 * np.cos(driven / 3.0)
+    heading = 0.8 * np.sin(driven / 5.0)
     way = speed[:, None] * np.column_stack([np.sin(heading), np.cos(heading), 0.0 * heading])
     path = CORNER + np.cumsum(way, axis=0) / 10.0
     assert len(find_steps(recorded(time[::10], path[::10]))) == 0

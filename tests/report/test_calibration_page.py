@@ -115,7 +115,8 @@ def test_a_calibration_that_makes_check_points_worse_is_red():
 
 def test_check_points_that_chance_or_the_scanner_makes_worse_are_amber():
     "A mounting without a significant change does no harm; what ranges lack is not the mounting's"
-    content, none = calibrated(worse=True), {"correction": [0.0] * 3, "sigma": [0.01] * 3}
+    content = calibrated(worse=True)
+    none = {"correction": [0.0] * 3, "sigma": [0.01] * 3}
     right = content["lsc"] | {"lever_arm": none, "boresight": none}
     screens = [
         calibration_screen(content | {"lsc": right}, []),
@@ -152,7 +153,8 @@ def test_what_the_drift_explains_between_passes_is_said_apart():
     "1.6 cm by the mounting that is written; 2 mm where the drift is written, too"
     away = {state: {"median": size} for state, size in (("before", 0.015), ("after", 0.016))}
     ties = {"n": 90, "used": 80, "pairs": [], **away}
-    content, sentences = calibrated() | {"ties": ties}, []
+    content = calibrated() | {"ties": ties}
+    sentences = []
     for more in ({}, {"with_drift": {"ties": {"after": {"median": 0.002}}}}):
         rows = calibration_screen(content | more, [])["statements"]
         sentences += [row["sentence"] for row in rows if row["what"] == "Two passes"]

@@ -34,7 +34,8 @@ def test_of_many_targets_the_worst_and_evenly_spread_ones_are_drawn():
 @pytest.mark.long
 def test_24_targets_fit_in_15_megabytes_whatever_they_look_like(tmp_path):
     "Pictures of pure noise, which no format makes smaller; names that hold a script don't run"
-    rng, evil = np.random.default_rng(6), "</script><script>alert(1)</script>"
+    rng = np.random.default_rng(6)
+    evil = "</script><script>alert(1)</script>"
     survey, correction, report = fabricate(drive(), 24)
     report.targets[0] = replace(report.targets[0], name=evil)
 

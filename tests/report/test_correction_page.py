@@ -20,8 +20,9 @@ def test_the_page_needs_nothing_but_itself(tmp_path):
     links = Links(html)
     inside = [link for link in links.links if link.startswith("#")]
     assert len(links.links) - len(inside) == 4 and inside
-    assert all(link.startswith("data:image/svg+xml;base64,") or link in inside
-               for link in links.links)  # fmt: skip
+    assert all(
+        link.startswith("data:image/svg+xml;base64,") or link in inside for link in links.links
+    )
     assert all(f'id="{link[1:]}"' in html for link in inside)
     assert not links.tags & {"link", "iframe", "object"}
     assert "@import" not in html and "url(" not in html and "http" not in words(html)
@@ -117,7 +118,8 @@ def test_warnings_come_before_the_tables(tmp_path):
 def test_a_target_that_was_not_seen_is_listed_with_its_reason(tmp_path):
     "Control first, then check, then unused, and missing numbers are dashes"
     survey, correction, report = fabricate(drive())
-    surveyed, reason = report.targets[0].surveyed, "no returns within 0.5 m"
+    surveyed = report.targets[0].surveyed
+    reason = "no returns within 0.5 m"
     report.targets.insert(0, TargetRow.unobserved("LOST", None, "control", surveyed, reason))
     text = words(page(tmp_path, survey, correction, report))
     table = text[text.index("Sigma is 1 sigma") :]
@@ -129,7 +131,8 @@ def test_a_target_that_was_not_seen_is_listed_with_its_reason(tmp_path):
 def test_a_correction_of_zero_still_has_a_page(tmp_path):
     "Limits of axes and scales hold when there is nothing to show"
     survey, correction, report = fabricate(drive(), 2, checks=False)
-    still, unknown = np.zeros(3), np.full(3, np.nan)
+    still = np.zeros(3)
+    unknown = np.full(3, np.nan)
     changes = {"before": still, "after": still, "sigma": unknown}
     report = report_of(drive(), [replace(row, **changes) for row in report.targets])
     nothing = replace(correction.corrected, position=correction.recorded.position)
@@ -152,8 +155,11 @@ def test_the_page_tells_what_two_passes_both_saw(tmp_path):
     html = path.read_text(encoding="utf-8")
     text, (pair,) = words(html), report.ties["pairs"]
     assert 'href="#ties"' in html and "What was seen twice" in text
-    cells = [tables.millimetres(pair[state][key])
-             for state in ("before", "after") for key in ("median", "rms")]  # fmt: skip
+    cells = [
+        tables.millimetres(pair[state][key])
+        for state in ("before", "after")
+        for key in ("median", "rms")
+    ]
     assert " ".join(["1 and 2", str(pair["n"]), str(pair["used"]), *cells]) in text
     assert "Grey crosses are not used" in text
     nothing = {"n": 0, "used": 0, "reason": "Nothing was scanned twice."}

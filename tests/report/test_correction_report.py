@@ -16,15 +16,19 @@ from tests.beds.street_of_points import ORIGIN, shifted, target
 
 def test_report_json_tells_the_accuracy_and_the_files(commanded):
     "The accuracy by the check point, and the hash of every file that was read and written"
-    folder, out = commanded[1].parents[1] / "Erste Fahrt", commanded[1]
+    folder = commanded[1].parents[1] / "Erste Fahrt"
+    out = commanded[1]
     report = json.loads((out / "report.json").read_text(encoding="utf-8"))
     check = report["check"]["after"]
     assert report["accuracy"]["points"] == 1 and not report["accuracy"]["conformant"]
     assert report["accuracy"]["fit"]["rmse_horizontal"] == pytest.approx(check["rmse_horizontal"])
     assert report["accuracy"]["rmse_horizontal"] > check["rmse_horizontal"]
     assert [row["what"] for row in report["inputs"]][:4] == [
-        "survey", "cloud", "trajectory", "control"
-    ]  # fmt: skip
+        "survey",
+        "cloud",
+        "trajectory",
+        "control",
+    ]
     for rows, place in ((report["inputs"], folder), (report["outputs"] + report["files"], out)):
         for row in rows:
             content = (place / row["name"]).read_bytes()
@@ -68,8 +72,11 @@ def test_the_document_has_its_parts_in_order():
     assert "leave_one_out" in content["control"] and "leave_one_out" not in content["check"]
     assert report.cloud_points == 1_234_567
     assert list(FileRow("a.csv", "ab", "targets", bytes=3).document()) == [
-        "what", "name", "bytes", "sha256"
-    ]  # fmt: skip
+        "what",
+        "name",
+        "bytes",
+        "sha256",
+    ]
 
 
 @pytest.mark.parametrize(

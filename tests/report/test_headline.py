@@ -56,7 +56,8 @@ def test_refused_and_missing_control_points_are_counted():
 def test_control_in_another_scale_is_not_green(tmp_path):
     "The term, what it makes, and the sentence of the warning; the result is amber however good"
     survey, correction, report = fabricate(drive())
-    size, sigma = np.array([4e-4]), np.array([1e-5])
+    size = np.array([4e-4])
+    sigma = np.array([1e-5])
     scale = DatumDifference("scale", size, sigma, 20.0, 12, 250.0)
     report = replace(report, support=Support(), datum=(scale,))
     assert scale.sentence in words(page(tmp_path, survey, correction, report))
@@ -84,7 +85,8 @@ def test_a_single_control_point_is_corrected_by_no_others(checks):
 
 def test_what_was_found_half_a_metre_off_is_not_said_to_be_unseen():
     "Refused, with its reason; a check point counts against the result all the same"
-    report, seen = fabricate(drive())[2], {"scanned": True, "gps_time": 413_200.0}
+    report = fabricate(drive())[2]
+    seen = {"scanned": True, "gps_time": 413_200.0}
     reason = "T40 lies 0.50 m from where the observation says."
     rows = [
         TargetRow.unobserved(name, 1, role, np.zeros(3), reason, **seen)
@@ -137,7 +139,8 @@ def test_page_report_and_terminal_begin_with_the_same_statements(tmp_path, capsy
     content = {**first_screen(report), **report.document()}
     html = page(tmp_path, survey, correction, report)
     tell(content, tmp_path, as_json=False)
-    terminal, text = " ".join(capsys.readouterr().err.split()), words(html)
+    terminal = " ".join(capsys.readouterr().err.split())
+    text = words(html)
     for row in content["statements"]:
         assert row["sentence"] in text[: text.index("How far the cloud is")]
         if row["what"] != "Warnings":  # said when they arose
@@ -167,9 +170,10 @@ def test_a_weak_stretch_is_named_by_time_and_way_and_is_amber_where_it_exceeds_w
             WeakStretch(50.0, 61.5, 60.0, sigma, "b", 300.0),
         )
         row = next(
-            row for row in statements(replace(report, support=Support(weak)))
+            row
+            for row in statements(replace(report, support=Support(weak)))
             if row.what == "Extrapolated"
-        )  # fmt: skip
+        )
         assert row.rating == rating
         assert row.items[0][0] == "50.0 to 61.5 s, 300 to 360 m of the way"
 
@@ -235,7 +239,8 @@ def test_what_became_no_better_is_not_green():
     report = replace(fabricate(drive())[2], support=Support())
     ratings = []
     for before in (0.030, 0.008):
-        report.check.before.rmse[:], report.check.after.rmse[:] = before, 0.0102
+        report.check.before.rmse[:] = before
+        report.check.after.rmse[:] = 0.0102
         ratings.append(statements(report)[0].rating)
     assert ratings == ["green", "amber"]
 

@@ -41,17 +41,32 @@ def test_a_drive_without_result_and_the_misfit_of_ties_stand_in_the_table(tmp_pa
     counts = {"n_surveyed": 0, "n_seen": 0, "n_scored": 0}
     ties = {"friday": {"n": 31, "before": 0.4123, "after": 0.0214}}
     row = {
-        "name": "monday", "state": "tied", "tied_with": ties, "meaning": "held by others",
-        "rating": "green", "files": 2, "points": 10, "control": counts, "check": counts,
-        "tested_by": None, "before": None, "after": None, "position_sigma": None,
-        "metres_extrapolated": 0.0, "headline": "",
-    }  # fmt: skip
+        "name": "monday",
+        "state": "tied",
+        "tied_with": ties,
+        "meaning": "held by others",
+        "rating": "green",
+        "files": 2,
+        "points": 10,
+        "control": counts,
+        "check": counts,
+        "tested_by": None,
+        "before": None,
+        "after": None,
+        "position_sigma": None,
+        "metres_extrapolated": 0.0,
+        "headline": "",
+    }
     fault = {"drive": "sunday", "name": "a.laz", "stage": "find", "fault": "a.laz ends"}
     document = {
-        "name": "city", "crs": "EPSG:25832", "headline": "1 drive", "rating": "amber",
-        "statements": [], "drives": [row],
+        "name": "city",
+        "crs": "EPSG:25832",
+        "headline": "1 drive",
+        "rating": "amber",
+        "statements": [],
+        "drives": [row],
         "faults": [fault, fault | {"name": "b.laz"}, fault | {"drive": "monday"}],
-    }  # fmt: skip
+    }
     write_project(tmp_path / "project.html", document, {})
     text = (tmp_path / "project.html").read_text(encoding="utf-8")
     assert "friday (31: 0.412 to 0.021)" in text

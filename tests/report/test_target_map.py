@@ -44,7 +44,8 @@ def test_names_on_the_map_go_to_the_other_side_of_a_star():
     axes.figure.draw_without_rendering()
     texts = {text.get_text(): text for text in axes.texts}
     (star,) = (line for line in axes.lines if line.get_marker() == "*" and len(line.get_xdata()))
-    name, box = texts[row.name], star.get_window_extent().padded(5.0)
+    name = texts[row.name]
+    box = star.get_window_extent().padded(5.0)
     assert not name.get_window_extent().overlaps(box)
     assert not name.get_window_extent().overlaps(texts["1"].get_window_extent())
     assert (name.xyann[0] > 0) == (row.before[0] > 0)

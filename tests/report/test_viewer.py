@@ -22,7 +22,8 @@ def test_the_scene_is_thinned_evenly_in_space():
 
 def test_the_scene_holds_the_cloud_before_and_after():
     "At UTM size each point is where it was recorded and where it was moved to, within 0.1 mm"
-    cloud, shift = street(20_000, np.random.default_rng(4)), np.array([0.31, -0.12, 0.07])
+    cloud = street(20_000, np.random.default_rng(4))
+    shift = np.array([0.31, -0.12, 0.07])
     row = target("T1", np.add(ORIGIN, [100.0, 0.0, 2.0]), shift)
     lost = TargetRow.unobserved("T2", None, "control", ORIGIN, "not seen")
     scene = viewer_data(shifted(shift), cloud, [row, lost], [row])

@@ -103,7 +103,8 @@ def test_bends_are_drivable():
     for parts in ({"turns": 90.0}, {"speed": 33.0, "turns": 30.0}):
         _, _, (trajectory,) = driven(**parts)
         velocity = np.gradient(trajectory.position[:, :2], 0.01, axis=0)
-        speed, course = np.hypot(*velocity.T), np.unwrap(np.arctan2(*velocity.T))
+        speed = np.hypot(*velocity.T)
+        course = np.unwrap(np.arctan2(*velocity.T))
         assert np.abs(speed * np.gradient(course, 0.01)).max() < 3.0
 
 
@@ -156,7 +157,8 @@ def test_a_u_turn_drives_the_way_back_in_the_same_pass(direction, kind):
     away = np.linalg.norm(trajectory.position[:, None, :2] - ends[None], axis=2)
     assert away[:, int(direction == "forward")].min() < 12.0
     velocity = np.gradient(trajectory.position[:, :2], 0.01, axis=0)
-    speed, course = np.hypot(*velocity.T), np.unwrap(np.arctan2(*velocity.T))
+    speed = np.hypot(*velocity.T)
+    course = np.unwrap(np.arctan2(*velocity.T))
     rate = np.abs(np.gradient(course, 0.01))
     assert np.degrees(abs(course[-1] - course[0])) == pytest.approx(180.0, abs=15.0)
     turning = rate > 0.15  # rad/s

@@ -9,7 +9,8 @@ from mlscorr.simulate import Mechanism, RecordedPoints, mechanisms
 from mlscorr.simulate._mechanisms import DIRECTIONS
 from mlscorr.survey import Mounting, Trajectory
 
-START, PLACE = 413200.0, np.array([523000.0, 3378000.0, 20.0])
+START = 413200.0
+PLACE = np.array([523000.0, 3378000.0, 20.0])
 MOUNTING = Mounting(
     np.array([0.1, -0.6, 0.4]), Rotation.from_euler("ZX", [35.0, 90.0], degrees=True)
 )
@@ -19,12 +20,15 @@ MOUNTING = Mounting(
 def seen():
     "Points around a vehicle that turns to the left at 6 deg/s and brakes by 0.2 m/s^2"
     t = np.arange(0.0, 30.0, 0.01)
-    heading, speed = -np.radians(6.0) * t, 11.0 - 0.2 * t
+    heading = -np.radians(6.0) * t
+    speed = 11.0 - 0.2 * t
     step = 0.01 * speed[:, None] * np.column_stack([np.sin(heading), np.cos(heading), 0.0 * t])
     attitude = attitude_from_angles(0.01 * np.sin(t), 0.02 * np.sin(t / 3), heading)
     trajectory = Trajectory(START + t, PLACE + np.cumsum(step, axis=0), attitude)
     rng = np.random.default_rng(1)
-    time, angle, away = START + rng.uniform(1, 29, 300), rng.uniform(-3, 3, 300), None
+    time = START + rng.uniform(1, 29, 300)
+    angle = rng.uniform(-3, 3, 300)
+    away = None
     away = rng.uniform(3.0, 30.0, 300)
     level = np.column_stack([away * np.cos(angle), away * np.sin(angle), 0.0 * away])
     pose = trajectory.at(time)

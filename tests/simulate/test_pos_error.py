@@ -22,7 +22,9 @@ pytestmark = pytest.mark.long
 
 START = 357_700.0  # s of the week
 ORIGIN = np.array([532_000.0, 3_374_000.0, 42.0])  # m
-LOST, BACK = 20.0, 80.0  # s, an outage of 60 s
+# s, an outage of 60 s
+LOST = 20.0
+BACK = 80.0
 SEEDS = range(30)
 REAL_TIME = {"processing": "filtered", "odometer": True}  # as the real series was made
 
@@ -38,7 +40,8 @@ def drive(duration, rate=100.0):
     return Trajectory(START + elapsed, way, attitude)
 
 
-SHORT, LONG = drive(30.0), drive(100.0)
+SHORT = drive(30.0)
+LONG = drive(100.0)
 ELAPSED = np.arange(len(LONG)) / 100.0
 IN_OUTAGE = (ELAPSED > LOST) & (ELAPSED < BACK)
 
@@ -89,7 +92,9 @@ def test_biases_grow_as_powers_of_time():
     epochs = 601
     still = inertial.motion(0.1, np.zeros((epochs, 3)), Rotation.identity(epochs))
     start = np.zeros(15)
-    start[12], start[9] = 1e-3, 1e-5  # m/s^2 to the right; rad/s about the right axis
+    # m/s^2 to the right; rad/s about the right axis
+    start[12] = 1e-3
+    start[9] = 1e-5
     state = inertial.propagate(inertial.transitions(still), np.zeros((epochs - 1, 15)), start)
     east, north, _ = state[-1, :3]
     assert east == pytest.approx(1e-3 * 60**2 / 2, rel=0.005)
@@ -118,7 +123,8 @@ def test_the_smoother_equals_dense_least_squares():
     epochs = 12
     moved = inertial.motion(0.5, SHORT.position[:600:50] - ORIGIN, SHORT.attitude[:600:50])
     transition = inertial.transitions(moved)
-    noise, start = MEMS.densities**2 * 0.5 + 1e-12, inertial.start_sigma(MEMS) ** 2
+    noise = MEMS.densities**2 * 0.5 + 1e-12
+    start = inertial.start_sigma(MEMS) ** 2
     design = np.eye(3, 15)
     covariance = 0.02**2 * np.eye(3)
     seen = {k: rng.standard_normal(3) * 0.05 for k in (0, 3, 7, 11)}
@@ -153,7 +159,8 @@ def test_the_sigmas_are_right_when_filter_and_truth_agree(grade, monkeypatch):
     tuned = replace(navigation.SETTINGS, mistuning=1.0, unmodelled=1.0)
     monkeypatch.setattr(navigation, "SETTINGS", tuned)
     imu = replace(GRADES[grade], gyro_scale=0.0, accelerometer_scale=0.0, misalignment=0.0)
-    position, attitude = [], []
+    position = []
+    attitude = []
     for seed in range(40):
         rng = np.random.default_rng(seed)
         navigated = navigation.navigate(SHORT, PosScenario(grade=grade), imu, rng)
@@ -238,8 +245,10 @@ def test_the_same_seed_gives_the_same_bits_and_another_seed_does_not(mems):
 def test_an_outage_changes_neither_sensors_nor_satellites():
     "Free inertial navigation and the remaining fixes stay bit for bit what they were"
     lost = PosScenario(outages=((5.0, 10.0),))
-    a, b = (navigation.navigate(SHORT, s, TACTICAL, np.random.default_rng(3), start=START)
-            for s in (PosScenario(), lost))  # fmt: skip
+    a, b = (
+        navigation.navigate(SHORT, s, TACTICAL, np.random.default_rng(3), start=START)
+        for s in (PosScenario(), lost)
+    )
     np.testing.assert_array_equal(a.error, b.error)
     np.testing.assert_array_equal(a.fixes.error, b.fixes.error)
     assert (a.fixes.valid & ~b.fixes.valid).sum() == 10
@@ -257,7 +266,8 @@ def test_outages_count_from_the_start_of_the_drive():
 
 def test_walls_take_satellites_away():
     "Fewer satellites, larger sigmas, and below four no fix"
-    times, heading = START + np.arange(60.0), np.full(60, 0.7)
+    times = START + np.arange(60.0)
+    heading = np.full(60, 0.7)
     hidden = (np.full((60, 2), np.radians(walls)) for walls in (0.0, 55.0, 85.0))
     open_, canyon, slot = (
         [gnss.gnss_fixes(times, heading, walls, np.random.default_rng(s)) for s in range(20)]
@@ -290,9 +300,12 @@ def test_the_sky_between_walls_is_used():
     scenario = PosScenario(sky_view=True)
     low, high = (np.full((len(SHORT), 2), np.radians(v)) for v in (5.0, 60.0))
     sigma = [
-        [pos_error(SHORT, scenario, np.random.default_rng(s), sky).position_sigma.mean()
-         for s in range(5)] for sky in (low, high)
-    ]  # fmt: skip
+        [
+            pos_error(SHORT, scenario, np.random.default_rng(s), sky).position_sigma.mean()
+            for s in range(5)
+        ]
+        for sky in (low, high)
+    ]
     assert np.median(sigma[1]) > 2 * np.median(sigma[0])
     with pytest.raises(ValueError, match="sky_view needs"):
         pos_error(SHORT, scenario, np.random.default_rng(1))

@@ -66,7 +66,8 @@ def test_the_reference_is_where_the_survey_file_says(folders):
 def test_the_reference_is_ground_and_walls_to_a_millimetre(folders):
     "Points on ground and walls lie on it within 4 mm; those on cars, trees and targets don't"
     _, _, made = folders
-    points, triangle = made.pulses.point - made.scenario.origin, made.pulses.triangle
+    points = made.pulses.point - made.scenario.origin
+    triangle = made.pulses.triangle
     fixed = triangle < made.scene.fixed
     away = distance(made.static_scan.triangles, points)
     assert np.quantile(away[fixed], 0.99) < 0.004

@@ -89,8 +89,10 @@ def recorded(effect):
         return apply_effects([effect], stage, value, reference, effect_streams(no_rng()))
 
     returns = Returns(*place[:2], away, pulses.intensity, incidence, np.ones(500, bool))
-    values = {name: getattr(changed(stage, returns), name) for stage, name in
-              (("clock", "gps_time"), ("angle", "angle"), ("range", "range"))}  # fmt: skip
+    values = {
+        name: getattr(changed(stage, returns), name)
+        for stage, name in (("clock", "gps_time"), ("angle", "angle"), ("range", "range"))
+    }
     survey = Survey(
         name="ground",
         path=Path("ground"),
@@ -138,7 +140,8 @@ def test_random_effects_are_drawn_alike_whatever_else_acts():
     def points(*effects):
         return replay(survey, pulses, ground, effects, reference, no_rng(), ORIGIN)[0]
 
-    noisy, bias = points(jitter), make_effect("range_bias", magnitude=0.01)
+    noisy = points(jitter)
+    bias = make_effect("range_bias", magnitude=0.01)
     assert 1e-3 < np.std(noisy - points()) < 1e-2
     np.testing.assert_allclose(points(jitter, bias) - noisy, points(bias) - points(), atol=1e-4)
     np.testing.assert_array_equal(points(make_effect("position_noise", magnitude=1.0)), points())
@@ -175,7 +178,8 @@ def test_what_stands_before_a_target_hides_it():
     plate = Boards(
         np.array([[5.0, 0, 0]]), axes, one.astype(int), 0.6 * one, 0 * one, 9 * one, one, 0 * one
     )
-    beyond, intensity = np.array([-1.0, 2.0, 2.0]), np.array([3.0, 4.0, 5.0])
+    beyond = np.array([-1.0, 2.0, 2.0])
+    intensity = np.array([3.0, 4.0, 5.0])
     world = TargetWorld(plate, np.zeros(3, int), beyond, intensity, np.zeros(3))
     direction = np.array([[1.0, 0, 0], [1.0, 0, 0], [1.0, 0.1, 0]])
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)

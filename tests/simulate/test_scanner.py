@@ -66,7 +66,8 @@ def scan(mesh, trajectory, mounting, scanner, seed=1, **options):
 def same(one, other, but=()):
     "That two Pulses are equal bit for bit, but for some fields, which aren't"
     for field in fields(MeasuredPulses):
-        a, b = getattr(one, field.name), getattr(other, field.name)
+        a = getattr(one, field.name)
+        b = getattr(other, field.name)
         assert np.array_equal(a, b) == (field.name not in but), field.name
 
 
@@ -86,7 +87,8 @@ def test_pulses_without_noise_return_the_points_they_hit(scanner, rate, divergen
 def test_points_lie_on_the_triangles_they_hit():
     "float32 ray casting costs nothing on the plane, and 0.1 mm at most along a triangle's edge"
     pulses = scan(ROOM, drive(), MOUNTING, with_(LINE, **QUIET))
-    points, corners = pulses.point - ORIGIN, ROOM.triangles[pulses.triangle]
+    points = pulses.point - ORIGIN
+    corners = ROOM.triangles[pulses.triangle]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     height = np.einsum("ij,ij->i", points - corners[:, 0], normal)

@@ -201,7 +201,8 @@ def without_targets(scene):
 def test_targets_do_not_overlap_and_stand_above_ground(name, seed):
     "Any two targets are further apart than their boards reach; none is below its ground"
     line, _, _, scene = built(name, seed)
-    centre, size = scene.targets.centre, SCENARIOS[name].targets.size
+    centre = scene.targets.centre
+    size = SCENARIOS[name].targets.size
     apart = np.linalg.norm(centre[:, None] - centre[None], axis=2) + 1e9 * np.eye(len(centre))
     assert apart.min() > 1.5 * np.sqrt(2) * size
     above = centre[:, 2] - line.height(centre)
@@ -216,7 +217,8 @@ def test_every_target_is_seen_by_every_pass(name, seed):
     "From each passing scanner a ray reaches the front of every target that is not hidden"
     _, _, trajectories, scene = built(name, seed)
     for i in np.flatnonzero(~scene.targets.hidden):
-        centre, normal = scene.targets.centre[i], scene.targets.normal[i]
+        centre = scene.targets.centre[i]
+        normal = scene.targets.normal[i]
         for trajectory in trajectories:
             start = in_scan_plane(trajectory, centre)
             front = (start - centre) @ normal > 0.2 * np.linalg.norm(start - centre, axis=1)
@@ -232,7 +234,8 @@ def test_hidden_targets_lose_a_fifth_to_two_fifths(name):
     for seed in (1, 2, 3):
         _, _, trajectories, scene = built(name, seed)
         for i in np.flatnonzero(scene.targets.hidden):
-            centre, normal = scene.targets.centre[i], scene.targets.normal[i]
+            centre = scene.targets.centre[i]
+            normal = scene.targets.normal[i]
             mine = scene.mesh.triangles[
                 (scene.target == i) & (scene.mesh.reflectance == SETTINGS.white)
             ]
@@ -374,7 +377,8 @@ def test_a_street_that_crosses_itself_is_free_to_drive():
     line, length = line_along(path)
     scene = build_scene(Scenario(), line, length, rng(2))
     s = np.arange(0.0, length, 0.5)
-    start, end = line.place(s[:-1], 0.0, 1.2), line.place(s[1:], 0.0, 1.2)
+    start = line.place(s[:-1], 0.0, 1.2)
+    end = line.place(s[1:], 0.0, 1.2)
     assert free(scene, start, end + 0.05 * (end - start)).all()
 
 
@@ -398,7 +402,8 @@ def write_ply(path, vertices, triangles):
     header += "".join(f"property double {axis}\n" for axis in "xyz")
     header += f"element face {len(triangles)}\nproperty list uchar int vertex_indices\nend_header\n"
     rows = np.zeros(len(triangles), dtype=[("n", "u1"), ("i", "<i4", 3)])
-    rows["n"], rows["i"] = 3, triangles
+    rows["n"] = 3
+    rows["i"] = triangles
     path.write_bytes(header.encode() + vertices.astype("<f8").tobytes() + rows.tobytes())
     return path
 
@@ -553,7 +558,8 @@ def test_paint_lies_on_the_carriageway():
     ]
     part = section(scenario.drive, length)
     s = np.arange(20.25, 60.0, 0.5)
-    middle, edge = np.zeros_like(s), part.half_width(s) - part.line_from_kerb
+    middle = np.zeros_like(s)
+    edge = part.half_width(s) - part.line_from_kerb
     painted = {"middle": middle, "right": edge, "left": -edge, "lane": edge / 2}
     for name, lateral in painted.items():
         above = line.place(s, lateral, part.height(s, lateral) + 1.0)

@@ -112,7 +112,8 @@ def test_the_range_noise_on_planes_is_as_stated(short):
 
 def test_the_same_seed_gives_the_same_survey_and_another_seed_does_not(short):
     "Every number of a survey follows from its seed"
-    again, other = make(SHORT), make(SHORT, seed=2)
+    again = make(SHORT)
+    other = make(SHORT, seed=2)
     np.testing.assert_array_equal(again.cloud.xyz, short.cloud.xyz)
     np.testing.assert_array_equal(again.cloud.intensity, short.cloud.intensity)
     np.testing.assert_array_equal(again.targets.position, short.targets.position)
@@ -185,7 +186,8 @@ def recorded(survey):
 @pytest.mark.parametrize(("effect", "changes"), EFFECTS, ids=[one["name"] for one, _ in EFFECTS])
 def test_an_effect_changes_what_its_stage_declares_and_nothing_else(short, effect, changes):
     "Every other recorded quantity stays bit for bit, and with magnitude zero all do"
-    plain, changed = recorded(short), recorded(make(with_effects(SHORT, effect)))
+    plain = recorded(short)
+    changed = recorded(make(with_effects(SHORT, effect)))
     nothing = np.zeros_like(effect["magnitude"]).tolist()
     zero = recorded(make(with_effects(SHORT, {**effect, "magnitude": nothing})))
     for name, value in plain.items():
@@ -336,7 +338,8 @@ def test_two_scanners_on_two_passes_are_four_files(pair, tmp_path):
     names = ["pass-1.laz", "pass-1-scanner-2.laz", "pass-2.laz", "pass-2-scanner-2.laz"]
     assert [file.path.name for file in survey.clouds] == names
     assert len(survey.trajectory.gaps) == 1
-    truth, first = np.load(tmp_path / "truth.npz"), 0
+    truth = np.load(tmp_path / "truth.npz")
+    first = 0
     mountings = json.loads((tmp_path / "truth.json").read_text())["mountings"]
     assert mountings["recorded"][1]["lever_arm"] == [0.0, -0.8, 0.6]
     for number, name in enumerate(names):
@@ -350,7 +353,8 @@ def test_two_scanners_on_two_passes_are_four_files(pair, tmp_path):
         xyz = to_scanner(pair.trajectory, mounting, las.xyz, time)
         error = georeference(pair.true_trajectory, mounting, xyz, time) - truth["point_xyz"][rows]
         assert np.sqrt((error**2).mean()) < 0.004  # m: range noise
-        count, numbers = np.array(las.number_of_returns), np.array(las.return_number)
+        count = np.array(las.number_of_returns)
+        numbers = np.array(las.return_number)
         assert (numbers <= count).all()
         assert (count.max() > 1) == (number % 2 == 0)  # the one with a footprint
     assert first == len(truth["point_xyz"]) == len(truth["point_target"])
@@ -522,8 +526,13 @@ def look_of(folder):
         ring = np.linalg.norm(cloud.xyz - centre, axis=1)
         board = cloud.intensity[(ring > 0.55 * size) & (ring < 0.65 * size)]
         spacing = np.sqrt(np.pi * (0.45 * size) ** 2 / len(near))
-        rows.append([spacing, 1.4826 * np.median(np.abs(residual)),
-                     np.median(near.intensity) / np.median(board)])  # fmt: skip
+        rows.append(
+            [
+                spacing,
+                1.4826 * np.median(np.abs(residual)),
+                np.median(near.intensity) / np.median(board),
+            ]
+        )
     return np.median(rows, axis=0)
 
 
@@ -555,7 +564,10 @@ def test_the_simulator_does_not_know_the_estimators_model():
     for room in (mlscorr.simulate, mlscorr.effects):
         for path in Path(room.__file__).parent.rglob("*.py"):
             for node in ast.walk(ast.parse(path.read_text())):
-                names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+                if isinstance(node, ast.Import):
+                    names = [a.name for a in node.names]
+                else:
+                    names = []
                 if isinstance(node, ast.ImportFrom):
                     names = [f"{node.module}.{a.name}" for a in node.names]
                 for name in names:

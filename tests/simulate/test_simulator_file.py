@@ -54,7 +54,8 @@ def test_what_is_written_is_read_to_the_last_bit(tmp_path):
             ),
             in_order(an_effect(kind, rng) for kind in EFFECTS),
         )
-        path, copy = tmp_path / f"{number}.toml", tmp_path / "copy.toml"
+        path = tmp_path / f"{number}.toml"
+        copy = tmp_path / "copy.toml"
         write_simulator(simulator, path)
         again = read_simulator(path)
         assert_same(again, simulator)
@@ -65,7 +66,8 @@ def test_what_is_written_is_read_to_the_last_bit(tmp_path):
 
 def test_a_boresight_of_any_digits_comes_back(tmp_path):
     "Rotations that no short angles give are read as the same to 1e-12 deg of each angle"
-    rng, path = np.random.default_rng(6), tmp_path / "simulator.toml"
+    rng = np.random.default_rng(6)
+    path = tmp_path / "simulator.toml"
     for boresight in Rotation.random(50, random_state=rng):
         write_simulator(Simulator(Mounting(np.zeros(3), boresight), Scanner(), Pos()), path)
         turn = read_simulator(path).mounting.boresight * boresight.inv()

@@ -17,7 +17,8 @@ class Heights(Columns):
 
 def test_records_are_told_apart_as_keys():
     "Two records with other values are two keys of a cache, and one is the same as itself"
-    low, high = Heights(np.zeros(3)), Heights(np.ones(3))
+    low = Heights(np.zeros(3))
+    high = Heights(np.ones(3))
     assert low != high
     assert {low: "low", high: "high"}[low] == "low"
     assert np.array_equal(high[1:].height, np.ones(2))

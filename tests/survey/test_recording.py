@@ -67,7 +67,8 @@ def test_rows_are_parted_by_scanner():
 
 def test_other_mountings_are_those_of_the_scanners_in_their_order():
     "One survey keeps its one, two scanners get one each; all else stays"
-    survey, arms = with_scanners(), [replace(MOUNTING, lever_arm=np.full(3, i)) for i in (2.0, 3.0)]
+    survey = with_scanners()
+    arms = [replace(MOUNTING, lever_arm=np.full(3, i)) for i in (2.0, 3.0)]
     changed = survey.with_mountings(arms)
     assert changed.mountings == tuple(arms) and changed.scanners[0].clouds == CLOUDS[1:]
     assert survey.mountings[1] is None

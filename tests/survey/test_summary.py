@@ -58,9 +58,15 @@ def test_a_sentence_covers_all_columns():
     assert "<td>a</td><td>1</td><td>None</td>" in shown
 
 
-@pytest.mark.parametrize(("noun", "several"), [
-    ("pass", "passes"), ("cloud file", "cloud files"), ("entry", "entries"), ("gap", "gaps"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("noun", "several"),
+    [
+        ("pass", "passes"),
+        ("cloud file", "cloud files"),
+        ("entry", "entries"),
+        ("gap", "gaps"),
+    ],
+)
 def test_one_thing_is_counted_in_the_singular(noun, several):
     "None and two are in the plural"
     assert [counted(n, noun) for n in range(3)] == [f"0 {several}", f"1 {noun}", f"2 {several}"]

@@ -42,6 +42,7 @@ def test_a_correction_of_either_view_closes_the_tie(wall):
     "n . (c1 - c2) = misclosure: moved by such corrections, both places agree along n"
     ties = Ties.between(wall, np.array([[0, 1]]), EAST[None], np.array([4e-6]))
     for share in (0.0, 0.4, 1.0):
-        first, second = share * 0.3 * EAST, (share - 1) * 0.3 * EAST
+        first = share * 0.3 * EAST
+        second = (share - 1) * 0.3 * EAST
         corrected = ties.place[0] + [first, second]
         assert abs((corrected[1] - corrected[0]) @ ties.direction[0]) < 1e-9

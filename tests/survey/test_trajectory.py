@@ -148,7 +148,8 @@ def test_sessions_part_a_trajectory_where_steps_do_not():
 
 def test_some_epochs_keep_all_that_is_known_of_them():
     "Position, attitude, sigmas and session of chosen epochs are theirs; what isn't known stays so"
-    gps_time, sigma = START + np.arange(6.0), np.linspace(0.01, 0.06, 18).reshape(6, 3)
+    gps_time = START + np.arange(6.0)
+    sigma = np.linspace(0.01, 0.06, 18).reshape(6, 3)
     whole = drive(gps_time, position_sigma=sigma, session=np.array([0, 0, 0, 1, 1, 1]))
     for rows in (slice(1, 4), np.array([0, 2, 5]), gps_time > START + 2.5):
         part = whole.select(rows)
@@ -200,7 +201,8 @@ def test_tiles_of_one_drive_are_one_pass():
     the trajectory and a pause of a minute each start another
     """
     rng = np.random.default_rng(3)
-    first, second = np.arange(0.0, 100.05, 0.1), np.arange(160.0, 400.05, 0.1)
+    first = np.arange(0.0, 100.05, 0.1)
+    second = np.arange(160.0, 400.05, 0.1)
     recorded = drive(START + np.concatenate([first, second]))
 
     def tile(begin, end):

@@ -9,7 +9,8 @@ from tests.targets.test_extract import ORIGIN
 def test_balls_hold_what_is_within_their_radius():
     "Each of three balls, at UTM coordinates, holds the points that distances say"
     rng = np.random.default_rng(2)
-    places, radius = ORIGIN + rng.uniform(0, 50, (3, 3)), np.array([2.0, 5.0, 9.0])
+    places = ORIGIN + rng.uniform(0, 50, (3, 3))
+    radius = np.array([2.0, 5.0, 9.0])
     xyz = ORIGIN + rng.uniform(0, 50, (5000, 3))
     apart = np.linalg.norm(xyz[:, None] - places, axis=2) <= radius
     balls = Neighbourhoods(places, radius)

@@ -15,7 +15,10 @@ def straight(sigma=None):
     "A drive of 100 s north from the origin at 10 m/s, with a gap from 50 to 60 s"
     elapsed = np.concatenate([np.arange(0, 50.01, 0.05), np.arange(60, 100.01, 0.05)])
     path = ORIGIN + np.outer(elapsed, [0.0, 10.0, 0.0])
-    sigmas = None if sigma is None else np.outer(sigma(elapsed), [1.0, 0.0, 0.0])
+    if sigma is None:
+        sigmas = None
+    else:
+        sigmas = np.outer(sigma(elapsed), [1.0, 0.0, 0.0])
     still = attitude_from_angles(0.0, 0.0, np.zeros(len(elapsed)))
     return Trajectory(START + elapsed, path, still, sigmas)
 
@@ -33,7 +36,9 @@ def test_search_radius_is_the_surveys_and_a_diagonal():
 
 def near(survey, read):
     "What collect hands on: Candidates, and points and pass numbers about each surveyed point"
-    handed_on, parts, since = {}, [], []
+    handed_on = {}
+    parts = []
+    since = []
 
     def fit(file, index, cloud):
         handed_on.setdefault(index, []).append((file, cloud))

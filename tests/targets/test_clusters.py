@@ -27,7 +27,8 @@ def test_what_else_a_piece_holds_changes_no_component():
     patch = np.column_stack([rng.uniform(-0.3, 0.3, (2000, 2)), np.zeros(2000)])
     wall = np.column_stack([rng.uniform(-4.0, 4.0, (20_000, 2)), np.zeros(20_000)])
     wall[:, 0] += 6.3
-    xyz, intensity = np.vstack([patch, wall]), rng.uniform(800.0, 1000.0, 22_000)
+    xyz = np.vstack([patch, wall])
+    intensity = rng.uniform(800.0, 1000.0, 22_000)
     intensity[2000:] *= 1.5
     alone, both = (
         {tuple(rows) for _, rows in bright_components(xyz[:n] + ORIGIN, intensity[:n], 0.6)}

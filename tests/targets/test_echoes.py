@@ -11,8 +11,12 @@ FACE = plane_through(np.array([0.0, 5.0, 0.0]), np.array([0.0, -1.0, 0.0]))  # 5
 
 def echoes(xyz, intensity=None, gps_time=None):
     "Points seen from the origin"
-    time = np.arange(len(xyz)) * 1e-5 if gps_time is None else gps_time
-    intensity = np.ones(len(xyz)) if intensity is None else intensity
+    if gps_time is None:
+        time = np.arange(len(xyz)) * 1e-5
+    else:
+        time = gps_time
+    if intensity is None:
+        intensity = np.ones(len(xyz))
     path = ScannerPath(time[[0, -1]], np.zeros((2, 3)))
     return Echoes(xyz, time, intensity, path, 0.03)
 

@@ -12,7 +12,10 @@ from mlscorr.targets import as_observations
 
 ORIGIN = np.array([532_000.0, 3_374_000.0, 42.0])  # m, UTM
 START = 357_700.0  # s of the GPS week
-SPEED, LINES, PULSES = 6.0, 150.0, 1500  # m/s, scan lines a second, pulses a turn
+# m/s, scan lines a second, pulses a turn
+SPEED = 6.0
+LINES = 150.0
+PULSES = 1500
 OBLIQUE = np.radians(35.0)  # of the scan plane to the vehicle's cross-section
 ACROSS = np.array([np.cos(OBLIQUE), np.sin(OBLIQUE), 0.0])
 ADVANCE = np.array([-np.sin(OBLIQUE), np.cos(OBLIQUE), 0.0])  # normal of the scan plane
@@ -63,7 +66,8 @@ class View:
 
 
 def control_point(position, kind, size=SIZE):
-    sigma, normal = np.full((1, 3), 0.003), np.full((1, 3), np.nan)
+    sigma = np.full((1, 3), 0.003)
+    normal = np.full((1, 3), np.nan)
     return ControlPoints(("T01",), position[None], sigma, (kind,), np.array([size]), normal)
 
 
@@ -122,11 +126,13 @@ def cast(patches, centre, passing, rng):
     towards = centre - HEIGHT * UP
     distance = np.linalg.norm(towards)
     near = np.abs(angle - np.arcsin(towards[2] / distance)) < np.arctan(WINDOW / distance)
-    k, angle = k[near], angle[near]
+    k = k[near]
+    angle = angle[near]
     position = np.outer(k / turn_rate - passing, [0.0, SPEED, 0.0]) + HEIGHT * UP
     beam = beams(angle)
     ranges = np.array([p.cast(position, beam) + 1e-6 * i for i, p in enumerate(patches)])
-    hit, distance = ranges.argmin(axis=0), ranges.min(axis=0)
+    hit = ranges.argmin(axis=0)
+    distance = ranges.min(axis=0)
     normal = np.array([np.cross(*patch.axes) for patch in patches])[hit]
     strength = np.array([patch.reflectance for patch in patches])[hit]
     strength *= np.abs(np.sum(normal * beam, axis=1)) / (1 + (distance / 10.0) ** 2)
@@ -262,7 +268,8 @@ def test_order_of_points_does_not_matter(what):
     "A cloud in any order gives the same target to 0.1 mm"
     seen = view(what, 1)
     shuffled = np.random.default_rng(5).permutation(len(seen.cloud))
-    found, again = find(seen), find(replace(seen, cloud=seen.cloud[shuffled]))
+    found = find(seen)
+    again = find(replace(seen, cloud=seen.cloud[shuffled]))
     assert len(again) == len(found) == 1
     assert np.abs(again.position - found.position).max() < 1e-4  # m
     assert again.gps_time == pytest.approx(found.gps_time, abs=1e-4)  # s
@@ -284,7 +291,8 @@ def test_order_of_surveyed_points_does_not_matter(what):
 @every_support
 def test_origin_does_not_matter(what):
     "A northing of 3.4e6 m gives the same target as one of 0 m, to 0.1 mm"
-    far, near = find(view(what, 2)), find(view(what, 2, origin=np.zeros(3)))
+    far = find(view(what, 2))
+    near = find(view(what, 2, origin=np.zeros(3)))
     assert np.abs(far.position - near.position - ORIGIN).max() < 1e-4  # m
 
 
@@ -294,7 +302,8 @@ def test_intensity_scale_does_not_matter(what, full_scale):
     "8 bits hold a target as well as 16 do: the centre moves by 5 mm at most"
     seen = view(what, 3)
     cloud = replace(seen.cloud, intensity=np.floor(seen.cloud.intensity / 65535 * full_scale))
-    found, again = find(seen), find(replace(seen, cloud=cloud))
+    found = find(seen)
+    again = find(replace(seen, cloud=cloud))
     assert len(again) == 1
     assert np.linalg.norm(again.position - found.position) < 0.005  # m
 
@@ -305,7 +314,8 @@ def test_two_passes_give_two_observations():
     lag = 2.5  # s, with a gap of the trajectory between
     trajectory = first.trajectory
     last = np.searchsorted(trajectory.gps_time, first.cloud.gps_time[-1] + 0.1)
-    time, path = trajectory.gps_time[:last], trajectory.position[:last]
+    time = trajectory.gps_time[:last]
+    path = trajectory.position[:last]
     angles = Rotation.concatenate([trajectory.attitude[:last], trajectory.attitude[:last]])
     gap = time[-1] - time[0] + lag
     twice = Trajectory(np.append(time, time + gap), np.vstack([path, path]), angles)

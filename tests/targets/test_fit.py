@@ -38,7 +38,9 @@ def views(look, count=VIEWS):
 @pytest.mark.parametrize("look", TARGETS)
 def test_every_kind_is_found_to_millimetres_and_nothing_else(look):
     "Among clutter, at 3 to 20 m: at most one is missed, median 3 mm, none false, sigmas honest"
-    kind, error, square = TARGETS[look][0], [], []
+    kind = TARGETS[look][0]
+    error = []
+    square = []
     for seen in views(look):
         found = fit(seen, kind)
         assert len(found) <= 1
@@ -60,7 +62,8 @@ def test_every_kind_is_found_to_millimetres_and_nothing_else(look):
 @pytest.mark.parametrize("look", ["disc", "hole", "board"])
 def test_a_target_that_is_known_is_not_fitted_again(look):
     "Where it was fitted well; a poor fit, or one a metre off, keeps nothing from being fitted"
-    kind, repeats = TARGETS[look][0], []
+    kind = TARGETS[look][0]
+    repeats = []
     for seen in views(look):
         rest = (seen.path, [(kind, SIZE)], SCANNER)
 
@@ -82,7 +85,8 @@ def test_a_line_of_points_does_not_hide_the_disc_it_lies_on():
     seen = view("disc", SIZE, np.random.default_rng([7, 4]), 60.0, 0.3, step=STEP)
     middle = seen.cloud.xyz.mean(axis=0)
     cloud = replace(seen.cloud, xyz=seen.cloud.xyz - middle)
-    path, thickness = seen.path.seen_from(middle), 4 * SCANNER.range_noise
+    path = seen.path.seen_from(middle)
+    thickness = 4 * SCANNER.range_noise
     echoes = Echoes(cloud.xyz, cloud.gps_time, cloud.intensity, path, thickness)
     whole = max(bright_seeds(echoes, "circle", SIZE), key=lambda seed: len(seed.rows))
     rows = np.sort(whole.rows)
@@ -90,7 +94,8 @@ def test_a_line_of_points_does_not_hide_the_disc_it_lies_on():
     line = max(np.split(rows, np.flatnonzero(pauses > 8 * np.median(pauses)) + 1), key=len)
     along = cloud.xyz[line[-1]] - cloud.xyz[line[0]]
     turn = Rotation.from_rotvec(np.radians(60.0) * along / np.linalg.norm(along))
-    axes, origin = turn.apply(whole.plane.axes), cloud.xyz[line].mean(axis=0)
+    axes = turn.apply(whole.plane.axes)
+    origin = cloud.xyz[line].mean(axis=0)
     plane = replace(whole.plane, origin=origin, axes=axes)
     seed = replace(whole, rows=line, plane=plane, middle=np.zeros(2))
     shaped = [(each, "circle", SIZE) for each in (seed, whole)]

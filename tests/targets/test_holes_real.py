@@ -82,7 +82,8 @@ def test_the_holes_form_one_square(holes):
 @pytest.mark.long
 def test_holes_do_not_depend_on_the_axes(frames, size, holes):
     "The first frame turned by 70 degrees and moved to UTM gives the same centres to 3 mm"
-    turn, origin = Rotation.from_euler("z", 70, degrees=True), np.array([523e3, 3378e3, 40.0])
+    turn = Rotation.from_euler("z", 70, degrees=True)
+    origin = np.array([523e3, 3378e3, 40.0])
     found = fit_holes(frames[0], size, turn, origin)
     back = turn.inv().apply([target.position - origin for target in found])
     for centre in holes[0]:

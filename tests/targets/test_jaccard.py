@@ -7,7 +7,10 @@ from hypothesis import strategies as st
 
 from mlscorr.targets._jaccard import jaccard_index
 
-LONGEST, RATIO, DIRECTIONS = 1.0, 1.6, 12  # m, of length to width, of the search
+# m, of length to width, of the search
+LONGEST = 1.0
+RATIO = 1.6
+DIRECTIONS = 12
 
 
 def places(n=4000):
@@ -19,7 +22,8 @@ def places(n=4000):
 def test_shapes_are_like_themselves_however_turned(turn):
     "The Jaccard index of a disc and a square is nearly 1; of an L it is less than 0.8"
     uv = places()
-    x, y = np.cos(turn) * uv[:, 0] + np.sin(turn) * uv[:, 1], uv @ [-np.sin(turn), np.cos(turn)]
+    x = np.cos(turn) * uv[:, 0] + np.sin(turn) * uv[:, 1]
+    y = uv @ [-np.sin(turn), np.cos(turn)]
     square = np.maximum(np.abs(x), np.abs(y)) < 0.5
     for bright in (np.hypot(x, y) < 0.5, square):
         assert jaccard_index(uv, bright, 1.0, 1.6, 12) > 0.88
@@ -44,8 +48,10 @@ def index(uv, bright, longest=LONGEST):
 def test_the_index_is_a_share(seed, size):
     "Between 0 and 1 for any bright points, and the same in any order"
     rng = np.random.default_rng(seed)
-    uv, bright = size * rng.normal(size=(60, 2)), rng.random(60) < 0.5
-    value, order = index(uv, bright), rng.permutation(60)
+    uv = size * rng.normal(size=(60, 2))
+    bright = rng.random(60) < 0.5
+    value = index(uv, bright)
+    order = rng.permutation(60)
     assert 0.0 <= value <= 1.0
     assert index(uv[order], bright[order]) == pytest.approx(value, abs=1e-12)
 
@@ -75,7 +81,8 @@ def test_bright_points_far_off_count_against_it():
 def test_two_quadrants_are_a_checkerboard(turn):
     "Though the smallest rectangle about two white quadrants lies along their diagonal"
     uv = places()
-    x, y = np.cos(turn) * uv[:, 0] + np.sin(turn) * uv[:, 1], uv @ [-np.sin(turn), np.cos(turn)]
+    x = np.cos(turn) * uv[:, 0] + np.sin(turn) * uv[:, 1]
+    y = uv @ [-np.sin(turn), np.cos(turn)]
     inside = np.maximum(np.abs(x), np.abs(y)) < 0.5
     for quadrants in (x * y > 0, x * y < 0):
         assert index(uv, inside & quadrants) > 0.85
@@ -93,7 +100,8 @@ def test_strips_along_any_diagonal_are_no_checkerboard(ratio):
     "A full rectangle longer than the limit is like nothing, however it is turned"
     uv = places(8000)
     for turn in (0.0, 0.4, np.pi / 4):
-        x, y = np.cos(turn) * uv[:, 0] + np.sin(turn) * uv[:, 1], uv @ [-np.sin(turn), np.cos(turn)]
+        x = np.cos(turn) * uv[:, 0] + np.sin(turn) * uv[:, 1]
+        y = uv @ [-np.sin(turn), np.cos(turn)]
         assert index(uv, (np.abs(x) < 0.8) & (np.abs(y) < 0.8 / ratio)) == 0.0
 
 

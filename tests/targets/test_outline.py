@@ -15,7 +15,8 @@ UNKNOWN = Size(0.65, np.inf, 0.4, 0.8)
 def beams(kind, seed, half=False, inner=0.0):
     "Scan lines 3 cm apart, their states, and the truth; four times as dense on one side"
     rng = np.random.default_rng(seed)
-    centre, turn = rng.uniform(-0.05, 0.05, 2), rng.uniform(0, np.pi)
+    centre = rng.uniform(-0.05, 0.05, 2)
+    turn = rng.uniform(0, np.pi)
     lines = np.arange(-0.6, 0.6, 0.03) + rng.uniform(0, 0.03)
     along = np.arange(-0.6, 0.6, 0.008)
     points = np.concatenate(
@@ -40,7 +41,8 @@ def beams(kind, seed, half=False, inner=0.0):
 @pytest.mark.parametrize("kind", ["circle", "square", "hole", "checkerboard", "board"])
 def test_outline_is_unbiased_by_density_and_its_covariance_honest(kind, half):
     "Errors are as large as stated, whatever the density and also where a side is unseen"
-    squares, errors = [], []
+    squares = []
+    errors = []
     for seed in range(10):
         points, state, truth = beams(kind, seed, half)
         start = truth[:2] + np.array([0.05, -0.02])  # m, as a seed's middle errs

@@ -111,9 +111,9 @@ def test_two_visits_are_two_pieces(cloud, survey):
 def test_a_stop_before_a_target_is_cut_in_its_middle(cloud, survey):
     "Of more points than a piece may have the middle ones stay, with their path"
     rows = np.abs(cloud.xyz[:, 1] - ORIGIN[1] - 14.0) < 0.7
-    dense = PointCloud.concatenate([
-        replace(cloud[rows], gps_time=cloud.gps_time[rows] + 0.01 * k) for k in range(12)
-    ])  # fmt: skip
+    dense = PointCloud.concatenate(
+        [replace(cloud[rows], gps_time=cloud.gps_time[rows] + 0.01 * k) for k in range(12)]
+    )
     (piece, path, _), *_ = pieces(dense, survey)
     assert len(piece) <= SETTINGS.piece_points
     place = survey.trajectory.at(piece.gps_time).position

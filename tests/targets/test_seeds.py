@@ -125,7 +125,8 @@ def test_flat_patches_are_the_planes_of_a_piece():
         [rng.uniform(4.0, 5.5, 1500), rng.normal(1.0, 0.002, 1500), rng.uniform(-1, 1, 1500)]
     )
     xyz = np.vstack([first, second])
-    one, seen = np.ones(len(xyz)), wall(disc, rng)
+    one = np.ones(len(xyz))
+    seen = wall(disc, rng)
     echoes = replace(seen, xyz=xyz, gps_time=one.cumsum(), intensity=one)
     patches = list(flat_patches(echoes, SIZE, RNG(1)))
     assert len(patches) == 2
@@ -135,10 +136,17 @@ def test_flat_patches_are_the_planes_of_a_piece():
     assert (others >= 3000).mean() > 0.97
 
 
-@pytest.mark.parametrize("extent, fits", [
-    ((0.6, 0.6), True), ((0.6, 0.25), True), ((0.6, 0.15), False), ((0.38, 0.38), False),
-    ((0.75, 0.6), True), ((0.85, 0.85), False),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "extent, fits",
+    [
+        ((0.6, 0.6), True),
+        ((0.6, 0.25), True),
+        ((0.6, 0.15), False),
+        ((0.38, 0.38), False),
+        ((0.75, 0.6), True),
+        ((0.85, 0.85), False),
+    ],
+)
 def test_extents_tell_what_a_disc_may_be(extent, fits):
     "Half hidden, or seen a little too large; not a stripe, and not half its size"
     points = RNG(6).uniform(0, 1, (4000, 2)) * extent

@@ -31,7 +31,8 @@ def best_rough(echoes, kind, size=SIZE):
 @pytest.mark.parametrize("look", ["disc", "ring", "plate", "checkerboard", "hole", "board"])
 def test_rough_is_near_and_exact_is_nearer(look):
     "In the median over three views within 3 cm, and then within 8 mm, of the true centre"
-    rough, exact = [], []
+    rough = []
+    exact = []
     for seen in views(look):
         echoes = echoes_of(seen)
         fit = best_rough(echoes, KINDS[look])

@@ -18,7 +18,8 @@ from mlscorr.targets.shapes import (
 def test_the_likelihood_from_a_table_is_that_of_the_normal_distribution():
     "Of 300 beams about a disc, told to 5e-6 each; a beam along the plane makes it no number"
     rng = np.random.default_rng(3)
-    points, side = rng.uniform(-0.5, 0.5, (300, 2)), rng.choice([-1, 1], 300).astype(np.int8)
+    points = rng.uniform(-0.5, 0.5, (300, 2))
+    side = rng.choice([-1, 1], 300).astype(np.int8)
     trials = np.array([[0.0, 0.0, 0.0, 0.6, 0.0], [0.05, 0.1, 0.0, 0.5, 0.0]])
     inside = trials[:, 3:4] / 2 - np.linalg.norm(points - trials[:, None, :2], axis=2)
     exact = np.log(0.01 + 0.98 * ndtr(inside * side / 0.05)).sum(axis=1)

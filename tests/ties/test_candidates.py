@@ -31,9 +31,11 @@ def crowd(rng, number):
 
 def all_pairs(features, place, sigma, radius, shift):
     "Pairs (k, 2) within the gates, of all that two visits make, by their definition"
-    visit, kind = visit_number(features), features.kind
+    visit = visit_number(features)
+    kind = features.kind
     first, second = np.nonzero(visit[:, None] < visit)
-    before, after = features.direction[first], features.direction[second]
+    before = features.direction[first]
+    after = features.direction[second]
     cosine = np.einsum("ni,ni->n", before, after)
     sign = np.where((cosine < 0) & np.isin(kind[first], ("line", "dash")), -1.0, 1.0)
     axis = before + sign[:, None] * after
@@ -43,7 +45,8 @@ def all_pairs(features, place, sigma, radius, shift):
     across = np.linalg.norm(apart - np.einsum("ni,ni->n", apart, axis)[:, None] * axis, axis=1)
     misfit, beside = np.where(kind[first] == "pole", [across, along], [along, across])
     noise = features.variance[first] + features.variance[second]
-    known, own = np.hypot(sigma[first], sigma[second]), noise + 2 * SETTINGS.surface_sigma**2
+    known = np.hypot(sigma[first], sigma[second])
+    own = noise + 2 * SETTINGS.surface_sigma**2
     gate = np.minimum(radius, 3 * np.sqrt(known**2 + own))
     of_pole = np.hypot(np.minimum(radius, 3 * known), 3 * np.sqrt(own))
     gate = np.where(kind[first] == "pole", of_pole, gate)
@@ -62,7 +65,8 @@ def all_pairs(features, place, sigma, radius, shift):
 def test_all_pairs_within_the_gates_are_candidates(sigma, radius, way):
     "Where fewer are near than are weighed, they are all pairs within the gates, displaced or not"
     rng = np.random.default_rng(1)
-    features, sigmas = crowd(rng, 600), rng.uniform(0.5, 1, 600) * sigma
+    features = crowd(rng, 600)
+    sigmas = rng.uniform(0.5, 1, 600) * sigma
     correction = rng.normal(scale=0.2, size=(600, 3))
     shift = way * features.direction
     displaced = {"shift": shift} if way else {}

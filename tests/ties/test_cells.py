@@ -19,7 +19,8 @@ def scattered(n, seed=1):
 
 def table_of(cloud):
     "A CellTable with a cloud, and the first times of both passes"
-    table, starts = CellTable(ORIGIN, START, 1.0, 1.0), np.full(2, np.inf)
+    table = CellTable(ORIGIN, START, 1.0, 1.0)
+    starts = np.full(2, np.inf)
     table.add(cloud, PASSES, 4, starts)
     return table, starts
 

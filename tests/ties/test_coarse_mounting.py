@@ -25,7 +25,8 @@ def wrong(degrees):
 def scanned_wrong(degrees, survey=None, clouds=None):
     "Features of a street whose every point a wrong mounting put where it is"
     survey = street.survey() if survey is None else survey
-    parts, way = [], survey.trajectory
+    parts = []
+    way = survey.trajectory
     for cloud in street.clouds() if clouds is None else clouds:
         seen = to_scanner(way, TRUE, cloud.xyz, cloud.gps_time)
         put = georeference(way, wrong(degrees), seen, cloud.gps_time)
@@ -44,7 +45,8 @@ def test_a_wall_that_is_passed_keeps_its_direction():
 
 def test_paint_turns_with_the_mounting():
     "A scanner that rolls 4 deg too far paints lines and dashes aside; corrected, they lie true"
-    survey, rng = road.survey(), np.random.default_rng(1)
+    survey = road.survey()
+    rng = np.random.default_rng(1)
     clouds = [road.cloud(number, rng) for number in (0, 1)]
     features = scanned_wrong([1.0, 4.0, 2.0], survey, clouds)
     corrected = remounted(features, survey.trajectory, [wrong([1.0, 4.0, 2.0])], [TRUE])
@@ -94,7 +96,9 @@ def test_some_blocks_are_the_same_in_both_passes():
 
 def test_a_scanner_that_passed_once_is_found_by_what_another_saw():
     "One pass of each, the second wrong by 3 deg: about forward to 0.02 deg, about right to 0.1"
-    lacks, way, parts = [0.0, -3.0, 2.0], street.trajectory(), []
+    lacks = [0.0, -3.0, 2.0]
+    way = street.trajectory()
+    parts = []
     first = Mounting(TRUE.lever_arm, TRUE.boresight, np.diag(np.repeat([1e-3, 1e-4], 3) ** 2))
     for cloud, mounting in zip(street.clouds(), (TRUE, wrong(lacks)), strict=True):
         seen = to_scanner(way, TRUE, cloud.xyz, cloud.gps_time)

@@ -24,7 +24,8 @@ def assert_same(first, second, shift=0.0):
 @pytest.mark.parametrize("held_cells", [10**9, 100])
 def test_chunks_are_as_good_as_the_whole(held_cells):
     "Cells that straddle chunks are merged, also when those that have passed are closed early"
-    survey, parts = street.survey(), street.clouds()
+    survey = street.survey()
+    parts = street.clouds()
     collector = TieCollector(survey, held_cells)
     for file, cloud in zip(survey.clouds, parts, strict=True):
         for first in range(0, len(cloud), 7_001):
@@ -67,7 +68,8 @@ def test_passes_count_in_time_whatever_the_order_of_the_files():
 
 def test_clouds_without_features_have_none():
     "No points, points in the air and a hundred times the same point: no feature, no warning"
-    survey, rng = street.survey(), np.random.default_rng(1)
+    survey = street.survey()
+    rng = np.random.default_rng(1)
     collector = TieCollector(survey)
     assert len(collector.features()) == 0
     scattered = rng.normal(0, 30, (5_000, 3))
@@ -89,7 +91,9 @@ def test_a_wall_knows_when_each_end_was_seen():
 
 def test_each_file_is_seen_from_its_own_scanner():
     "Two scanners with lever arms and noises of their own: what each finds alone, in one survey"
-    survey, parts, straight = street.survey(), street.clouds(), Rotation.identity()
+    survey = street.survey()
+    parts = street.clouds()
+    straight = Rotation.identity()
     mounted = [
         MountedScanner(
             str(x),
@@ -103,7 +107,8 @@ def test_each_file_is_seen_from_its_own_scanner():
     for number, scanner in enumerate(mounted):
         alone = replace(survey, mounting=scanner.mounting, scanner=scanner.scanner)
         other = street.collect(alone, parts)
-        inside, same = features.scanner == number, other.pass_number == number + 1
+        inside = features.scanner == number
+        same = other.pass_number == number + 1
         np.testing.assert_array_equal(features.centre[inside], other.centre[same])
         np.testing.assert_array_equal(features.variance[inside], other.variance[same])
     from_one = street.collect(replace(survey, mounting=mounted[0].mounting), parts)

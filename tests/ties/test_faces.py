@@ -7,9 +7,13 @@ from mlscorr.survey import PointCloud
 from mlscorr.ties._cells import CellTable
 from mlscorr.ties._faces import join_across_faces
 
-ORIGIN, START = np.array([447_000.0, 5_410_000.0, 120.0]), 413_200.0  # m, s
+# m, s
+ORIGIN = np.array([447_000.0, 5_410_000.0, 120.0])
+START = 413_200.0
 PASSES = np.array([[START, START + 10.0]])
-NOISE, POINTS = 0.02, 3000  # m
+# m
+NOISE = 0.02
+POINTS = 3000
 
 
 def joined(axis, side=0.0):

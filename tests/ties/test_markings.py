@@ -37,12 +37,15 @@ def test_lines_are_where_they_were_painted(azimuth):
 
 def test_dashes_are_known_along_the_way():
     "Of each pass all dashes but those at its ends, midway between their ends within stated sigmas"
-    errors, sigmas = [], []
+    errors = []
+    sigmas = []
     for seed in range(1, 5):
         dashes = of_kind(road.features(seed=seed), "dash")
         x, y = road.along_and_left(dashes.centre).T
         whole = (x > road.DASH) & (x < road.LENGTH - road.DASH)  # of others a pass may see a part
-        dashes, x, y = dashes[whole], x[whole], y[whole]
+        dashes = dashes[whole]
+        x = x[whole]
+        y = y[whole]
         number = np.floor(x / (road.DASH + road.GAP))
         for one_pass in (1, 2):
             seen = number[dashes.pass_number == one_pass]
@@ -51,7 +54,8 @@ def test_dashes_are_known_along_the_way():
         errors.append(x - number * (road.DASH + road.GAP) - road.DASH / 2)
         sigmas.append(np.sqrt(dashes.variance))
         assert np.allclose(np.sqrt(12) * dashes.extent, road.DASH, atol=0.15)  # m
-    error, sigma = np.concatenate(errors), np.concatenate(sigmas)
+    error = np.concatenate(errors)
+    sigma = np.concatenate(sigmas)
     assert np.median(sigma) < 0.025  # m
     assert np.mean(np.abs(error) < 2 * sigma) > 0.9
     assert np.sqrt(np.mean(error**2)) < 0.025  # m
@@ -68,7 +72,8 @@ def test_a_vehicle_that_stands_sees_no_line():
 
 def test_chunks_and_their_order_do_not_matter():
     "Paint of chunks in any order is that of the whole, but for what borders of chunks cut"
-    survey, rng = road.survey(), np.random.default_rng(1)
+    survey = road.survey()
+    rng = np.random.default_rng(1)
     parts = [road.cloud(number, rng) for number in (0, 1)]
     pieces = [
         (file, part[first : first + 50_000])

@@ -15,7 +15,8 @@ NOTHING = np.zeros(3)
 
 def walls(place, number, normal=(1.0, 0.0, 0.0), time=None):
     "A plane at each place (n, 3), of the passes (n,)"
-    place, number = street.ORIGIN + np.array(place, float), np.array(number)
+    place = street.ORIGIN + np.array(place, float)
+    number = np.array(number)
     n = len(place)
     return TieFeatures(
         pass_number=number,
@@ -103,7 +104,8 @@ def test_a_repeated_facade_is_not_paired_with_the_next_window():
 def test_a_street_that_changed_at_random_has_no_ties():
     "Features of the second pass at random places: those that pair do so elsewhere too"
     features = street.features()
-    rng, late = np.random.default_rng(1), features.pass_number == 2
+    rng = np.random.default_rng(1)
+    late = features.pass_number == 2
     low, high = (edge(features.centre, axis=0) for edge in (np.min, np.max))
     centre = np.where(late[:, None], rng.uniform(low, high, features.centre.shape), features.centre)
     assert len(pair(features, 0.4)) > 300
@@ -113,7 +115,8 @@ def test_a_street_that_changed_at_random_has_no_ties():
 def test_chance_in_one_direction_takes_nothing_from_another():
     "Houses rebuilt beside the same road: its ties stay, in full, and hardly another one"
     features = street.features()
-    rng, is_road = np.random.default_rng(1), features.direction[:, 2] > 0.9
+    rng = np.random.default_rng(1)
+    is_road = features.direction[:, 2] > 0.9
     gone = (features.pass_number == 2) & ~is_road
     low, high = (edge(features.centre, axis=0) for edge in (np.min, np.max))
     centre = np.where(gone[:, None], rng.uniform(low, high, features.centre.shape), features.centre)
@@ -240,7 +243,9 @@ def test_poles_hold_along_walls_and_across_them(azimuth):
 @pytest.mark.parametrize("azimuth", [0.0, 45.0, 70.0, 135.0])
 def test_paint_is_paired_whichever_way_it_was_crossed(azimuth):
     "Passes 15 cm apart across, 20 along: lines tell the one, dashes the other, to their sigmas"
-    along, left = (0.20, 0.15)  # m
+    # m
+    along = 0.20
+    left = 0.15
     shift = road.turned(np.array([[along, left, 0.0]]), azimuth)[0] - road.ORIGIN
     ties = pair(road.features(azimuth, shift=shift), 0.08)
     for kind, least in (("line", 40), ("dash", 4)):
@@ -281,6 +286,8 @@ def test_lanes_that_drift_could_exchange_are_not_paired(sigma, number):
 def test_dashes_of_other_lengths_are_not_paired():
     "A dash of which a parked car hid a metre is no pair of the whole; one as long is"
     place = [[0, 0, 0], [0.1, 0.0, 0.0]]
-    whole, part = 3.0 / np.sqrt(12), 2.0 / np.sqrt(12)  # m
+    # m
+    whole = 3.0 / np.sqrt(12)
+    part = 2.0 / np.sqrt(12)
     assert len(pair(painted(place, [1, 2], "dash", np.array([whole, part])), 0.1)) == 0
     assert len(pair(painted(place, [1, 2], "dash", whole), 0.1)) == 1

@@ -41,7 +41,8 @@ def test_sigma_grows_with_the_distance():
 
 def test_a_scanner_that_spins_is_tied_to_itself():
     "Each wall seen again 1.5 s later: ties of one visit; not where it does so for a moment alone"
-    survey, once = street.survey(1), street.features(1, 1)
+    survey = street.survey(1)
+    once = street.features(1, 1)
     once = once[once.gps_time < survey.trajectory.gps_time[-1] - 1.6]
     assert least_pause(survey, once) == SETTINGS.pause
     later = replace(once, gps_time=once.gps_time + 1.5)
@@ -59,7 +60,8 @@ def test_a_scanner_that_spins_is_tied_to_itself():
 
 def slowed(times):
     "A survey of one pass that takes so many times as long, and what it saw once"
-    survey, once = street.survey(1), street.features(1, 1)
+    survey = street.survey(1)
+    once = street.features(1, 1)
     drive, seen = (
         replace(part, gps_time=street.START + times * (part.gps_time - street.START))
         for part in (survey.trajectory, once)

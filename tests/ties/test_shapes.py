@@ -36,10 +36,11 @@ def test_planes_are_as_good_as_they_say():
     "Over seeds, road, facades and cross walls lie off by their sigma, within a factor of 1.5"
     error, sigma = (
         np.concatenate(column)
-        for column in zip(*(
-            errors_of_planes(f[f.kind == "plane"]) for f in map(street.features, range(1, 5))
-        ), strict=True)
-    )  # fmt: skip
+        for column in zip(
+            *(errors_of_planes(f[f.kind == "plane"]) for f in map(street.features, range(1, 5))),
+            strict=True,
+        )
+    )
     assert len(error) > 2000
     assert np.isfinite(error).all()
     assert 1 / 1.5 < np.sqrt(np.mean((error / sigma) ** 2)) < 1.5
@@ -51,7 +52,8 @@ def test_roughness_that_neighbours_share_is_stated():
     ratios = []
     for seed in range(6):
         rng = np.random.default_rng(seed)
-        x, y = rng.uniform(2, 30, 60_000), rng.uniform(2, 7, 60_000)
+        x = rng.uniform(2, 30, 60_000)
+        y = rng.uniform(2, 7, 60_000)
         phases = rng.uniform(0, 2 * np.pi, (40, 1))
         waves = 2 * np.pi / 10 ** rng.uniform(-1, 0.3, (40, 1))
         turn = rng.uniform(0, 2 * np.pi, (40, 1))
@@ -89,7 +91,8 @@ def test_normals_face_the_scanner():
 def test_a_column_is_no_better_than_its_curvature(density):
     "The face of a column of 0.9 m is stated to 2 to 5 cm, however many points it has"
     rng = np.random.default_rng(7)
-    angle, up = rng.uniform(-np.pi, 0, 2_000 * density), rng.uniform(0, 5, 2_000 * density)
+    angle = rng.uniform(-np.pi, 0, 2_000 * density)
+    up = rng.uniform(0, 5, 2_000 * density)
     ring = np.column_stack([10.6 + 0.45 * np.cos(angle), 5.5 + 0.45 * np.sin(angle), up])
     features = collected(ring)
     assert len(features) > 0
@@ -104,7 +107,8 @@ def test_what_is_no_plane_or_pole_is_refused(shape):
     foot = np.array([10.6, 5.5, 0.0])
     ball = rng.normal(size=(n, 3))
     ball /= np.linalg.norm(ball, axis=1, keepdims=True)
-    angle, up = rng.uniform(-np.pi, 0, n), rng.uniform(0, 1, n)
+    angle = rng.uniform(-np.pi, 0, n)
+    up = rng.uniform(0, 1, n)
     ring = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(n)])
     points = {
         "bush": foot + [0, 0, 1] + ball * rng.uniform(0, 0.8, (n, 1)),
@@ -119,8 +123,10 @@ def test_one_scan_line_is_no_post(sides):
     """What one scan line meets, as the edge of a house, has no width: where it stands is open by
     the step between lines. Three lines 5 cm apart tell a post to 1.5 cm
     """
-    rng, n = np.random.default_rng(2), 300
-    side, height = np.repeat(sides, n), np.tile(np.linspace(0.2, 5.8, n), len(sides))
+    rng = np.random.default_rng(2)
+    n = 300
+    side = np.repeat(sides, n)
+    height = np.tile(np.linspace(0.2, 5.8, n), len(sides))
     line = np.repeat(np.arange(len(sides)), n)
     depth = np.sqrt(street.RADIUS**2 - side**2) + rng.normal(0, street.NOISE, len(side))
     places = np.column_stack([10.2 + side, 5.95 - depth, height])
@@ -139,7 +145,8 @@ def test_the_face_of_a_square_mast_is_a_post_and_a_cut_wall_is_none():
     """A mast 14 cm wide is found where it is from both sides, to 2 cm across the way; what a cell
     and the second leave of a wall is no post in any of twenty streets
     """
-    rng, n = np.random.default_rng(4), 1_500
+    rng = np.random.default_rng(4)
+    n = 1_500
     for number in (0, 1):
         side = rng.uniform(-0.07, 0.07, n)
         places = np.column_stack([10.2 + side, np.full(n, 5.5), rng.uniform(0.3, 5.0, n)])
@@ -156,7 +163,8 @@ def test_the_face_of_a_square_mast_is_a_post_and_a_cut_wall_is_none():
 
 def square_mast(foot, turn, rng, width=0.14, points=1_500):
     "Points on the sides of a square mast, turned by an angle (rad), that face the way south of it"
-    c, s = np.cos(turn), np.sin(turn)
+    c = np.cos(turn)
+    s = np.sin(turn)
     x = rng.uniform(-1, 1, points) * width * (c + s) / 2
     to_corner = x - width * (s - c) / 2
     y = -width * (c + s) / 2 + np.where(
@@ -171,7 +179,9 @@ def test_a_square_mast_is_a_post_however_it_stands(turn):
     """Turned and wherever borders of cells cut it, a mast of 14 cm is found where it is, to 1 cm
     across the way and to 4 cm in depth
     """
-    rng, edge = np.random.default_rng(5), 10.7  # m, a border of cells along the way
+    # m, a border of cells along the way
+    rng = np.random.default_rng(5)
+    edge = 10.7
     for foot in ([10.2, 5.5], [edge, 5.5], [edge + 0.03, 5.5], [10.3, 5.4], [10.3, 5.36]):
         features = collected(square_mast(foot, np.radians(turn), rng), rng=rng)
         assert set(features.kind) == {"pole"} and len(features) >= 2

@@ -74,7 +74,8 @@ def test_opposite_directions_have_opposite_classes():
 
 def test_a_second_has_no_more_ties_with_ten_later_passes_than_with_two():
     "As many of each direction, with every pass about as many, whatever the order of the ties"
-    rng, per_pass = np.random.default_rng(3), 200
+    rng = np.random.default_rng(3)
+    per_pass = 200
     features = crowd()[:per_pass]
     for passes in (2, 10):
         again = [

@@ -46,7 +46,8 @@ def mirror_wobble(seen, size, rng):
 
     Source: estimate; polygons of line scanners are ground to some seconds of arc to 0.01 deg.
     """
-    often, phase = rng.integers(2, 5), rng.uniform(0.0, 2 * np.pi)
+    often = rng.integers(2, 5)
+    phase = rng.uniform(0.0, 2 * np.pi)
     wave = np.sin(often * _angle(seen) + phase) * np.linalg.norm(seen.scanner_xyz, axis=1)
     axis = seen.trajectory.at(seen.gps_time).attitude.apply(seen.mounting.boresight.apply(UP))
     return np.radians(size) * wave[:, None] * axis
@@ -57,7 +58,8 @@ def cyclic_range(seen, size, rng):
 
     Source: Rueeger 1990, Electronic Distance Measurement: some mm, by half the wavelength.
     """
-    period, phase = rng.uniform(3.0, 12.0), rng.uniform(0.0, 2 * np.pi)
+    period = rng.uniform(3.0, 12.0)
+    phase = rng.uniform(0.0, 2 * np.pi)
     away = np.linalg.norm(seen.scanner_xyz, axis=1)
     return size * np.sin(2 * np.pi * away / period + phase)[:, None] * _beam(seen)
 
@@ -177,13 +179,15 @@ def _angle(seen):
 
 def _motion(seen):
     """Speed (n,) in m/s, turn (n, 3) about map axes in rad/s, acceleration (n,) in m/s^2."""
-    trajectory, parts = seen.trajectory, []
+    trajectory = seen.trajectory
+    parts = []
     starts = np.append(trajectory.gps_time[0], trajectory.gaps[:, 1])
     ends = np.append(trajectory.gaps[:, 0], trajectory.gps_time[-1])
     for start, end in zip(starts, ends, strict=True):
         time = np.linspace(start, end, max(4, int((end - start) / 0.1)))
         inside = (trajectory.gps_time >= start) & (trajectory.gps_time <= end)
-        known, position = trajectory.gps_time[inside], trajectory.position[inside]
+        known = trajectory.gps_time[inside]
+        position = trajectory.position[inside]
         early, late = (np.clip(time + step, start, end) for step in (-MOMENT, MOMENT))
         place = [_at(known, position, t) for t in (early, late)]
         turned = Slerp(known, trajectory.attitude[inside])

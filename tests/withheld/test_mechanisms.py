@@ -16,8 +16,12 @@ FILE = Path(__file__).with_name("mechanisms.py")
 MECHANISMS, UNITS, LEADS = (
     {name: parts[number] for name, parts in load_mechanisms(FILE).items()} for number in range(3)
 )
-START, PLACE = 413200.0, np.array([523000.0, 3378000.0, 20.0])
-SPEED, TURNING, SLOWING = 8.0, np.radians(10.0), 1.0  # m/s, rad/s to the left, m/s^2
+START = 413200.0
+PLACE = np.array([523000.0, 3378000.0, 20.0])
+# m/s, rad/s to the left, m/s^2
+SPEED = 8.0
+TURNING = np.radians(10.0)
+SLOWING = 1.0
 MOUNTING = Mounting(
     np.array([0.1, -0.6, 0.4]), Rotation.from_euler("ZX", [35.0, 90.0], degrees=True)
 )
@@ -26,13 +30,15 @@ MOUNTING = Mounting(
 def seen(heading, along, duration=20.0, n=400):
     "Points around a vehicle with a heading (rad) and a way (m) that are functions of time"
     t = np.arange(0.0, duration, 0.01)
-    h, s = heading(t), along(t)
+    h = heading(t)
+    s = along(t)
     step = np.diff(s, prepend=s[0])[:, None] * np.column_stack([np.sin(h), np.cos(h), 0.0 * h])
     attitude = attitude_from_angles(np.zeros_like(t), np.zeros_like(t), h)
     trajectory = Trajectory(START + t, PLACE + np.cumsum(step, axis=0), attitude)
     rng = np.random.default_rng(1)
     time = START + rng.uniform(1.0, duration - 1.0, n)
-    angle, away = rng.uniform(-np.pi, np.pi, n), rng.uniform(3.0, 30.0, n)
+    angle = rng.uniform(-np.pi, np.pi, n)
+    away = rng.uniform(3.0, 30.0, n)
     level = np.column_stack([away * np.cos(angle), away * np.sin(angle), 0.0 * away])
     pose = trajectory.at(time)
     body = MOUNTING.boresight.apply(level) + MOUNTING.lever_arm
@@ -168,7 +174,8 @@ def test_a_tilted_window_lengthens_the_way_to_one_side():
 def test_is_linear_in_its_size_and_the_same_each_time(name):
     "Twice the size moves twice as far, with the same draws, and nothing moves at zero"
     points = turning()
-    once, twice = moved(name, points, 0.01), moved(name, points, 0.02)
+    once = moved(name, points, 0.01)
+    twice = moved(name, points, 0.02)
     np.testing.assert_allclose(twice, 2 * once, atol=1e-12)
     assert not moved(name, points, 0.0).any()
     assert np.isfinite(once).all()

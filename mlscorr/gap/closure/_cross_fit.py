@@ -38,16 +38,21 @@ class CrossFit:
         sizes = []
         for number in range(self.number + 1):
             keep = (self.fold != number) | (self.number == 1)  # nothing is held out then
-            columns, free = self.columns[keep], SETTINGS.free_sigma
+            columns = self.columns[keep]
+            free = SETTINGS.free_sigma
             normal = columns.T @ columns + np.eye(columns.shape[1]) / free**2
             sizes.append(np.linalg.solve(normal, columns.T @ innovations[keep]))
         return np.array(sizes)
 
 
 def cross_fitted(
-    observations: Observations, model: ErrorModel, fold: np.ndarray, number: int,
-    columns: np.ndarray, residual: np.ndarray,
-) -> np.ndarray:  # fmt: skip
+    observations: Observations,
+    model: ErrorModel,
+    fold: np.ndarray,
+    number: int,
+    columns: np.ndarray,
+    residual: np.ndarray,
+) -> np.ndarray:
     """Sizes (f + 1, p) of columns by all folds but each, and last by all.
 
     Parameters

@@ -37,7 +37,8 @@ class OverSigma:
     @property
     def beyond(self) -> tuple[str, ...]:
         """Axes whose errors after it are larger than chance makes them, and than 1.96 sigma."""
-        pairs, usual = zip(self.axes, self.after, self.largest, strict=True), SETTINGS.quantile
+        pairs = zip(self.axes, self.after, self.largest, strict=True)
+        usual = SETTINGS.quantile
         return tuple(axis for axis, after, chance in pairs if after > max(chance, usual))
 
 
@@ -57,7 +58,8 @@ def errors_over_sigma(
     rng : numpy.random.Generator
         Draws replicas.
     """
-    o, after = observations, folds.whole
+    o = observations
+    after = folds.whole
     residual = rows.residual[:, None]
     shift = folds.held("shift")[:, None]
     nothing = Predicted.nothing(rows)

@@ -11,9 +11,14 @@ from mlscorr.targets import SETTINGS as TARGETS
 
 
 def refit_targets(
-    residual: np.ndarray, rows: Rows, survey: Survey, beams: Beams, views: np.ndarray,
-    simulated: tuple, rng: np.random.Generator,
-) -> None:  # fmt: skip
+    residual: np.ndarray,
+    rows: Rows,
+    survey: Survey,
+    beams: Beams,
+    views: np.ndarray,
+    simulated: tuple,
+    rng: np.random.Generator,
+) -> None:
     """Fill the residuals of target rows: where the extraction finds the simulated targets.
 
     Parameters
@@ -32,14 +37,18 @@ def refit_targets(
         Of the extraction.
     """
     xyz, kept, met, (start, direction), boards = simulated
-    seed, fitted = rng.integers(2**63), {}
+    seed = rng.integers(2**63)
+    fitted = {}
     for row in np.flatnonzero((rows.channel == "target") & (views[:, 0] >= 0)):
         view = views[row, 0]
         if view not in fitted:
             first, last = np.searchsorted(beams.view, [view, view + 1])
             points = first + np.flatnonzero(kept[first:last])
             true = start[points] + met.range[points, None] * direction[points]
-            moved = (xyz[points] - beams.origin - true).mean(axis=0) if len(points) else 0.0
+            if len(points):
+                moved = (xyz[points] - beams.origin - true).mean(axis=0)
+            else:
+                moved = 0.0
             expected = boards.centre[beams.target[view]] + moved + beams.origin
             cloud = PointCloud(xyz[points], beams.pulses.gps_time[points], met.intensity[points])
             number = rows.survey_item[row]
@@ -47,7 +56,8 @@ def refit_targets(
             bright = boards.bright[beams.target[view]]
             same_rng = np.random.default_rng(seed)  # of each target alike
             fitted[view] = _fitted(cloud, shape, survey, expected, bright, same_rng)
-        target, along = fitted[view], rows.direction[row]
+        target = fitted[view]
+        along = rows.direction[row]
         # a plate whose edges lie along the scan lines is known well at one place, not beside it
         worst = max(SETTINGS.worst**2 * rows.noise[row], SETTINGS.least_worst**2)
         if target is None or along @ target.covariance @ along > worst:
@@ -70,7 +80,10 @@ def _fitted(cloud, shape, survey, expected, bright, rng):
     dark = np.percentile(beside, 90) if len(beside) else 0.0
     spot = BrightRegion(expected, SETTINGS.extent * diameter(kind, size), (bright + dark) / 2)
     lit = (cloud.intensity >= spot.threshold) & (apart <= spot.radius)
-    spots = [None] if kind in BY_EDGES or lit.sum() < TARGETS.smallest_count else [spot, None]
+    if kind in BY_EDGES or lit.sum() < TARGETS.smallest_count:
+        spots = [None]
+    else:
+        spots = [spot, None]
     for spot in spots:
         targets = fit_targets(cloud, path, [shape], survey.scanner, rng, spot)
         away = [np.linalg.norm(target.position - expected) for target in targets]

@@ -46,7 +46,8 @@ class SightedTarget:
         away = np.abs(pulses.gps_time - sighting.fitted.gps_time)
         near = np.argsort(away, kind="stable")[: SETTINGS.target_pulses]
         near = near[np.argsort(pulses.gps_time[near], kind="stable")]
-        pulses, place = pulses[near], place[near]
+        pulses = pulses[near]
+        place = place[near]
         beyond = pulses.range - distance[near]
         off = beyond * slant[near]
         form = FORMS.index(sighting.fitted.kind)
@@ -59,11 +60,14 @@ class SightedTarget:
         bright, dark, speckle = paints(sighting.fitted.kind, pulses.intensity[lit])
         board = board_of(sighting.fitted, np.zeros(3), bright, dark, speckle)
         others = np.flatnonzero(~own & ~(off < -SIMULATION.hiding_depth))
-        beyond, behind = beyond.copy(), pulses.intensity.copy()
-        beyond[own], behind[own] = np.nan, 0.0
+        beyond = beyond.copy()
+        behind = pulses.intensity.copy()
+        beyond[own] = np.nan
+        behind[own] = 0.0
         if own.any() and len(others):
             nearest = others[cKDTree(place[others]).query(place[own])[1]]
-            beyond[own], behind[own] = beyond[nearest], behind[nearest]
+            beyond[own] = beyond[nearest]
+            behind[own] = behind[nearest]
         return cls(pulses, board, beyond, behind)
 
 
@@ -76,7 +80,8 @@ def sightings_of(rows: Rows, finding: Any) -> list[Sighting]:
     finding : Finding
         Of the same survey.
     """
-    on, sightings = rows.channel == "target", []
+    on = rows.channel == "target"
+    sightings = []
     matched = finding.matches.matched
     sights = zip(matched.name, matched.gps_time, strict=True)
     passes = dict(zip(sights, matched.pass_number, strict=True))
@@ -92,9 +97,12 @@ def sightings_of(rows: Rows, finding: Any) -> list[Sighting]:
 
 
 def board_of(
-    target: FittedTarget, origin: np.ndarray, bright: float = 1.0, dark: float = 0.0,
+    target: FittedTarget,
+    origin: np.ndarray,
+    bright: float = 1.0,
+    dark: float = 0.0,
     speckle: float = 0.0,
-) -> Boards:  # fmt: skip
+) -> Boards:
     """Boards of one FittedTarget.
 
     Parameters
@@ -106,17 +114,27 @@ def board_of(
         Intensity of its paints, and their relative noise.
     """
     outline, (u, v) = target.view.outline, target.view.axes
-    cos, sin = np.cos(outline.turn), np.sin(outline.turn)
+    cos = np.cos(outline.turn)
+    sin = np.sin(outline.turn)
     if target.kind == "circle":  # nobody knows how its board is turned: upright
         normal = np.cross(u, v)
-        side = np.array([0.0, 0.0, 1.0]) if abs(normal[2]) < 0.99 else np.array([1.0, 0.0, 0.0])
+        if abs(normal[2]) < 0.99:
+            side = np.array([0.0, 0.0, 1.0])
+        else:
+            side = np.array([1.0, 0.0, 0.0])
         u = np.cross(side, normal)
         u /= np.linalg.norm(u)
-        v, cos, sin = np.cross(normal, u), 1.0, 0.0
+        v = np.cross(normal, u)
+        cos = 1.0
+        sin = 0.0
     edges = np.array([cos * u + sin * v, cos * v - sin * u])
     return Boards(
-        centre=(target.position - origin)[None], axes=np.vstack([edges, np.cross(*edges)])[None],
-        form=np.array([FORMS.index(target.kind)]), size=np.array([target.size]),
-        inner=np.array([outline.inner]), bright=np.array([bright]), dark=np.array([dark]),
+        centre=(target.position - origin)[None],
+        axes=np.vstack([edges, np.cross(*edges)])[None],
+        form=np.array([FORMS.index(target.kind)]),
+        size=np.array([target.size]),
+        inner=np.array([outline.inner]),
+        bright=np.array([bright]),
+        dark=np.array([dark]),
         speckle=np.array([speckle]),
-    )  # fmt: skip
+    )

@@ -32,9 +32,12 @@ def share_gone(before: float, after: float, chance: float = -np.inf) -> float:
     >>> share_gone(100.0, 1.0), share_gone(100.0, -50.0, -60.0), share_gone(50.0, -100.0, -60.0)
     (0.99, 1.0, -0.5)
     """
-    before, after = max(before, 0.0), -after if after < chance else max(after, 0.0)
+    before = max(before, 0.0)
+    after = -after if after < chance else max(after, 0.0)
     largest = max(before, after)
-    return float((before - after) / largest) if largest > 0 else 0.0
+    if largest > 0:
+        return float((before - after) / largest)
+    return 0.0
 
 
 def unit_square(observations: Observations, model: ErrorModel) -> float:
@@ -98,9 +101,15 @@ class SystematicGap:
 
     @classmethod
     def of(
-        cls, observations: Observations, model: ErrorModel, table: ColumnTable,
-        residual: np.ndarray, folds: Folds, used: np.ndarray, among: np.ndarray,
-    ) -> SystematicGap:  # fmt: skip
+        cls,
+        observations: Observations,
+        model: ErrorModel,
+        table: ColumnTable,
+        residual: np.ndarray,
+        folds: Folds,
+        used: np.ndarray,
+        among: np.ndarray,
+    ) -> SystematicGap:
         """Of some observations.
 
         Parameters
@@ -123,7 +132,8 @@ class SystematicGap:
         parts = observations.columns(np.column_stack([residual, shifts, folds.columns / scale]))
         white = observations.whitener(model).innovations(parts)[0][keep]
         u, each, own = np.split(white, [1, 1 + f], axis=1)
-        fold, learned = folds.of_rows[row], used[row]
+        fold = folds.of_rows[row]
+        learned = used[row]
         judged = each[np.arange(len(row)), fold]
         predicted = np.where(folds.fold[row] < 0, each.mean(axis=1), judged)
         cross = CrossFit(own[learned], fold[learned], f)
@@ -145,7 +155,8 @@ class SystematicGap:
         tails = rest / np.sqrt(np.mean(rest**2))
         drawn = rng.choice(tails, (len(rest), SETTINGS.replicas))
         chance = self.explanations.largest(drawn)[0]
-        usual, limit = chance.mean(), np.percentile(chance, SETTINGS.band[1])
+        usual = chance.mean()
+        limit = np.percentile(chance, SETTINGS.band[1])
         (largest,), (block,) = self.explanations.largest(rest[:, None])
         chance = self.unit * (chance - usual)
         if not self.predicted.any():  # a signed gap, as it is
@@ -153,7 +164,10 @@ class SystematicGap:
             return Squares(square, square[None], chance, 0.0, (0.0, 0.0))
         gone, own, off = self._own(drawn)
         stays = self._explained_by_own(rest[:, None])[1][:, 0]
-        other = max(float(largest - usual), own) if largest > limit else own
+        if largest > limit:
+            other = max(float(largest - usual), own)
+        else:
+            other = own
         left = own + (1.0 - probability) * (other - own)
         if left > 2 * own:
             stays = self.explanations.fit(block, rest)
@@ -202,7 +216,8 @@ class SystematicGap:
 
     def _folds(self, stays, left):
         """Squares (f, 2) in each fold, before and after, on the scale of the whole."""
-        rest, number = self.residual - self.predicted, self.fold.max() + 1
+        rest = self.residual - self.predicted
+        number = self.fold.max() + 1
         gone = self.residual**2 - rest**2
         share = stays**2 / max((stays**2).sum(), 1e-300) * left
         both = [np.bincount(self.fold, v, number) for v in (gone + share, share)]

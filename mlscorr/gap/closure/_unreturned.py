@@ -23,7 +23,9 @@ def unreturned(pulses: RecordedPulses, span: tuple[float, float], opening: float
     of beams, jitter, a thinned cloud): then a target before the sky has only the beams that met
     it.
     """
-    none, start, pause = pulses[:0], pulses.gps_time[0], np.diff(pulses.gps_time)
+    none = pulses[:0]
+    start = pulses.gps_time[0]
+    pause = np.diff(pulses.gps_time)
     if len(pause) < SETTINGS.line_pulses or np.ptp(pulses.elevation) > SETTINGS.level:
         return none
     step = np.percentile(pause, 25)

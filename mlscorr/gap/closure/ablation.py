@@ -47,7 +47,8 @@ def lone_effects(
         Draws replicas.
     """
     evidence = inference.evidence
-    o, table = evidence.observations, evidence.table
+    o = evidence.observations
+    table = evidence.table
     names = [name for name in table.effects if name not in evidence.noisy]
     chance = inference.probability
     causes = [cause_of(rows, signatures, evidence, name, chance.get(name, 0.0)) for name in names]
@@ -55,7 +56,8 @@ def lone_effects(
     shifts = np.array([np.zeros(len(rows)), *(cause.shift for cause in causes)]).T
     both = np.hstack([rows.residual[:, None] - shifts, table.columns])
     white = o.whitener(model).innovations(o.columns(both))[0]
-    rest, columns = white[:, : len(names) + 1], white[:, len(names) + 1 :]
+    rest = white[:, : len(names) + 1]
+    columns = white[:, len(names) + 1 :]
     explanations = Explanations.of(table, columns)
     usual = explanations.largest(rng.standard_normal((len(o), SETTINGS.replicas)))[0].mean()
     square = unit_square(o, model) * (explanations.largest(rest)[0] - usual)

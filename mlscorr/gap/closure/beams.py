@@ -113,7 +113,8 @@ def _patches_behind(rows, patches):
     samples = zip(patches.time.ravel(), *patches.xyz.reshape(-1, 3).T, strict=True)
     known = {sample: i // patches.time.shape[1] for i, sample in enumerate(samples)}
     pulses = pulses[np.unique(2 * pulses.item + (pulses.weight < 0), return_index=True)[1]]
-    second, behind = pulses.weight < 0, []
+    second = pulses.weight < 0
+    behind = []
     for i in np.argsort(place_key(pulses.xyz, pulses.gps_time), kind="stable"):
         number = known.get((pulses.gps_time[i], *pulses.xyz[i]))
         if number is not None:
@@ -144,15 +145,21 @@ def _beams(survey, rows, platform, origin, patches, targets):
         on = np.isin(item, rows.item[rows.channel == "surface"])[view]
         facet[on] = reference.cast(start[on], direction[on])
     return Beams(
-        pulses=pulses, view=view, item=item,
-        gps_time=rows.gps_time[row[np.searchsorted(known, item)]], second=second,
+        pulses=pulses,
+        view=view,
+        item=item,
+        gps_time=rows.gps_time[row[np.searchsorted(known, item)]],
+        second=second,
         target=np.append(np.full(len(patches), -1), np.arange(len(targets))).astype(int),
-        point=point, normal=normal,
+        point=point,
+        normal=normal,
         boards=scan.Boards.concatenate([about.board for _, about in targets]),
         beyond=np.concatenate([nothing, *(about.beyond for _, about in targets)]),
         behind=np.concatenate([nothing, *(about.behind for _, about in targets)]),
-        reference=reference, facet=facet, origin=origin,
-    )  # fmt: skip
+        reference=reference,
+        facet=facet,
+        origin=origin,
+    )
 
 
 def _joined(platform, origin, patches, targets):

@@ -118,7 +118,9 @@ def close_gap(
     rng : numpy.random.Generator
     progress : function of a number of steps, one in all, optional
     """
-    rows, used, cause = case.rows, case.used, case.cause
+    rows = case.rows
+    used = case.used
+    cause = case.cause
     kind = gap_kind(cause.effect, case.evidence.noisy, rows)
     unit = UNITS[kind]
     whole = predict_whole(case, simulated)  # takes most memory: before there is a table of all rows
@@ -126,15 +128,25 @@ def close_gap(
     folds = make_folds(case, whole, ruler.observations, ruler.model, simulated, rng, progress)
     held = ruler.compare(folds, rng)
     fitted = replace(folds, fold=np.where(used, 0, -1), predicted=(whole,))
-    gap, in_sample = _gap(held, unit), _gap(ruler.compare(fitted, rng, used), unit)
+    gap = _gap(held, unit)
+    in_sample = _gap(ruler.compare(fitted, rng, used), unit)
     nothing = cause.effect == "none"
     return Closure(
-        cause.effect, float(cause.probability), kind, unit, gap.before,
-        gap.before if nothing else gap.after, 0.0 if nothing else held.gone,
-        (0.0, 0.0) if nothing else held.interval, gap.null_band, folds.held_out,
-        folds.is_held_out, signed_root(held.folds, unit), in_sample,
+        cause.effect,
+        float(cause.probability),
+        kind,
+        unit,
+        gap.before,
+        gap.before if nothing else gap.after,
+        0.0 if nothing else held.gone,
+        (0.0, 0.0) if nothing else held.interval,
+        gap.null_band,
+        folds.held_out,
+        folds.is_held_out,
+        signed_root(held.folds, unit),
+        in_sample,
         errors_over_sigma(rows, ruler.observations, folds, rng),
-    )  # fmt: skip
+    )
 
 
 def _gap(squares, unit):
@@ -158,7 +170,8 @@ class _Ruler:
 
     @classmethod
     def of(cls, kind, case, probability):
-        rows, noise = case.rows, case.cause.model
+        rows = case.rows
+        noise = case.cause.model
         observations = Observations.of(rows, background(rows, case.survey))
         unknown = unknown_blocks(rows, case.survey)
         table = column_table(rows, case.signatures, unknown, observations.sigma)
@@ -176,13 +189,18 @@ class _Ruler:
 
     def compare(self, folds, rng, among=None):
         """What the size of each fold's others does to the gap of some rows (m,): Squares."""
-        among = np.ones(len(self.rows), bool) if among is None else among
+        if among is None:
+            among = np.ones(len(self.rows), bool)
         if self.kind == "systematic":
             given = self.observations, self.model, self.table, self.rows.residual
             return SystematicGap.of(*given, folds, self.used, among).measure(rng, self.probability)
         *terms, place = self._terms(folds, rng)
         is_share = self.kind == "returns"  # a mean of shares, not of squares
-        sign = -1.0 if is_share and terms[0][among[place]].mean() < 0 else 1.0  # lost, or gained
+        # lost, or gained
+        if is_share and terms[0][among[place]].mean() < 0:
+            sign = -1.0
+        else:
+            sign = 1.0
         before, after, chance, usual = (sign * values[among[place]] for values in terms)
         place = place[among[place]]
         both = np.column_stack([before, after])
@@ -201,7 +219,9 @@ class _Ruler:
         """Terms before, after (q,) and by chance (q, k) where the simulator is right without the
         cause and with it, whose means are gaps; their rows (q,).
         """
-        rows, nothing, replicas = self.rows, Predicted.nothing(self.rows), INFERENCE.replicas
+        rows = self.rows
+        nothing = Predicted.nothing(self.rows)
+        replicas = INFERENCE.replicas
         if self.kind == "position":
             observations = self.observations
             residual = observations.columns(rows.residual[:, None])
@@ -219,10 +239,13 @@ class _Ruler:
             held = Predicted(nothing.shift, folds.held("growth"), nothing.extra)
             grown = np.column_stack([rows.residual, np.log1p(held.growth)[:, None] + drawn])
             of_kind &= ~_outliers(rows.residual, np.log1p(held.growth), rows.noise, of_kind)
-            before, after = scatter_terms(rows, nothing, before), scatter_terms(rows, held, grown)
+            before = scatter_terms(rows, nothing, before)
+            after = scatter_terms(rows, held, grown)
         else:
             after = np.column_stack([rows.residual - folds.held("shift"), drawn])
-        before, after, place = before[of_kind], after[of_kind], np.flatnonzero(of_kind)
+        before = before[of_kind]
+        after = after[of_kind]
+        place = np.flatnonzero(of_kind)
         return before[:, 0], after[:, 0], before[:, 1:], after[:, 1:], place
 
     def _replicas(self, predicted, rng):
@@ -238,7 +261,10 @@ def _outliers(residual, expected, noise, among):
     than planes, and a few of them would rule a mean of squares.
     """
     score = np.minimum(np.abs(residual), np.abs(residual - expected)) / np.sqrt(noise)
-    limit = np.quantile(score[among], 1.0 - INFERENCE.tail_rows) if among.any() else 0.0
+    if among.any():
+        limit = np.quantile(score[among], 1.0 - INFERENCE.tail_rows)
+    else:
+        limit = 0.0
     return among & (score > max(limit, INFERENCE.tail))
 
 
@@ -246,7 +272,8 @@ def _left_out(both, block):
     """Means (g, 2) of terms (q, 2) with groups of blocks (q,) left out in turn."""
     groups = 2 * SETTINGS.folds
     group = np.unique((block * groups) // (block.max() + 1), return_inverse=True)[1]
-    count, sums = np.bincount(group), np.array([np.bincount(group, v) for v in both.T]).T
+    count = np.bincount(group)
+    sums = np.array([np.bincount(group, v) for v in both.T]).T
     return (both.sum(axis=0) - sums) / np.maximum(len(both) - count, 1)[:, None]
 
 

@@ -92,9 +92,14 @@ def predict_whole(case: FoundCause, simulated: Simulated) -> Predicted:
 
 
 def make_folds(
-    case: FoundCause, whole: Predicted, observations: Observations, model: ErrorModel,
-    simulated: Simulated, rng: np.random.Generator, progress: Callable[[int], None] | None = None,
-) -> Folds:  # fmt: skip
+    case: FoundCause,
+    whole: Predicted,
+    observations: Observations,
+    model: ErrorModel,
+    simulated: Simulated,
+    rng: np.random.Generator,
+    progress: Callable[[int], None] | None = None,
+) -> Folds:
     """Folds for a cause.
 
     Parameters
@@ -109,8 +114,11 @@ def make_folds(
     simulated, rng, progress
         As in ``close_gap``.
     """
-    rows, used, cause = case.rows, case.used, case.cause
-    block, columns = _blocks(rows, cause), case.columns()
+    rows = case.rows
+    used = case.used
+    cause = case.cause
+    block = _blocks(rows, cause)
+    columns = case.columns()
     nothing = np.zeros(len(rows), dtype=int)
     if not callable(simulated):
         held_out = (
@@ -190,12 +198,15 @@ def _trained(case, observations, model, used, rng):
 
     The windows of a worse POS are those that all rows tell, as an event's time is.
     """
-    survey, evidence, cause = case.survey, case.evidence, case.cause
+    survey = case.survey
+    evidence = case.evidence
+    cause = case.cause
     if cause.model.windows:
         part = observations[used[observations.row]]
         windows = _with_factor(part, model, part.columns(case.rows.residual[:, None]))
         return replace(cause, model=replace(cause.model, windows=windows))
-    names, part = cause.effect.split("+"), case.rows.select(used)
+    names = cause.effect.split("+")
+    part = case.rows.select(used)
     of_part = select([s for s in case.signatures if s.name in names], case.rows, used)
     anew = weigh_labels(part, background(part, survey), survey, of_part, rng, 0)
     best = {name: _likeliest(evidence, name) for name in names}
@@ -244,7 +255,8 @@ def cause_for_simulator(rows: Rows, signatures: Sequence[Signature], inference: 
         return inference.cause
     if inference.verdict.is_hidden:
         return cause_of(rows, signatures, inference.evidence, "none", inference.probability["none"])
-    best, probability = _best_known(inference.probability), inference.probability
+    best = _best_known(inference.probability)
+    probability = inference.probability
     return cause_of(rows, signatures, inference.evidence, best, probability.get(best, 0.0))
 
 

@@ -48,7 +48,8 @@ class FoundCause:
         """Rows (m,) bool of check points seen at the moment of a jump, between the used rows
         next to it: nothing says on which side of it they are.
         """
-        rows, undecided = self.rows, np.zeros(len(self.rows), bool)
+        rows = self.rows
+        undecided = np.zeros(len(self.rows), bool)
         known = rows.gps_time[self.used & rows.metric], rows.gps_time_2[self.used & rows.two_times]
         known = np.sort(np.concatenate([[-np.inf], *known, [np.inf]]))
         for part, _ in self.shifting:
@@ -60,6 +61,8 @@ class FoundCause:
 
     def columns(self) -> np.ndarray:
         """What these parts make of all rows (m, p), by their parameters."""
-        bench, rng = Bench(self.rows, self.survey), np.random.default_rng(0)  # nothing is drawn
+        # nothing is drawn
+        bench = Bench(self.rows, self.survey)
+        rng = np.random.default_rng(0)
         parts = [signature(bench, p.kind, p.fixed, rng).jacobian for p, _ in self.shifting]
         return np.hstack([np.zeros((len(self.rows), 0)), *parts])

@@ -61,7 +61,8 @@ def rerun(
         For effects on the beams of a survey without a mounting, and for rows that are not the
         Beams'.
     """
-    effects, views = tuple(effects), _views_of(rows, beams)
+    effects = tuple(effects)
+    views = _views_of(rows, beams)
     check_mounting(survey, effects)
     residual = np.full(len(rows), np.nan)
     if len(rows) == 0:
@@ -133,8 +134,10 @@ def _drawn(rows, survey, beams, effects, rng):
     m, speckle of the pulses about targets, and a generator for the fits.
     """
     draws, dither, speckle, fit_rng = rng.spawn(4)
-    n, on_target = len(beams.view), beams.target[beams.view] >= 0
-    draws, rounding = Draws.of(n, draws), rounding_sigma() * dither.standard_normal((n, 3))
+    n = len(beams.view)
+    on_target = beams.target[beams.view] >= 0
+    draws = Draws.of(n, draws)
+    rounding = rounding_sigma() * dither.standard_normal((n, 3))
     run = Replay(survey, beams.pulses, effects, rows.reference, draws, beams.origin)
     return run, rounding, speckle.standard_normal(n)[on_target], fit_rng
 
@@ -161,16 +164,21 @@ def _boards(rows, beams, effects):
     of_item = dict(zip(rows.item.tolist(), rows.survey_item, strict=True))
     items = beams.item[beams.target >= 0].tolist()
     surveyed = np.array([of_item.get(item, -1) for item in items], dtype=int)
-    centre = targets.position[surveyed] - beams.origin if len(targets) else np.empty((0, 3))
+    if len(targets):
+        centre = targets.position[surveyed] - beams.origin
+    else:
+        centre = np.empty((0, 3))
     return replace(beams.boards, centre=centre)
 
 
 def _meet(rows, beams, views, shot, boards, speckle):
     """Met of all pulses: with the planes of patches, and with targets."""
-    point, normal = beams.point.copy(), beams.normal.copy()
+    point = beams.point.copy()
+    normal = beams.normal.copy()
     shared, second = np.nonzero((views >= 0) & (rows.channel == "shared")[:, None])
     both = views[shared, second]  # one plane for both views
-    point[both], normal[both] = rows.position[shared] - beams.origin, rows.direction[shared]
+    point[both] = rows.position[shared] - beams.origin
+    normal[both] = rows.direction[shared]
     offset = np.einsum("li,li->l", normal, point)
     on_target = beams.target[beams.view] >= 0
     flat, (start, direction) = ~on_target, shot
@@ -198,7 +206,8 @@ class _Patches:
     @classmethod
     def of(cls, beams, xyz, kept, met):
         flat = beams.target[beams.view] < 0
-        view, count = beams.view[flat], int((beams.target < 0).sum())
+        view = beams.view[flat]
+        count = int((beams.target < 0).sum())
         local = xyz[flat] - beams.origin - beams.point[view]
         weight = (kept & met)[flat].astype(float)
         local[weight == 0] = 0.0
@@ -243,14 +252,18 @@ def _surface(rows, survey, beams, on, view, run, dither, spread):
     another surface.
     """
     fired = np.flatnonzero(np.isin(beams.view, view))  # the other pulses are not compared
-    of, facet = beams.view[fired], beams.facet[fired]
+    of = beams.view[fired]
+    facet = beams.facet[fired]
     start, beam = (values[fired] for values in run.beams)
     part, triangle = beams.reference.meet(start, beam, beams.pulses.intensity[fired])
     met = Met(np.full(len(dither), np.nan), np.ones(len(dither)), beams.pulses.intensity)
-    met.range[fired], met.incidence[fired] = part.range, part.incidence
+    met.range[fired] = part.range
+    met.incidence[fired] = part.incidence
     xyz, kept = (values[fired] for values in run.measure(met))
-    normal, offset = beams.reference.mesh.normal, beams.reference.mesh.offset
-    direction, largest = np.zeros((len(beams), 3)), np.zeros(len(beams))
+    normal = beams.reference.mesh.normal
+    offset = beams.reference.mesh.offset
+    direction = np.zeros((len(beams), 3))
+    largest = np.zeros(len(beams))
     direction[view] = rows.direction[on]
     largest[view] = np.abs(rows.residual[on]) + gate(survey, rows.gps_time[on])
     cosine = np.einsum("ni,ni->n", normal[triangle], direction[of])
@@ -268,7 +281,8 @@ def _surface(rows, survey, beams, on, view, run, dither, spread):
     def count(which):
         return np.bincount(of, which, len(beams))[view]
 
-    number, lost = count(used), count(np.isfinite(part.range) & ~kept)
+    number = count(used)
+    lost = count(np.isfinite(part.range) & ~kept)
     known = number >= np.maximum(1, SETTINGS.facet_share * (count(of >= 0) - lost))
     return np.where(known, count(np.where(used, away, 0.0)) / np.maximum(number, 1), np.nan)
 

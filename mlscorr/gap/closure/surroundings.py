@@ -25,11 +25,14 @@ class Surroundings:
     """
 
     def __init__(self, survey: Survey):
-        self._targets, self._trajectory = survey.surveyed, survey.trajectory
+        self._targets = survey.surveyed
+        self._trajectory = survey.trajectory
         self._origin = survey.trajectory.position.mean(axis=0)
         self._platform = recorded_platform(survey, self._origin)
         self._radius = search_radius(survey, self._targets)
-        self._open, self._settled, self._fitted = [], [], []
+        self._open = []
+        self._settled = []
+        self._fitted = []
 
     def __len__(self):
         return sum(len(cloud) for cloud, _ in [*self._settled, *self._open])
@@ -58,7 +61,8 @@ class Surroundings:
         self._fitted += [(t, _scanned(t), self._largest_extent(t)) for t in fitted]
         if not self._open:
             return
-        last, remaining = min(since, self._open[-1][1][1]) - OBSERVE.moment, []
+        last = min(since, self._open[-1][1][1]) - OBSERVE.moment
+        remaining = []
         for cloud, limits in self._open:
             part = self._narrowed(cloud, last), limits
             (remaining if limits[1] >= last else self._settled).append(part)
@@ -98,14 +102,17 @@ class Surroundings:
             One or none: pulses, and their distance (m), cosine of incidence and place where they
             cross the target's plane (m).
         """
-        target, times = sighting.fitted, np.array(_scanned(sighting.fitted))
+        target = sighting.fitted
+        times = np.array(_scanned(sighting.fitted))
         extent = _extent(target, np.linalg.norm(target.position - sighting.surveyed))
-        clouds, read = [NO_POINTS], []
+        clouds = [NO_POINTS]
+        read = []
         for chunk, limits in [*self._settled, *self._open]:
             if limits[0] <= times[1] and limits[1] >= times[0]:
                 clouds.append(chunk[slice(*np.searchsorted(chunk.gps_time, times))])
                 read += np.clip(times, *limits).tolist()
-        cloud, place = PointCloud.concatenate(clouds), target.position - origin
+        cloud = PointCloud.concatenate(clouds)
+        place = target.position - origin
         start = platform.scanner(cloud.gps_time)
         near = _passing_any(start, cloud.xyz - origin, place[None], np.array([extent**2]))
         if not near.any():
@@ -116,11 +123,14 @@ class Surroundings:
         pulses = _first_returns(recorded_pulses(platform, cloud, origin, target.normal))
         pulses = RecordedPulses.concatenate([pulses, unreturned(pulses, span, extent / nearest)])
         beams = aim(platform, pulses.gps_time, pulses.angle, pulses.elevation)
-        board, number = board_of(target, origin), np.zeros(len(pulses), int)
+        board = board_of(target, origin)
+        number = np.zeros(len(pulses), int)
         distance, slant, place = board.crossings(number, *beams)
         with np.errstate(invalid="ignore"):
             near = np.isfinite(distance) & (np.hypot(*place.T) <= extent)
-        return [(pulses[near], distance[near], slant[near], place[near])] if near.any() else []
+        if near.any():
+            return [(pulses[near], distance[near], slant[near], place[near])]
+        return []
 
 
 def _scanned(target):
@@ -139,7 +149,9 @@ def _passing_any(start, end, place, squared_extent):
     """Which beams (n,) from start to end (n, 3) pass one of the places (k, 3), or would."""
     near = np.zeros(len(start), np.bool_)
     for i in range(len(start)):
-        x, y, z = end[i, 0] - start[i, 0], end[i, 1] - start[i, 1], end[i, 2] - start[i, 2]
+        x = end[i, 0] - start[i, 0]
+        y = end[i, 1] - start[i, 1]
+        z = end[i, 2] - start[i, 2]
         length = np.sqrt(x**2 + y**2 + z**2)
         for k in range(len(place)):
             a = place[k, 0] - start[i, 0]

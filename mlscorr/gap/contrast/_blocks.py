@@ -59,7 +59,9 @@ def joined_bins(weight: np.ndarray) -> list[slice]:
     filled = np.flatnonzero(weight.sum(axis=0) > 0)
     if len(filled) == 0:
         return [slice(0, weight.shape[1])]
-    bins, start, stop = [], filled[0], filled[-1] + 1
+    bins = []
+    start = filled[0]
+    stop = filled[-1] + 1
     for end in range(filled[0] + 1, stop + 1):
         if effective(weight[:, start:end].sum(axis=1)) >= SETTINGS.least_blocks:
             bins.append(slice(start, end))

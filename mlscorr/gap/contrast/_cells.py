@@ -85,9 +85,13 @@ class Cells(Columns):
         """The same with one row each cell."""
         cells = self[np.argsort(self.key, kind="stable")]
         first = np.flatnonzero(np.append(True, np.diff(cells.key) != 0)[: len(cells)])
-        sums = np.add.reduceat(cells.sums, first) if len(cells) else cells.sums
-        return Cells(cells.key[first], cells.chance[first], cells.corner[first],
-                     cells.moment[first], sums)  # fmt: skip
+        if len(cells):
+            sums = np.add.reduceat(cells.sums, first)
+        else:
+            sums = cells.sums
+        return Cells(
+            cells.key[first], cells.chance[first], cells.corner[first], cells.moment[first], sums
+        )
 
 
 class CellCollector:
@@ -101,8 +105,11 @@ class CellCollector:
     """
 
     def __init__(self, survey: Survey, limit: int = SETTINGS.kept, points: int = SETTINGS.points):
-        self._survey, self._limit, self._most_points = survey, limit, points
-        self._cells, self._points = cells_of(NO_POINTS, 1.0), [NO_POINTS]
+        self._survey = survey
+        self._limit = limit
+        self._most_points = points
+        self._cells = cells_of(NO_POINTS, 1.0)
+        self._points = [NO_POINTS]
         self.share = self.point_share = 1.0
 
     def add(self, chunk: PointCloud) -> None:
@@ -134,7 +141,9 @@ def sampled(cloud: PointCloud, share: float) -> PointCloud:
     cloud : PointCloud
     share : float
     """
-    return cloud if share >= 1 else cloud[chance(place_key(cloud.xyz, cloud.gps_time)) < share]
+    if share >= 1:
+        return cloud
+    return cloud[chance(place_key(cloud.xyz, cloud.gps_time)) < share]
 
 
 def cells_of(cloud: PointCloud, share: float) -> Cells:
@@ -147,12 +156,14 @@ def cells_of(cloud: PointCloud, share: float) -> Cells:
     """
     block = block_chance(cloud.xyz)
     if share < 1:
-        cloud, block = cloud[block < share], block[block < share]
+        cloud = cloud[block < share]
+        block = block[block < share]
     key = place_key(cloud.xyz, cloud.gps_time)
     order = np.argsort(key, kind="stable")
     key = key[order]
     first = np.flatnonzero(np.append(True, np.diff(key) != 0)[: len(key)])
-    xyz, time = cloud.xyz[order], cloud.gps_time[order]
+    xyz = cloud.xyz[order]
+    time = cloud.gps_time[order]
     corner = cell_corner(xyz[first])
     moment = np.floor(time[first] / OBSERVE.moment) * OBSERVE.moment
     count = np.diff(np.append(first, len(key)))
@@ -161,5 +172,8 @@ def cells_of(cloud: PointCloud, share: float) -> Cells:
     columns = [np.ones(len(key)), time - np.repeat(moment, count), *local.T]
     columns += [local[:, i] * local[:, j] for i, j in PRODUCTS] + [counts]
     table = np.column_stack(columns)
-    sums = np.add.reduceat(table, first) if len(first) else np.empty((0, len(columns)))
+    if len(first):
+        sums = np.add.reduceat(table, first)
+    else:
+        sums = np.empty((0, len(columns)))
     return Cells(key[first], block[order][first], corner, moment, sums)

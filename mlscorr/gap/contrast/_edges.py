@@ -54,10 +54,12 @@ class EdgeCollector:
     """
 
     def __init__(self, survey: Survey, limit: int = SETTINGS.kept):
-        self._survey, self._limit = survey, limit
+        self._survey = survey
+        self._limit = limit
         self._origin = survey.trajectory.position.mean(axis=0)
         self._platform = recorded_platform(survey, self._origin)
-        self._parts, self.share = [Edges(np.empty(0), np.empty((0, 3)), *np.empty((2, 0)))], 1.0
+        self._parts = [Edges(np.empty(0), np.empty((0, 3)), *np.empty((2, 0)))]
+        self.share = 1.0
         self._held = NO_POINTS
 
     def add(self, chunk: PointCloud) -> None:
@@ -107,19 +109,24 @@ def edges_of(cloud: PointCloud, sight: np.ndarray, rough: float) -> Edges:
     across = turn * np.minimum(away, np.append(np.inf, away[:-1]))
     is_more = (np.diff(cloud.gps_time, prepend=-np.inf) == 0) & (across < SETTINGS.same_pulse)
     first = np.flatnonzero(~is_more)
-    near, far = np.minimum.reduceat(away, first), np.maximum.reduceat(away, first)
-    time, step = cloud.gps_time[first], np.append(turn[first][1:], np.inf)
+    near = np.minimum.reduceat(away, first)
+    far = np.maximum.reduceat(away, first)
+    time = cloud.gps_time[first]
+    step = np.append(turn[first][1:], np.inf)
     pause = np.append(np.diff(time), np.inf)
     follows = pause <= 1.5 * np.median(pause)
     bend = np.full(len(first), np.inf)
     bend[1:-1] = np.abs(near[2:] - 2 * near[1:-1] + near[:-2])
     is_smooth = (bend <= rough) & follows & np.append(False, follows[:-1])
     begin, end = _between_plateaus(is_smooth, follows)
-    ahead, back = 2 * near[begin] - near[begin - 1], 2 * near[end] - near[end + 1]
-    low, high = np.minimum(ahead, back), np.maximum(ahead, back)
+    ahead = 2 * near[begin] - near[begin - 1]
+    back = 2 * near[end] - near[end + 1]
+    low = np.minimum(ahead, back)
+    high = np.maximum(ahead, back)
     is_edge = (high - low >= SETTINGS.jump) & (end - begin - 1 >= 2)
     mixed = np.maximum(end - begin - 3, 0)  # but the last on the one and the first on the other
-    last, is_double = len(first), far - near >= SETTINGS.jump
+    last = len(first)
+    is_double = far - near >= SETTINGS.jump
     is_near = near[begin] <= near[end]  # pulses that measure both surfaces end the near one
     both = np.where(is_near, _run(is_double)[begin + 1], _run(is_double[::-1])[::-1][end - 1])
     for offset in range(2, SETTINGS.widest + 2):  # a pulse between is on neither surface
@@ -140,13 +147,16 @@ def _run(is_double):
 def _between_plateaus(is_smooth, follows):
     """Last pulse of a plateau (e,) and first of the next (e,), with few pulses between them."""
     change = np.flatnonzero(np.diff(is_smooth.astype(np.int8)))
-    starts, ends = np.append(0, change + 1), np.append(change, len(is_smooth) - 1)
-    length, smooth = ends - starts + 1, is_smooth[starts]
+    starts = np.append(0, change + 1)
+    ends = np.append(change, len(is_smooth) - 1)
+    length = ends - starts + 1
+    smooth = is_smooth[starts]
     middle = np.arange(1, len(starts) - 1)
     gaps = np.append(0, np.cumsum(~follows))
     least = SETTINGS.plateau - 2  # a smooth pulse has its neighbours on the surface
     good = ~smooth[middle] & (length[middle] <= SETTINGS.widest + 2)
     good &= (length[middle - 1] >= least) & (length[middle + 1] >= least)
-    begin, end = ends[middle - 1], starts[middle + 1]
+    begin = ends[middle - 1]
+    end = starts[middle + 1]
     good &= (gaps[end] == gaps[begin]) & (begin >= 1) & (end < len(is_smooth) - 1)
     return begin[good], end[good]

@@ -21,8 +21,25 @@ class Settings:
     # bins and blocks
     # m, finest ones: those in which too few blocks lie are joined
     ranges: tuple[float, ...] = (
-        0, 2, 4, 6, 8, 10, 12, 15, 20, 25, 30, 40, 50, 60, 80, 100, 150, 500,
-    )  # fmt: skip
+        0,
+        2,
+        4,
+        6,
+        8,
+        10,
+        12,
+        15,
+        20,
+        25,
+        30,
+        40,
+        50,
+        60,
+        80,
+        100,
+        150,
+        500,
+    )
     incidences: tuple[float, ...] = (0, 15, 30, 45, 60, 75, 90)  # deg
     block: float = 16.0  # m of ground that go together: a house or a lane has one reflectance
     least_blocks: int = 6  # in a bin, for a sigma known to a third; bins with fewer are joined

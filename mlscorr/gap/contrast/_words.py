@@ -40,7 +40,9 @@ def sentence(measure: Measure, table: ContrastTable, sums: np.ndarray) -> str:
     (real,), (simulated,) = measure.sides(part.sum(axis=0))
     where = _where(table, run)
     if measure.channel == "intensity":
-        return "" if where == "everywhere" else _intensity(table, value, sigma, where)
+        if where == "everywhere":
+            return ""
+        return _intensity(table, value, sigma, where)
     if measure.channel == "density":
         return _density(value, sigma, where)
     if measure.channel == "dropout":
@@ -57,9 +59,11 @@ def sentence(measure: Measure, table: ContrastTable, sums: np.ndarray) -> str:
 
 
 def _density(value, sigma, where):
-    change, hint = "more", "loses too many returns there, or its scene lacks things"
+    change = "more"
+    hint = "loses too many returns there, or its scene lacks things"
     if value < 0:
-        change, hint = "fewer", "lacks lost returns there, or what hides things"
+        change = "fewer"
+        hint = "lacks lost returns there, or what hides things"
     percent = _pair(100 * abs(np.expm1(value)), 100 * sigma * np.exp(value))
     return (
         f"The real cloud has {percent} % {change} points than the simulated one {where}: the "
@@ -70,7 +74,10 @@ def _density(value, sigma, where):
 def _intensity(table, value, sigma, where):
     factor = np.exp(abs(value))
     known = np.flatnonzero(np.isfinite(table.value))
-    slope = np.polyfit(known, table.value[known], 1)[0] if len(known) > 1 else value
+    if len(known) > 1:
+        slope = np.polyfit(known, table.value[known], 1)[0]
+    else:
+        slope = value
     return (
         f"Real returns are {_pair(factor, factor * sigma)} times "
         f"{'weaker' if value < 0 else 'stronger'} than simulated ones {where}, beside the usual "
@@ -82,8 +89,13 @@ def _lacks(by, falls):
     """What simulated intensities lack, where the real ones fall along the bins, or rise."""
     if by == "reflectance":
         return f"'s materials differ too {'much' if falls else 'little'} in brightness"
-    along = "with range" if by == "range" else f"with the {PLACES[by][0]}"
-    return f" lacks falloff {along}" if falls else f"'s intensity falls off too fast {along}"
+    if by == "range":
+        along = "with range"
+    else:
+        along = f"with the {PLACES[by][0]}"
+    if falls:
+        return f" lacks falloff {along}"
+    return f"'s intensity falls off too fast {along}"
 
 
 def _pair(value, sigma):
@@ -114,11 +126,15 @@ def _where(table, run):
         return f"from {' and '.join(table.bins[run])} surfaces"
     name, unit = PLACES[table.by]
     known = np.flatnonzero(np.isfinite(table.value))
-    low, high = table.edges[run.start], table.edges[run.stop]
-    is_first, is_last = run.start <= known[0], run.stop > known[-1]
+    low = table.edges[run.start]
+    high = table.edges[run.stop]
+    is_first = run.start <= known[0]
+    is_last = run.stop > known[-1]
     if is_first and is_last:
         return "everywhere"
     of = "" if table.by == "range" else f" {name}"
     if is_last:
         return f"beyond {low:g}{unit}{of}"
-    return f"within {high:g}{unit}{of}" if is_first else f"between {low:g} and {high:g}{unit}{of}"
+    if is_first:
+        return f"within {high:g}{unit}{of}"
+    return f"between {low:g} and {high:g}{unit}{of}"

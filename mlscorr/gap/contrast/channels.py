@@ -31,12 +31,14 @@ def contrast_clouds(
     """
     real, simulated = of_shared_moments((real, simulated))
     pairs = paired_cells(survey, real, simulated)
-    return _judged([
-        _intensity(pairs, real, simulated, rng),
-        _density(pairs, rng),
-        _dropout(survey, real.patches, simulated.patches, None, rng),
-        _edge_width(real, simulated, rng),
-    ])  # fmt: skip
+    return _judged(
+        [
+            _intensity(pairs, real, simulated, rng),
+            _density(pairs, rng),
+            _dropout(survey, real.patches, simulated.patches, None, rng),
+            _edge_width(real, simulated, rng),
+        ]
+    )
 
 
 def contrast_returns(
@@ -84,7 +86,8 @@ def _contrast(measure, tables, tests):
         sentences.append(sentence(measure, whole, sums_of_all))
     else:
         best = int(np.argmax(clear))
-        first, split = judged[best], measure.splits[best]
+        first = judged[best]
+        split = measure.splits[best]
         sentences.append(sentence(measure, first, tables[best][1]))
         number = split.number(first.edges)
         change = np.where(number >= 0, np.nan_to_num(first.value)[number], 0.0)
@@ -137,10 +140,15 @@ def _of_ratio(pairs, ratio, weights, splits):
         return sums[..., 0] / sums[..., 3] - (medians[1:, None] if is_replica else medians[0])
 
     return Measure(
-        "intensity", pairs.block, [ratio, *pairs.brightness.T, np.ones(len(pairs))], figure,
-        lambda s: (10 ** (s[:, 1] / s[:, 3]), 10 ** (s[:, 2] / s[:, 3])), weights,
-        lambda change: _of_ratio(pairs, ratio - change, weights, splits), splits,
-    )  # fmt: skip
+        "intensity",
+        pairs.block,
+        [ratio, *pairs.brightness.T, np.ones(len(pairs))],
+        figure,
+        lambda s: (10 ** (s[:, 1] / s[:, 3]), 10 ** (s[:, 2] / s[:, 3])),
+        weights,
+        lambda change: _of_ratio(pairs, ratio - change, weights, splits),
+        splits,
+    )
 
 
 def _medians(ratio, block, weights):
@@ -180,10 +188,15 @@ def _density(pairs: PairedCells, rng: np.random.Generator) -> Contrast | Measure
 def _of_points(block, real, simulated, weights, splits):
     """Measure of the density by numbers of points (n,)."""
     return Measure(
-        "density", block, [real, simulated, real + simulated],
-        lambda sums: np.log(sums[..., 0] / sums[..., 1]), lambda s: (s[:, 0], s[:, 1]), weights,
-        lambda change: _of_points(block, real, simulated * np.exp(change), weights, splits), splits,
-    )  # fmt: skip
+        "density",
+        block,
+        [real, simulated, real + simulated],
+        lambda sums: np.log(sums[..., 0] / sums[..., 1]),
+        lambda s: (s[:, 0], s[:, 1]),
+        weights,
+        lambda change: _of_points(block, real, simulated * np.exp(change), weights, splits),
+        splits,
+    )
 
 
 def _of_means(channel, block, real, simulated, splits, weights):
@@ -194,16 +207,24 @@ def _of_means(channel, block, real, simulated, splits, weights):
         return _of_means(channel, block, real, (b + n * change, n), splits, weights)
 
     return Measure(
-        channel, block, [a, m, b, n, m + n],
+        channel,
+        block,
+        [a, m, b, n, m + n],
         lambda sums: sums[..., 0] / sums[..., 1] - sums[..., 2] / sums[..., 3],
-        lambda s: (s[:, 0] / s[:, 1], s[:, 2] / s[:, 3]), weights, without, splits,
-    )  # fmt: skip
+        lambda s: (s[:, 0] / s[:, 1], s[:, 2] / s[:, 3]),
+        weights,
+        without,
+        splits,
+    )
 
 
 def _dropout(
-    survey: Survey, patches: Patches | None, simulated: Patches | None, loss: float | None,
+    survey: Survey,
+    patches: Patches | None,
+    simulated: Patches | None,
+    loss: float | None,
     rng: np.random.Generator,
-) -> Contrast | Measure:  # fmt: skip
+) -> Contrast | Measure:
     """Beams without a return, between those of a scan line that have one."""
     known = [part for part in (patches, simulated) if part is not None]
     if patches is None or not all(part.fired.any() for part in known):
@@ -214,9 +235,11 @@ def _dropout(
     sight = joined.centre - scanner_origin(survey, joined.gps_time)
     away = np.linalg.norm(sight, axis=1)
     slant = np.abs(np.einsum("pi,pi->p", sight, joined.normal)) / away
-    fired, is_real = joined.fired.astype(float), np.arange(len(joined)) < len(patches)
+    fired = joined.fired.astype(float)
+    is_real = np.arange(len(joined)) < len(patches)
     lost = fired - joined.returned
-    real, other = (lost * is_real, fired * is_real), (lost * ~is_real, fired * ~is_real)
+    real = (lost * is_real, fired * is_real)
+    other = (lost * ~is_real, fired * ~is_real)
     if simulated is None:
         other = loss * fired, fired
     splits = _by_sight(away, np.degrees(np.arccos(np.clip(slant, 0.0, 1.0))))
@@ -233,7 +256,8 @@ def _edge_width(
     if min(map(len, sides)) < SETTINGS.least_blocks:
         return Contrast("edge_width", SILENT["edges"])
     joined = Edges.concatenate(sides)
-    is_real, width = np.arange(len(joined)) < len(sides[0]), 1e3 * joined.width
+    is_real = np.arange(len(joined)) < len(sides[0])
+    width = 1e3 * joined.width
     sums = [(width * which, which.astype(float)) for which in (is_real, ~is_real)]
     splits = (Binning("range", joined.range, SETTINGS.ranges),)
     block = block_of(joined.place)

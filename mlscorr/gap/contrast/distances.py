@@ -96,7 +96,8 @@ def chamfer_distance(x: np.ndarray, y: np.ndarray) -> float:
     >>> chamfer_distance(np.array([[0.0], [1.0]]), np.array([[0.0]]))
     0.25
     """
-    there, back = cKDTree(y).query(x)[0], cKDTree(x).query(y)[0]
+    there = cKDTree(y).query(x)[0]
+    back = cKDTree(x).query(y)[0]
     return float(0.5 * (there.mean() + back.mean()))
 
 
@@ -121,16 +122,21 @@ def cloud_distances(
     clouds = of_shared_moments([c for c in (real, simulated, following) if c is not None])
     share = min(cloud.point_share for cloud in clouds)
     points = [sampled(cloud.points, share) for cloud in clouds]
-    origin = points[0].xyz.mean(axis=0) if len(points[0]) else np.zeros(3)
+    if len(points[0]):
+        origin = points[0].xyz.mean(axis=0)
+    else:
+        origin = np.zeros(3)
     pulses = [part.gps_time.view(np.int64) for part in points]
     places = [_Sample(part.xyz - origin, pulse) for part, pulse in zip(points, pulses, strict=True)]
     distances = [*_of_samples("points", places, rng, {"chamfer": chamfer_distance})]
     distances += _of_samples("points", places, rng)
     if all(cloud.has_intensity for cloud in clouds):
         counts = [np.log10(np.maximum(part.intensity.astype(float), 1.0)) for part in points]
-        distances += _of_samples("intensity", [
-            _Sample(c[:, None], pulse) for c, pulse in zip(counts, pulses, strict=True)
-        ], rng)  # fmt: skip
+        distances += _of_samples(
+            "intensity",
+            [_Sample(c[:, None], pulse) for c, pulse in zip(counts, pulses, strict=True)],
+            rng,
+        )
     ground = min(cloud.share for cloud in clouds)
     cells = [cloud.cells[cloud.cells.chance < ground] for cloud in clouds]
     density = [_Sample(np.log10(part.points)[:, None], part.key.view(np.int64)) for part in cells]
@@ -192,7 +198,8 @@ class _Sample:
 def _of_samples(channel, samples, rng, figures=None):
     """DistributionDistances of real things from those of one simulation or two."""
     real, simulated, *following = samples
-    figures = _pairwise(simulated.values) if figures is None else figures
+    if figures is None:
+        figures = _pairwise(simulated.values)
     smallest = min(len(sample.values) for sample in samples)
     half = smallest // 2 - smallest // 8  # halves are not quite alike
     number = {
@@ -218,17 +225,24 @@ def _of_draws(channel, figures, pairs, number, rng):
         size = number[name]
         if size < SETTINGS.least_blocks:
             continue
-        values, seed = {}, int(rng.integers(2**63))  # the same draws before and after
+        # the same draws before and after
+        values = {}
+        seed = int(rng.integers(2**63))
         for when, draw in pairs.items():
             stream = np.random.default_rng(seed)
             samples = (draw(salt, stream) for salt in range(SETTINGS.halves))
             values[when] = [figure(x[:size], y[:size]) for x, y in samples]
         mean = {when: float(np.mean(drawn)) for when, drawn in values.items()}
         yield DistributionDistance(
-            channel, name, "" if name == "mmd" else UNITS.get(channel, "sigmas"),
-            mean["before"], mean.get("after", np.nan), mean["floor"],
-            float(np.percentile(values["floor"], 95)), size,
-        )  # fmt: skip
+            channel,
+            name,
+            "" if name == "mmd" else UNITS.get(channel, "sigmas"),
+            mean["before"],
+            mean.get("after", np.nan),
+            mean["floor"],
+            float(np.percentile(values["floor"], 95)),
+            size,
+        )
 
 
 def _pairwise(simulated) -> dict[str, Callable]:

@@ -93,6 +93,14 @@ class SampleCollector:
         patches : Patches or None
             Of the same chunks.
         """
-        cells, edges = self._cells, self._edges
-        return ChannelSample(cells.cells(), cells.share, edges.edges(), edges.share,
-                           cells.points(), cells.point_share, patches)  # fmt: skip
+        cells = self._cells
+        edges = self._edges
+        return ChannelSample(
+            cells.cells(),
+            cells.share,
+            edges.edges(),
+            edges.share,
+            cells.points(),
+            cells.point_share,
+            patches,
+        )

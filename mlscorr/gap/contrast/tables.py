@@ -67,11 +67,17 @@ class ContrastTable:
         """
         value = np.exp(self.value) if is_ratio else self.value
         columns = {
-            "real": self.real, "simulated": self.simulated, "value": value,
+            "real": self.real,
+            "simulated": self.simulated,
+            "value": value,
             "sigma": self.sigma * value if is_ratio else self.sigma,
-            "blocks": np.round(self.blocks, 1), "differs": self.differs,
-        }  # fmt: skip
-        place = {"bins": list(self.bins)} if self.edges is None else {"edges": list(self.edges)}
+            "blocks": np.round(self.blocks, 1),
+            "differs": self.differs,
+        }
+        if self.edges is None:
+            place = {"bins": list(self.bins)}
+        else:
+            place = {"edges": list(self.edges)}
         return {"by": self.by} | place | {name: c.tolist() for name, c in columns.items()}
 
 
@@ -144,7 +150,8 @@ class Measure:
         ----------
         split : Binning
         """
-        edges, bins = split.edges, split.bins
+        edges = split.edges
+        bins = split.bins
         if edges is None:
             sums = sums_by_block(self.block, split.values, len(bins), self.columns)
         else:

@@ -63,14 +63,17 @@ def refine_events(
         if not signatures[member].kind.moment() or evidence.gain[best, 0] < SETTINGS.refinement:
             continue
         numbers = [
-            i for i, block in enumerate(bank.blocks)
+            i
+            for i, block in enumerate(bank.blocks)
             if block.label == label and block.member == member
-        ]  # fmt: skip
+        ]
         score = evidence.by_model[:, numbers].max(axis=1)
         models = tuple(evidence.models[s] for s in np.argsort(-score)[:3])  # others add little
-        share, none = sum(bank.blocks[i].weight for i in numbers), float(evidence.total[0])
+        share = sum(bank.blocks[i].weight for i in numbers)
+        none = float(evidence.total[0])
         search = _Search(rows, survey, observations, models, none)
-        event, times = signatures[member], [s.fixed["time"] for s in signatures if s.name == label]
+        event = signatures[member]
+        times = [s.fixed["time"] for s in signatures if s.name == label]
         refined[label] = search.best(event, share, spacing_of(times))
     return refined
 
@@ -87,7 +90,9 @@ def spacing_of(times: Sequence[float]) -> float:
     2.0
     """
     apart = np.diff(np.unique(times))
-    return float(np.median(apart)) if len(apart) else SIGNATURES.step_spacing
+    if len(apart):
+        return float(np.median(apart))
+    return SIGNATURES.step_spacing
 
 
 @dataclass(frozen=True)
@@ -115,7 +120,9 @@ class _Search:
             return None
         if is_of_one_target(self.rows, moved.jacobian):
             return None
-        return moved if moved.jacobian[self.rows.metric].any() else None
+        if moved.jacobian[self.rows.metric].any():
+            return moved
+        return None
 
     def best(self, event, share, spacing):
         """The RefinedEvent near an event of the bank with a prior share."""
@@ -130,9 +137,11 @@ class _Search:
         there are peaks beside the highest. The most probable interval, among those a part of the
         spacing apart, then by halves.
         """
-        time, parts = event.fixed["time"], int(4 / SETTINGS.event_steps[-1])
+        time = event.fixed["time"]
+        parts = int(4 / SETTINGS.event_steps[-1])
         edges = self._edges(time, 2 * spacing)
-        middle, length = (edges[1:] + edges[:-1]) / 2, np.diff(edges)
+        middle = (edges[1:] + edges[:-1]) / 2
+        length = np.diff(edges)
         times = np.append(np.linspace(edges[0], edges[-1], parts)[1:-1], time)
         number = np.unique(np.searchsorted(edges, times) - 1)
         tried = {i: self._at(event, middle[i]) for i in number.tolist()}
@@ -151,7 +160,8 @@ class _Search:
 
     def _edges(self, time, span):
         """Times near one at which an event changes other rows: of rows and passes. Units: s."""
-        rows, passes = self.rows, self.survey.trajectory.passes.ravel()
+        rows = self.rows
+        passes = self.survey.trajectory.passes.ravel()
         times = rows.gps_time[rows.metric], rows.gps_time_2[rows.two_times]
         known = np.unique(np.round(np.concatenate([passes, *times]) - rows.reference.start, 2))
         known = known[np.abs(known - time) < span]
@@ -160,30 +170,40 @@ class _Search:
     def _at(self, event, time):
         """Score, table and signature at another time; minus infinity where there is none."""
         moved = self.moved(event, time=round(float(time), 3))
-        return (-np.inf, None, None) if moved is None else (*self.score(moved), moved)
+        if moved is None:
+            return (-np.inf, None, None)
+        return (*self.score(moved), moved)
 
     def _by_steps(self, event):
         """An event with a width: by halves, until the evidence falls by less than a factor e to
         all sides; a drift of metres tells its time to milliseconds.
         """
         gain, table = self.score(event)
-        keys, step, fall = event.kind.moment(), 2 * SETTINGS.event_steps[0], np.inf
+        keys = event.kind.moment()
+        step = 2 * SETTINGS.event_steps[0]
+        fall = np.inf
         while step > SETTINGS.event_steps[-1] or fall > 1:
-            step, gained = step / 2, True
+            step = step / 2
+            gained = True
             while gained:
-                gained, fall = False, 0.0
+                gained = False
+                fall = 0.0
                 for key, sign in product(keys, (-1, 1)):
                     moved = self._changed(event, key, sign * step)
                     value, other = (-np.inf, None) if moved is None else self.score(moved)
                     if value > gain:
-                        event, gain, table, gained = moved, value, other, True
+                        event = moved
+                        gain = value
+                        table = other
+                        gained = True
                     elif moved is not None:
                         fall = max(fall, gain - value)
         return event, gain, table, {key: self._sigma(event, key, gain, step) for key in keys}
 
     def _changed(self, event, key, step):
         """The signature with another time or width, or None where there is none."""
-        time, width = event.fixed["time"], event.fixed["width"]
+        time = event.fixed["time"]
+        width = event.fixed["width"]
         if key == "time":
             return self.moved(event, time=round(time + step * width, 3))
         return self.moved(event, width=float(width * np.exp(2 * step)))

@@ -59,13 +59,16 @@ def extent_of(values: np.ndarray, square: np.ndarray, turn: float | None = None)
     """
     values = _opened(values, turn)
     places, number = np.unique(values, return_inverse=True)
-    count, amplitude = np.bincount(number), np.bincount(number, np.sqrt(square))
+    count = np.bincount(number)
+    amplitude = np.bincount(number, np.sqrt(square))
     if len(places) < 3 or not square.any():
         return None
     cuts = np.unique(np.linspace(0, len(places), min(len(places), CUTS) + 1).astype(int))
     rows, sums = (np.append(0, np.cumsum(v))[cuts] for v in (count, amplitude))
-    n, total = rows[-1], sums[-1]
-    inside, moved = rows[None, :] - rows[:, None], sums[None, :] - sums[:, None]
+    n = rows[-1]
+    total = sums[-1]
+    inside = rows[None, :] - rows[:, None]
+    moved = sums[None, :] - sums[:, None]
     outside = n - inside
     with np.errstate(divide="ignore", invalid="ignore"):
         difference = moved / inside - (total - moved) / outside
@@ -74,12 +77,15 @@ def extent_of(values: np.ndarray, square: np.ndarray, turn: float | None = None)
     first, last = np.unravel_index(np.argmax(score), score.shape)
     if score[first, last] <= 0:
         return None
-    a, b = cuts[first], cuts[last]
+    a = cuts[first]
+    b = cuts[last]
     here = (number >= a) & (number < b)
     share = float(square[here].sum() / square.sum())
     half = 0.5 * np.diff(places)
     half = np.concatenate([[0.0], np.where(half > 10 * np.median(half), 0.0, half), [0.0]])
-    low, high = places[a] - half[a], places[b - 1] + half[b]  # no farther into a gap
+    # no farther into a gap
+    low = places[a] - half[a]
+    high = places[b - 1] + half[b]
     return Extent(float(low), float(high), share, float(here.mean()))
 
 
@@ -90,4 +96,6 @@ def _opened(values, turn):
     known = np.sort(values)
     steps = np.diff(known, append=known[0] + turn)
     cut = known[int(np.argmax(steps))]
-    return np.where(values <= cut, values + turn, values) if steps[-1] < steps.max() else values
+    if steps[-1] < steps.max():
+        return np.where(values <= cut, values + turn, values)
+    return values

@@ -81,7 +81,8 @@ def weigh_noise(
     channels : (q, k) array
         Residuals of the rows without a metre.
     """
-    results, rate = [], rows.channel == "return_rate"
+    results = []
+    rate = rows.channel == "return_rate"
     for number, signature in enumerate(signatures):
         if not (signature.is_noise or signature.jacobian[rate].any()):
             continue
@@ -131,10 +132,12 @@ def draw_channels(rows: Rows, rng: np.random.Generator | None, number: int) -> n
     channels : (q, 1 + number) array
     """
     here = np.isin(rows.channel, CHANNELS)
-    values, rough = rows.residual[here][:, None], rows.channel[here] == "roughness"
+    values = rows.residual[here][:, None]
+    rough = rows.channel[here] == "roughness"
     if not number:
         return values
-    variance, share = rows.noise[here], np.zeros(len(values))
+    variance = rows.noise[here]
+    share = np.zeros(len(values))
     if rough.any():
         fits = _roughness(values[rough], np.zeros(rough.sum()), variance[rough])
         _, variance[rough], best = max(fits, key=lambda fit: fit[2].best[0])
@@ -162,9 +165,10 @@ def _own(observations, signature, evidence, residual, size):
     best = int(np.argmax(evidence.none[:, 0]))
     calm = replace(evidence.models[best], noise=1.0)
     variance = signature.variance[observations.row] * observations.half
-    return np.array([
-        model_likelihood(observations, calm, residual, x**2 * variance) for x in size
-    ]) - evidence.none[best]  # fmt: skip
+    return (
+        np.array([model_likelihood(observations, calm, residual, x**2 * variance) for x in size])
+        - evidence.none[best]
+    )
 
 
 def channel_means(rows: Rows, signature: Signature, size: np.ndarray) -> np.ndarray:
@@ -177,8 +181,10 @@ def channel_means(rows: Rows, signature: Signature, size: np.ndarray) -> np.ndar
         Of the noise.
     size : (x,) array
     """
-    here, x = np.isin(rows.channel, CHANNELS), np.asarray(size)[:, None]
-    growth, shift = signature.growth[here], signature.jacobian[here, 0]
+    here = np.isin(rows.channel, CHANNELS)
+    x = np.asarray(size)[:, None]
+    growth = signature.growth[here]
+    shift = signature.jacobian[here, 0]
     return np.where(rows.channel[here] == "roughness", np.log1p(growth * x**2), x * shift)
 
 
@@ -198,7 +204,8 @@ def channel_evidence(
     if not means.any():
         return np.zeros((len(size), values.shape[1]))
     here = np.isin(rows.channel, CHANNELS)
-    rough, noise = rows.channel[here] == "roughness", rows.noise[here]
+    rough = rows.channel[here] == "roughness"
+    noise = rows.noise[here]
     likelihood = np.array([_channel_likelihood(values, mean, rough, noise) for mean in means])
     return likelihood[1:] - likelihood[0]
 
@@ -221,7 +228,8 @@ def _channel_likelihood(values, mean, rough, noise):
 
 def _roughness(values, mean, noise) -> list[tuple[float, np.ndarray, MixtureFit]]:
     """Weight, variance (q,) and fit under each scatter between patches."""
-    density, fits = 1 / SETTINGS.odd_span, []
+    density = 1 / SETTINGS.odd_span
+    fits = []
     for sigma, weight in SETTINGS.roughness:
         variance = noise + sigma**2
         fits.append((weight, variance, fit_mixture(values, mean, variance, density)))

@@ -65,7 +65,8 @@ def with_absence(probability: dict[str, float], absence: Absence) -> dict[str, f
     """
     if not absence.runs:
         return probability
-    prior, none = dict(SETTINGS.prior), probability["none"]
+    prior = dict(SETTINGS.prior)
+    none = probability["none"]
     hidden = prior["unknown"] / prior["none"]
     moved = none * hidden / (hidden + min(absence.chance, hidden))
     weight = probability | {"none": none - moved, "unknown": probability["unknown"] + moved}
@@ -91,7 +92,8 @@ def decide(
     costs : Costs, optional
         Of wrong answers.
     """
-    by_rows, is_hidden = probability, False
+    by_rows = probability
+    is_hidden = False
     if absence is not None:
         probability = with_absence(by_rows, absence)
         is_hidden = bool(absence.runs) and by_rows["none"] > by_rows["unknown"]
@@ -129,14 +131,19 @@ def joint_score(
         Of these.
     """
     score = {name: float(values[0]) for name, values in evidence.score.items()}
-    single, best = dict(score), _best_effect(evidence)
-    given, refined = {}, {}
+    single = dict(score)
+    best = _best_effect(evidence)
+    given = {}
+    refined = {}
     for first in _accepted(evidence, score, best):
         regained, beside, events = _given(rows, survey, signatures, evidence, first)
         base = score[first] = score[first] + regained
         given[first] = {name: gain for name, gain in beside.items() if name != first}
         for name, gain in given[first].items():
-            label = "unknown" if name == "unknown" else _joined(evidence, first, name)
+            if name == "unknown":
+                label = "unknown"
+            else:
+                label = _joined(evidence, first, name)
             score[label] = np.logaddexp(score.get(label, -np.inf), base + gain)
             if name in events:
                 refined[label] = events[name]
@@ -160,7 +167,9 @@ def _accepted(evidence, score, best):
     causes = [name for name in order if score[name] - total > np.log(1 - SETTINGS.confidence)][:2]
     noisy = evidence.noisy
     causes = [name for name in causes if name not in noisy or effect_class(name).is_of_pose()]
-    return causes if best is None or best in causes else [best, *causes]
+    if best is None or best in causes:
+        return causes
+    return [best, *causes]
 
 
 def _facts(rows, evidence, best):
@@ -203,14 +212,17 @@ def best_member(
     """
     event = evidence.event(name, label)
     best = evidence.table.blocks[evidence.best(name)]
-    return signatures[best.member] if event is None else event.signature
+    if event is None:
+        return signatures[best.member]
+    return event.signature
 
 
 def _best_columns(evidence, name):
     """Columns (m, p), scaled, of one label's best member; an event's is refined."""
     if name in evidence.refined:
         return evidence.refined[name].table.columns
-    table, member = evidence.table, evidence.table.blocks[evidence.best(name)].member
+    table = evidence.table
+    member = evidence.table.blocks[evidence.best(name)].member
     blocks = [b for b in table.blocks if b.label == name and b.member == member]
     return table.columns[:, max(blocks, key=lambda block: len(block.columns)).columns]
 
@@ -221,9 +233,12 @@ def _given(rows, survey, signatures, evidence, first):
 
     Scores are logs of prior times evidence over that of the one alone.
     """
-    observations, table = evidence.observations, evidence.table
-    residual, regained = observations.columns(rows.residual[:, None]), 0.0
-    prior, is_noise = dict(SETTINGS.prior_beside), first == PositionNoise.name
+    observations = evidence.observations
+    table = evidence.table
+    residual = observations.columns(rows.residual[:, None])
+    regained = 0.0
+    prior = dict(SETTINGS.prior_beside)
+    is_noise = first == PositionNoise.name
     if is_noise:
         models = noisy_pos_models() + models_with_windows(evidence.noise)
         models = suited_models(observations, table, models, residual)
@@ -249,7 +264,8 @@ def _given(rows, survey, signatures, evidence, first):
 
 def _regained(evidence, name, models, residual):
     """By how much the log evidence of a label over none grows with models that suit it."""
-    columns, block = _best_columns(evidence, name), evidence.table.blocks[evidence.best(name)]
+    columns = _best_columns(evidence, name)
+    block = evidence.table.blocks[evidence.best(name)]
     table = ColumnTable(columns, (replace(block, columns=np.arange(columns.shape[1])),))
     known = evidence.blocks.models
     blocks = weigh_blocks(

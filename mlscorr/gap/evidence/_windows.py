@@ -94,10 +94,15 @@ def weigh_windows(
     score = _excess(observations, left, (), bank)
     largest = np.argsort(-score[:, 0], kind="stable")[: SETTINGS.shortlist]
     chosen = np.append(largest, np.setdiff1d(np.argmax(score, axis=0), largest))
-    likelihood = np.array([
-        [_score(observations, residual, base, (bank[i]._replace(factor=factor),)) for i in chosen]
-        for factor in SETTINGS.window_factors
-    ])  # fmt: skip
+    likelihood = np.array(
+        [
+            [
+                _score(observations, residual, base, (bank[i]._replace(factor=factor),))
+                for i in chosen
+            ]
+            for factor in SETTINGS.window_factors
+        ]
+    )
     factor, place = np.unravel_index(np.argmax(likelihood[:, :, 0]), likelihood.shape[:2])
     windows = (bank[chosen[place]]._replace(factor=SETTINGS.window_factors[factor]),)
     metric = np.logaddexp.reduce(likelihood - evidence.total, axis=1)
@@ -105,7 +110,8 @@ def weigh_windows(
     if metric[:, 0].max() > SETTINGS.refinement:
         windows, metric[:, 0] = _Search(observations, residual[:, :1], left[:, :1], bank).best()
         metric[:, 0] -= evidence.total[0]
-    nothing, size = np.zeros_like(metric), np.asarray(SETTINGS.window_factors)
+    nothing = np.zeros_like(metric)
+    size = np.asarray(SETTINGS.window_factors)
     return (WindowEvidence(PositionNoise.name, -1, size, metric, nothing, windows),)
 
 
@@ -127,7 +133,8 @@ def _excess(observations, residual, windows, bank):
 
     Not of innovations: where GNSS is back, these are largest after the window.
     """
-    errors, row = observations.errors, observations.row
+    errors = observations.errors
+    row = observations.row
     growth = np.hypot(window_growth(windows, errors.gps_time), errors.growth)
     signal = errors.position**2 * (1 + growth**2) + errors.attitude**2
     variance = np.bincount(row, signal.sum(axis=1) + errors.own, observations.rows)[row]
@@ -177,7 +184,8 @@ class _Search:
             value = self.score(base, more) + prior * len(more) - np.log(2) * len(windows)
             if value <= evidence:
                 break
-            windows, evidence = more, value
+            windows = more
+            evidence = value
         if windows == first and first[0].shape == HUMP:
             base, windows = self._first((RISE,))
             evidence = self.score(base, windows) + prior
@@ -209,8 +217,10 @@ class _Search:
     def _refined(self, base, windows):
         """The last window with its start, end and factor where the likelihood is largest."""
         *others, window = windows
-        time, least = self.observations.errors.gps_time, SETTINGS.window_lengths[0]
-        first, last = time[0] - least, time[-1] + least
+        time = self.observations.errors.gps_time
+        least = SETTINGS.window_lengths[0]
+        first = time[0] - least
+        last = time[-1] + least
         best = (window.start, window.end, window.factor)
 
         def score(edges):
@@ -228,7 +238,8 @@ class _Search:
             for key, change in product(range(3), (-step, step)):
                 edges = _moved(best, key, change)
                 if (value := score(edges)) > top:
-                    best, top = edges, value
+                    best = edges
+                    top = value
         start, end, factor = (float(v) for v in best)
         return (*others, Window(start, end - start, factor, window.shape))
 

@@ -17,5 +17,6 @@ def calibration_error(stated: np.ndarray, hit: np.ndarray) -> float:
         One where it was right, else zero.
     """
     bins = np.clip((stated * BINS).astype(int), 0, BINS - 1)
-    return float(sum(abs(np.sum(stated[bins == b] - hit[bins == b])) for b in range(BINS))
-                 / len(stated))  # fmt: skip
+    return float(
+        sum(abs(np.sum(stated[bins == b] - hit[bins == b])) for b in range(BINS)) / len(stated)
+    )

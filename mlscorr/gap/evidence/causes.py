@@ -76,7 +76,10 @@ class Cause:
             if part.kind.moment():
                 time = trajectory.gps_time[0] + part.fixed["time"]
                 half = np.sqrt(2 * np.log(2)) * part.fixed.get("width", 0.0)
-                end = time + half if half else trajectory.passes[trajectory.segment(time)][1]
+                if half:
+                    end = time + half
+                else:
+                    end = trajectory.passes[trajectory.segment(time)][1]
                 stretches.append((part.name, float(time - half), float(end)))
         for start, length, *_ in self.model.windows:
             stretches.append((PositionNoise.name, start, start + length))
@@ -157,7 +160,8 @@ def infer_causes(
     joint, evidence = joint_score(rows, survey, signatures, evidence)
     probability = learned().probabilities(joint)
     verdict = decide(evidence, probability, absence, costs)
-    probability = probability if absence is None else with_absence(probability, absence)
+    if absence is not None:
+        probability = with_absence(probability, absence)
     names = [n for n in probability if n not in ("none", "unknown")]
     names = [
         name
@@ -173,7 +177,10 @@ def infer_causes(
     best = first
     left = rows.residual - best.shift
     models = _likely_models(evidence, left, rng, max(replicas, 20), best.model.windows)
-    acts = best.stretches(survey.trajectory) if len(best.parts) < 2 else ()
+    if len(best.parts) < 2:
+        acts = best.stretches(survey.trajectory)
+    else:
+        acts = ()
     acts = acts[0][1:] if len(acts) == 1 else None  # several are no stretch
     where = locate(rows, background, best.shift, rng, models, best.model, best.extra, acts)
     compared = compare_signatures(evidence.observations, signatures, evidence.blocks.models[0])
@@ -186,10 +193,12 @@ def _likely_models(evidence, residual, rng, number, windows):
     columns = evidence.observations.columns(residual[:, None])
     # with windows all are open: those that were relevant were chosen without them
     models = error_models() if windows else evidence.blocks.models
-    score = np.concatenate([
-        model_likelihood(evidence.observations, replace(model, windows=windows), columns)
-        for model in models
-    ])  # fmt: skip
+    score = np.concatenate(
+        [
+            model_likelihood(evidence.observations, replace(model, windows=windows), columns)
+            for model in models
+        ]
+    )
     count = rng.multinomial(number, shares(score))
     return [model for model, times in zip(models, count, strict=True) for _ in range(times)]
 
@@ -224,7 +233,9 @@ def cause_of(
         return Cause(label, probability, (), (), shift)
     if label == "unknown":
         return Cause(label, probability, (), (), _unknown_shift(rows, evidence))
-    names, parameters, parts = label.split("+"), (), ()
+    names = label.split("+")
+    parameters = ()
+    parts = ()
     steady = [name for name in names if name not in evidence.noisy]
     if steady:
         members = [best_member(signatures, evidence, n, "+".join(steady)) for n in steady]
@@ -242,7 +253,8 @@ def _with_noise(cause, rows, signatures, evidence, name):
     classes = [each for each in evidence.noise if each.label == name]
     best = max(classes, key=lambda each: each.gain[0])
     if isinstance(best, WindowEvidence):
-        more, model = window_parameters(best.windows), replace(cause.model, windows=best.windows)
+        more = window_parameters(best.windows)
+        model = replace(cause.model, windows=best.windows)
         return replace(cause, parameters=cause.parameters + more, model=model)
     size, sigma = most_probable_size(best.size, best.by_size[:, 0])
     if best.member < 0:
@@ -267,8 +279,10 @@ def _with_noise(cause, rows, signatures, evidence, name):
 
 def _unknown_shift(rows, evidence):
     """What the leading unknown block makes of the residuals (m,)."""
-    observations, columns = evidence.observations, evidence.table.columns[:, evidence.lead()[1]]
+    observations = evidence.observations
+    columns = evidence.table.columns[:, evidence.lead()[1]]
     residual = observations.columns(rows.residual[:, None])[:, 0]
-    weight, models = evidence.blocks.none[:, 0], evidence.blocks.models
+    weight = evidence.blocks.none[:, 0]
+    models = evidence.blocks.models
     fit = fit_amplitudes(observations, models, weight, residual, observations.columns(columns))
     return columns @ fit.estimate

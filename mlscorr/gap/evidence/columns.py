@@ -97,7 +97,8 @@ def column_table(
         Stated one of each row by the POS's position. Units: m.
     """
     metric = rows.metric
-    parts, blocks = [np.zeros((len(rows), 0))], []
+    parts = [np.zeros((len(rows), 0))]
+    blocks = []
     members = Counter(signature.name for signature in signatures)
 
     def add(columns, block):
@@ -118,11 +119,14 @@ def column_table(
         elif signature.kind.is_on_target():
             survey = _rms_of(np.sqrt(rows.survey + rows.noise), signature.jacobian)
             least = SETTINGS.outlier * survey
-        p, share = len(used), 1 / members[signature.name]
+        p = len(used)
+        share = 1 / members[signature.name]
         every = ColumnBlock(signature.name, number, np.arange(p), share, least)
         is_vector = p > 1 and not signature.kind.is_wave()
-        add(signature.jacobian[:, used] / scale[used], replace(
-            every, weight=share / 2 if is_vector else share))  # fmt: skip
+        add(
+            signature.jacobian[:, used] / scale[used],
+            replace(every, weight=share / 2 if is_vector else share),
+        )
         single = replace(every, weight=share / 2 / p)  # each component of a vector, evenly
         blocks += [replace(single, columns=np.array([c])) for c in blocks[-1].columns if is_vector]
     events = any(signature.kind.moment() for signature in signatures)
@@ -168,7 +172,9 @@ def _rms(column):
     """Root mean square over the rows that a column changes; zero where it changes none."""
     size = np.abs(column)
     changed = size > SETTINGS.changed * size.max(initial=0.0)
-    return float(np.sqrt(np.mean(column[changed] ** 2))) if changed.any() else 0.0
+    if changed.any():
+        return float(np.sqrt(np.mean(column[changed] ** 2)))
+    return 0.0
 
 
 def block_groups(table: ColumnTable) -> Iterator[tuple[np.ndarray, np.ndarray, tuple[float, ...]]]:

@@ -103,7 +103,8 @@ def features(joint: JointScore) -> dict[str, float]:
     base = joint.score["none"]
     by_kind = _by_kind(joint.single, joint.noisy)
     effects = sorted(by_kind["effect"], reverse=True)
-    noise, unknown = _total(by_kind["noise"]) - base, _total(by_kind["unknown"]) - base
+    noise = _total(by_kind["noise"]) - base
+    unknown = _total(by_kind["unknown"]) - base
     effect, pair, joined = (
         _total(joint.of_kind(kind).values()) - base for kind in ("effect", "pair", "unknown")
     )
@@ -143,7 +144,9 @@ def _by_kind(score, noisy):
 
 def _total(values: Iterable[float]) -> float:
     values = list(values)
-    return float(np.logaddexp.reduce(values)) if values else ABSENT
+    if values:
+        return float(np.logaddexp.reduce(values))
+    return ABSENT
 
 
 @dataclass(frozen=True)
@@ -181,7 +184,8 @@ class LearnedDecision:
             np.array(document[key]) for key in ("mean", "scale", "weights", "bias")
         )
         a, b = document["p_value"]
-        names, sharpness = tuple(document["names"]), document["sharpness"]
+        names = tuple(document["names"])
+        sharpness = document["sharpness"]
         return cls(names, mean, scale, weights, bias, sharpness, (a, b))
 
     def standardised(self, values: Sequence[float]) -> np.ndarray:
@@ -212,7 +216,10 @@ class LearnedDecision:
             labels = joint.of_kind(kind)
             factor, floor = self.sharpness.get(kind, (1.0, 0.0))
             score = factor * np.array(list(labels.values()))
-            parts = np.exp(score - np.logaddexp.reduce(score)) if len(score) else score
+            if len(score):
+                parts = np.exp(score - np.logaddexp.reduce(score))
+            else:
+                parts = score
             parts = (1.0 - floor) * parts + floor / max(len(score), 1)
             share |= dict(zip(labels, probability * parts, strict=True))
         return {name: float(share[name]) for name in sorted(share, key=lambda n: -share[n])}
@@ -246,7 +253,8 @@ def cheapest(probability: dict[str, float], noisy: Collection[str], costs: Costs
     costs : Costs
     """
     calm = {n: kind_of(n, noisy) in ("none", "noise") for n in probability}
-    none, no_cause = probability["none"], sum(p for name, p in probability.items() if calm[name])
+    none = probability["none"]
+    no_cause = sum(p for name, p in probability.items() if calm[name])
 
     def cost(label):
         right = probability[label]

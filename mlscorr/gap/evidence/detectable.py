@@ -46,7 +46,10 @@ def detectable_size(
     size : float
         In the effect's unit, within a fifth; nan where none within 4 000 times the usual one is.
     """
-    shown = _channels if channel_means(rows, kind, kind.typical).any() else _metric
+    if channel_means(rows, kind, kind.typical).any():
+        shown = _channels
+    else:
+        shown = _metric
     bias_evidence = 0.5 * (mdb * SETTINGS.detectable) ** 2
 
     def excess(doublings):
@@ -56,7 +59,8 @@ def detectable_size(
     at = excess(doublings := 0)
     way = -1 if at > 0 else 1
     while ((after := excess(doublings + way)) > 0) == (at > 0):
-        at, doublings = after, doublings + way
+        at = after
+        doublings = doublings + way
         if abs(doublings) == DOUBLINGS:
             return np.nan
     return float(kind.typical[0] * 2.0 ** (doublings + way * at / (at - after)))
@@ -68,7 +72,8 @@ def _channels(rows, _observations, kind, size):
     What the residuals scatter by is taken with both signs: their product with the mean, which is
     chance, falls out of the sum of the two.
     """
-    mean, residual = np.zeros(len(rows)), draw_channels(rows, None, 0)
+    mean = np.zeros(len(rows))
+    residual = draw_channels(rows, None, 0)
     here = np.isin(rows.channel, CHANNELS)
     mean[here] = channel_means(rows, kind, np.array([size]))[0]
     values = np.hstack([mean[here, None] + residual, mean[here, None] - residual])

@@ -66,7 +66,8 @@ def weigh_blocks(
         Units: m.
     table : ColumnTable
     """
-    groups, k = list(block_groups(table)), residual.shape[1]
+    groups = list(block_groups(table))
+    k = residual.shape[1]
     columns = observations.columns(table.columns)
     none = np.empty((len(models), k))
     total = np.full((len(table.blocks), k), -np.inf)
@@ -74,7 +75,8 @@ def weigh_blocks(
     for s, model in enumerate(models):
         whitener = observations.whitener(model)
         white = whitener.whiten(np.hstack([residual, columns]))
-        y, a = white[slice(k)], white[slice(k, None)]
+        y = white[slice(k)]
+        a = white[slice(k, None)]
         none[s] = np.log(model.weight) + whitener.log_likelihood(y)
         projected = a.product(y)
         for index, numbers, amplitudes in groups:
@@ -97,11 +99,18 @@ def without_known(observations: Observations, table: ColumnTable) -> ColumnTable
     normal = white.product(white)
     length = np.sqrt(np.maximum(np.diag(normal), 1e-300))
     normal /= np.outer(length, length)
-    known = np.array([
-        np.einsum("cp,pq,cq->c", normal[:, x], np.linalg.pinv(normal[np.ix_(x, x)], 1e-9),
-                  normal[:, x]) > SETTINGS.same
-        for x in (block.columns for block in table.blocks if block.label in table.steady)
-    ])  # fmt: skip
+    known = np.array(
+        [
+            np.einsum(
+                "cp,pq,cq->c",
+                normal[:, x],
+                np.linalg.pinv(normal[np.ix_(x, x)], 1e-9),
+                normal[:, x],
+            )
+            > SETTINGS.same
+            for x in (block.columns for block in table.blocks if block.label in table.steady)
+        ]
+    )
     if len(known) == 0:
         return table
     keep = [
@@ -170,7 +179,8 @@ def suited_models(
         Units: m.
     """
     steady = steady_columns(observations, table)
-    time, place = observations.errors.gps_time, observations.errors.place
+    time = observations.errors.gps_time
+    place = observations.errors.place
     time = time - time[0]
     wave = np.arange(12) * np.pi * time[:, None] / max(time[-1], 1e-9)
     slow = (np.cos(wave)[:, :, None] * place[:, None]).reshape(len(observations), -1)

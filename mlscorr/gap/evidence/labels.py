@@ -81,7 +81,8 @@ class LabelEvidence:
 
     def likely_model(self, label: str) -> ErrorModel:
         """The ErrorModel that is most probable when a label, or the first of two, acts."""
-        name, score = label.split("+", maxsplit=1)[0], self.blocks.none[:, 0]
+        name = label.split("+", maxsplit=1)[0]
+        score = self.blocks.none[:, 0]
         if name in self.table.labels:
             score = self.blocks.by_model[:, self.table.of(name)].max(axis=1)
         return self.blocks.models[int(np.argmax(score))]
@@ -191,7 +192,8 @@ def noise_scores(noise: Sequence[NoiseEvidence], prior: dict[str, float]) -> dic
     prior : dict
         Holds that of noise.
     """
-    labels, scores = list(dict.fromkeys(each.label for each in noise)), {}
+    labels = list(dict.fromkeys(each.label for each in noise))
+    scores = {}
     for label in labels:
         gain = [each.gain for each in noise if each.label == label]
         mean = np.logaddexp.reduce(gain, axis=0) - np.log(len(gain))
@@ -211,7 +213,8 @@ def p_value(score: dict[str, np.ndarray]) -> float:
     """
     against = [values for label, values in score.items() if label != "none"]
     against = np.logaddexp.reduce(against, axis=0)
-    observed, replicas = against[0], np.sort(against[1:])
+    observed = against[0]
+    replicas = np.sort(against[1:])
     if len(replicas) == 0:
         return float("nan")
     upper = replicas[int(0.8 * len(replicas)) :]

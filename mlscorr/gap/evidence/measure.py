@@ -71,7 +71,9 @@ def gap_kind(label: str, noisy: Iterable[str], rows: Rows) -> str:
     if all(kind.stage == "return" for kind in kinds):
         return "returns"
     rough = (rows.channel == "roughness").any()
-    return "scatter" if rough and not any(kind.is_of_pose() for kind in kinds) else "position"
+    if rough and not any(kind.is_of_pose() for kind in kinds):
+        return "scatter"
+    return "position"
 
 
 def signed_root(square: np.ndarray, unit: str = "mm") -> np.ndarray:
@@ -100,7 +102,8 @@ class Explanations:
     @classmethod
     def of(cls, table: ColumnTable, columns: np.ndarray) -> Explanations:
         """See the class."""
-        normal, modes = columns.T @ columns, []
+        normal = columns.T @ columns
+        modes = []
         for index, numbers, _ in block_groups(table):
             value, vector = np.linalg.eigh(normal[index[:, :, None], index[:, None, :]])
             modes.append((numbers, index, np.maximum(value, 0.0), vector))
@@ -120,14 +123,18 @@ class Explanations:
         square : (k,) array
         block : (k,) int array
         """
-        free, projected, k = SETTINGS.free_sigma, self.columns.T @ innovations, innovations.shape[1]
-        scores, numbers = [np.full((1, k), -np.inf)], [np.array([-1])]
+        free = SETTINGS.free_sigma
+        projected = self.columns.T @ innovations
+        k = innovations.shape[1]
+        scores = [np.full((1, k), -np.inf)]
+        numbers = [np.array([-1])]
         for number, index, value, vector in self.modes:
             square = (vector.swapaxes(1, 2) @ projected[index]) ** 2
             explained = (square / (value + free**-2)[:, :, None]).sum(axis=1)
             scores.append(explained - (value * free**2 > 1).sum(axis=1)[:, None])
             numbers.append(number)
-        score, number = np.vstack(scores), np.concatenate(numbers)
+        score = np.vstack(scores)
+        number = np.concatenate(numbers)
         best = score.argmax(axis=0)
         return score[best, np.arange(k)], number[best]
 
@@ -213,4 +220,6 @@ def simulated_variance(
     variance += model.attitude[0] ** 2 * (e.attitude**2).sum(axis=1)
     variance += model.fixes**2 * (e.place**2).sum(axis=1) + model.noise**2 * e.own
     variance += (observations.shared**2).sum(axis=1)
-    return variance if extra is None else variance + extra[observations.row] * observations.half
+    if extra is None:
+        return variance
+    return variance + extra[observations.row] * observations.half

@@ -121,9 +121,11 @@ class Observations(Columns):
             )
         leg = np.flatnonzero(_affordable(rows)[background.row])
         leg = leg[np.argsort(background.gps_time[leg], kind="stable")]
-        row, time = background.row[leg], background.gps_time[leg]
+        row = background.row[leg]
+        time = background.gps_time[leg]
         double = rows.two_times[row]
-        first, half = double & (time == rows.gps_time[row]), np.where(double, 0.5, 1.0)
+        first = double & (time == rows.gps_time[row])
+        half = np.where(double, 0.5, 1.0)
         partials = np.where((first | ~double)[:, None], rows.partials[row], rows.partials_2[row])
         survey = rows.survey_design()[row]
         often = np.diff(survey.tocsc().indptr) > 1  # columns
@@ -176,7 +178,10 @@ class Observations(Columns):
             When V is not positive definite.
         """
         plain = np.ndim(extra) == 0 and extra == 0.0
-        separate = _factored(self.errors, model) if plain else _factor(self.errors, model, extra)
+        if plain:
+            separate = _factored(self.errors, model)
+        else:
+            separate = _factor(self.errors, model, extra)
         return separate.with_common(self.shared)
 
 

@@ -58,8 +58,11 @@ def fit_amplitudes(
     """
     weight = np.exp(log_weight - np.logaddexp.reduce(log_weight))
     used = np.flatnonzero(weight > 0.01 * weight.max())
-    weight, p = weight[used] / weight[used].sum(), columns.shape[1]
-    means, covariances, information = [], [], np.zeros(p)
+    weight = weight[used] / weight[used].sum()
+    p = columns.shape[1]
+    means = []
+    covariances = []
+    information = np.zeros(p)
     for w, s in zip(weight, used.tolist(), strict=True):
         white = observations.whitener(models[s]).whiten(np.column_stack([columns, residual]))
         normal = white.product(white)
@@ -95,7 +98,8 @@ def effect_parameters(
     shift : (m,) array
         What they make of the residuals.
     """
-    jacobian, observations = np.hstack([m.jacobian for m in members]), evidence.observations
+    jacobian = np.hstack([m.jacobian for m in members])
+    observations = evidence.observations
     scale = np.abs(jacobian[rows.metric]).max(axis=0)
     scale[scale == 0] = 1.0
     named = [i for i, block in enumerate(evidence.table.blocks) if block.label in labels]
@@ -103,9 +107,12 @@ def effect_parameters(
     residual = observations.columns(rows.residual[:, None])[:, 0]
     columns = observations.columns(jacobian / scale)
     fit = fit_amplitudes(observations, evidence.blocks.models, weight, residual, columns)
-    value, sigma = fit.estimate / scale, np.sqrt(np.diag(fit.covariance)) / scale
+    value = fit.estimate / scale
+    sigma = np.sqrt(np.diag(fit.covariance)) / scale
     detectable = SETTINGS.detectable / np.sqrt(np.maximum(fit.information, 1e-300)) / scale
-    parameters, estimates, start = [], [], 0
+    parameters = []
+    estimates = []
+    start = 0
     for member in members:
         part = slice(start, start + len(member.parameters))
         prefix = "" if len(members) == 1 else f"{member.name} "

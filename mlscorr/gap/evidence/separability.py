@@ -44,7 +44,8 @@ class Separability:
     @property
     def classes(self) -> tuple[tuple[str, ...], ...]:
         """Effects of which some parameters can't be told apart, in the order in which they come."""
-        same, group = self.correlation**2 > SETTINGS.same, np.arange(len(self.effects))
+        same = self.correlation**2 > SETTINGS.same
+        group = np.arange(len(self.effects))
         for i, j in zip(*np.nonzero(np.triu(same, 1)), strict=True):
             group[group == group[j]] = group[i]
         classes = []
@@ -65,7 +66,10 @@ class Separability:
         number = len(self._rows(effect))
         if number == 0:
             return (effect,)
-        ways = np.eye(number) if estimate is None else np.asarray(estimate, float)[None]
+        if estimate is None:
+            ways = np.eye(number)
+        else:
+            ways = np.asarray(estimate, float)[None]
         return tuple(
             name
             for name in dict.fromkeys(self.effects)
@@ -82,7 +86,8 @@ class Separability:
             Of its parameters.
         other : str
         """
-        numbers, others = self._rows(effect), self._rows(other)
+        numbers = self._rows(effect)
+        others = self._rows(other)
         signal = estimate @ self.normal[np.ix_(numbers, numbers)] @ estimate
         if signal <= 0 or len(others) == 0:
             return 0.0
@@ -107,7 +112,9 @@ def explained_square(normal: np.ndarray, across: np.ndarray) -> float:
     visible = length > 0
     length, part = length[visible], across[visible] / length[visible]
     scaled = normal[np.ix_(visible, visible)] / np.outer(length, length)
-    return float(part @ np.linalg.pinv(scaled, rcond=1e-9) @ part) if visible.any() else 0.0
+    if visible.any():
+        return float(part @ np.linalg.pinv(scaled, rcond=1e-9) @ part)
+    return 0.0
 
 
 def compare_signatures(
@@ -124,7 +131,9 @@ def compare_signatures(
     """
     members = Counter(signature.name for signature in signatures)
     use = [s for s in signatures if members[s.name] == 1 and not s.is_noise]
-    names, effects, units = [], [], []
+    names = []
+    effects = []
+    units = []
     for s in use:
         is_scalar = len(s.parameters) == 1
         names += [s.name if is_scalar else f"{s.name} {part}" for part in s.parameters]

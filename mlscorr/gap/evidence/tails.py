@@ -116,11 +116,16 @@ def _fit(columns, variance, density, smallest, first, largest):
     """Rows of log likelihood, offset, weight, share, by expectation and maximisation."""
     k, q = columns.shape
     fitted = np.empty((k, 4))
-    scale, weight = 1 / np.sqrt(2 * np.pi * variance), 1 / variance
+    scale = 1 / np.sqrt(2 * np.pi * variance)
+    weight = 1 / variance
     for j in range(k):
-        offset, share, held = 0.0, first, 0.0
+        offset = 0.0
+        share = first
+        held = 0.0
         for _ in range(3):  # the shares of so few odd values hardly move
-            held, pulled, total_odd = 0.0, 0.0, 0.0
+            held = 0.0
+            pulled = 0.0
+            total_odd = 0.0
             for i in range(q):
                 away = columns[j, i] - offset
                 regular = (1 - share) * scale[i] * np.exp(-0.5 * away * away * weight[i])
@@ -129,7 +134,8 @@ def _fit(columns, variance, density, smallest, first, largest):
                 held += part * weight[i]
                 pulled += part * weight[i] * columns[j, i]
             held = max(held, weight[0] * smallest)  # not all can be odd
-            offset, share = pulled / held, min(max(total_odd / q, smallest), largest)
+            offset = pulled / held
+            share = min(max(total_odd / q, smallest), largest)
         total = 0.0
         for i in range(q):
             away = columns[j, i] - offset

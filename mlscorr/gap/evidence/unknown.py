@@ -150,7 +150,8 @@ def _functions(views):
 
 
 def _of_time(c):
-    since, time = c["time"] - c["time"].min(), _without_gaps(c["time"])
+    since = c["time"] - c["time"].min()
+    time = _without_gaps(c["time"])
     return {
         "constant": np.ones((len(time), 1)),
         "elapsed": _centred(c["time"])[:, None],
@@ -182,7 +183,8 @@ def _of_beam(c):
 
 
 def _of_motion(c):
-    speed, turn = c["speed"], c["turn_rate"]
+    speed = c["speed"]
+    turn = c["turn_rate"]
     values = {
         "speed": speed[:, None] / max(speed.mean(), 1e-9),
         "speed squared": (speed[:, None] / max(speed.mean(), 1e-9)) ** 2,
@@ -218,7 +220,8 @@ def _of_scan_angle(c):
 
 def _centred(values):
     """Values from -1 to 1 over their span."""
-    low, high = values.min(), values.max()
+    low = values.min()
+    high = values.max()
     return (2 * values - low - high) / max(high - low, 1e-9)
 
 
@@ -243,7 +246,8 @@ def _smooth(name, values):
 
 def _splines(values, number):
     """Cubic B-splines (k, p) over the span of values, on equal intervals; none without a span."""
-    low, high = values.min(), values.max()
+    low = values.min()
+    high = values.max()
     if not high - low > 1e-6 * max(1.0, abs(high)):
         return np.zeros((len(values), 0))
     inner = int(np.clip(number, 5, SETTINGS.functions)) - 3

@@ -156,13 +156,20 @@ def locate(
     terms = sigma[:, None] ** 2 * (u**2 - 1)
     has_cause = bool(shift.any()) or model != STATED or extra is not None
     if model != STATED or extra is not None:
-        more = 0.0 if extra is None else extra[observed.row] * observed.half
+        if extra is None:
+            more = 0.0
+        else:
+            more = extra[observed.row] * observed.half
         after, wider = observed.whitener(model, more).innovations(columns[:, 1:])
         u[:, 1] = after[:, 0]
         terms[:, 1] = wider**2 * (after[:, 0] ** 2 - 1)
     keep = observed.second
-    terms, row = terms[keep], observed.row[keep]
-    square = _moved(observed, shift, model, extra)[keep] if has_cause else np.zeros(len(row))
+    terms = terms[keep]
+    row = observed.row[keep]
+    if has_cause:
+        square = _moved(observed, shift, model, extra)[keep]
+    else:
+        square = np.zeros(len(row))
     is_moved = bool(square.any())
     explained = square if is_moved else terms[:, 0]
     mean = terms.mean(axis=0)
@@ -174,9 +181,16 @@ def locate(
         splits = _timed(splits, rows, row, square, acts)
     before, after = (float(v) for v in signed_root(mean[:2]))
     return Where(
-        before, after, band, splits, row, observed.errors.gps_time[keep], u[keep, :2], sigma[keep],
+        before,
+        after,
+        band,
+        splits,
+        row,
+        observed.errors.gps_time[keep],
+        u[keep, :2],
+        sigma[keep],
         _headline(before, band, _of_headline(splits, acts), len(row), is_moved),
-    )  # fmt: skip
+    )
 
 
 def _moved(observed, shift, model, extra):
@@ -188,7 +202,8 @@ def _moved(observed, shift, model, extra):
 
 def _timed(splits, rows, row, square, acts):
     """Splits with the extent in time that is known."""
-    first, time = rows.reference.start, rows.gps_time[row]
+    first = rows.reference.start
+    time = rows.gps_time[row]
     inside = (time >= acts[0]) & (time <= acts[1])
     share = float(square[inside].sum() / (square.sum() or 1.0))
     extent = Extent(acts[0] - first, acts[1] - first, share, float(inside.mean()))
@@ -204,11 +219,16 @@ def _split(rows, row, by, terms, explained, is_moved):
     sums = np.array([np.bincount(number, column, len(bins)) for column in terms.T]).T
     mean = signed_root(sums / np.maximum(count, 1)[:, None])
     return Split(
-        by, edges, bins, count, mean[:, 0], mean[:, 1],
+        by,
+        edges,
+        bins,
+        count,
+        mean[:, 0],
+        mean[:, 1],
         np.bincount(number, explained, len(bins)) / (explained.sum() or 1.0),
         np.percentile(mean[:, 2:], SETTINGS.band, axis=1).T,
         _extent(rows, row, by, explained) if is_moved and edges is not None else None,
-    )  # fmt: skip
+    )
 
 
 def _extent(rows, row, by, square):
@@ -240,22 +260,27 @@ def _bins(rows, row, by):
 
 def _of_headline(splits, acts):
     """The splits of which the headline may speak: of an event that of time alone."""
-    return splits if acts is None else tuple(split for split in splits if split.by == "time")
+    if acts is None:
+        return splits
+    return tuple(split for split in splits if split.by == "time")
 
 
 def _headline(before, band, splits, number, is_moved):
     """One sentence: how large, and where most of it is."""
     low, high = band
-    measurable, chance = before > high, f"{low:.1f} to {high:.1f} mm when nothing is wrong"
+    measurable = before > high
+    chance = f"{low:.1f} to {high:.1f} mm when nothing is wrong"
     size = f"All rows together differ by {before:.1f} mm more than predicted ({chance})"
     if not measurable:
         size = f"All rows together differ by no more than chance makes them ({chance})"
     if not measurable and not is_moved:
         return f"Nothing stands out. {size}."
-    best, largest = None, 0.0
+    best = None
+    largest = 0.0
     for share, rows, words in _places(splits, number):
         if share > SETTINGS.plain * rows and share - rows > largest:
-            best, largest = (share, rows, words), share - rows
+            best = (share, rows, words)
+            largest = share - rows
     of = "what the cause moves" if is_moved else "the gap"
     if best is None:
         return f"{of.capitalize()} lies everywhere alike. {size}."
@@ -271,7 +296,8 @@ def _places(splits, number):
     for split in splits:
         if split.extent is not None:
             name, unit = NAMES[split.by]
-            low, high = split.extent.low, split.extent.high
+            low = split.extent.low
+            high = split.extent.high
             words = f"at a {name} of {low:.4g} to {high:.4g} {unit}"
             yield split.extent.share, split.extent.rows, words
             continue

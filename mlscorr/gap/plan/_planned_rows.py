@@ -61,7 +61,8 @@ def planned_rows(survey: Survey) -> Rows:
 
 def _targets(survey, targets):
     which, time, number = _sweeps(survey, targets.position)
-    n, item = len(which), np.arange(len(which))
+    n = len(which)
+    item = np.arange(len(which))
     place = targets.position[which]
     sight = scanner_origin(survey, time) - place
     facing = sight / np.linalg.norm(sight, axis=1, keepdims=True)
@@ -69,12 +70,20 @@ def _targets(survey, targets):
     brightness = np.full(n, SETTINGS.brightness)
     pulses = sample_pulses(survey, item, np.ones(n), place, time, brightness, normal)
     return assemble(
-        survey, "target", np.repeat(item, 3), np.repeat(time, 3), np.repeat(place, 3, axis=0),
-        np.tile(np.eye(3), (n, 1)), np.zeros(3 * n), np.full(3 * n, SETTINGS.centre_sigma**2),
-        np.full(3 * n, SETTINGS.facet_points), pulses, np.repeat(number, 3),
+        survey,
+        "target",
+        np.repeat(item, 3),
+        np.repeat(time, 3),
+        np.repeat(place, 3, axis=0),
+        np.tile(np.eye(3), (n, 1)),
+        np.zeros(3 * n),
+        np.full(3 * n, SETTINGS.centre_sigma**2),
+        np.full(3 * n, SETTINGS.facet_points),
+        pulses,
+        np.repeat(number, 3),
         survey_item=np.repeat(which, 3),
         survey_factor=(targets.sigma[which][:, :, None] * np.eye(3)).reshape(-1, 3),
-    )  # fmt: skip
+    )
 
 
 def _facets(survey, rng):
@@ -88,7 +97,8 @@ def _facets(survey, rng):
     u, v = np.sort(rng.random((2, len(chosen))), axis=0)
     place = u[:, None] * a[chosen] + (v - u)[:, None] * b[chosen] + (1 - v)[:, None] * c[chosen]
     which, time, number = _sweeps(survey, place + origin)
-    place, normal = place[which] + origin, (cross / area[:, None])[chosen][which]
+    place = place[which] + origin
+    normal = (cross / area[:, None])[chosen][which]
     sight = scanner_origin(survey, time) - place
     away = np.linalg.norm(sight, axis=1)
     slant = np.einsum("ni,ni->n", normal, sight) / away
@@ -96,14 +106,27 @@ def _facets(survey, rng):
     visible = sees(mesh.caster, start - origin, start + sight * 0.99 - origin)
     visible &= np.abs(slant) >= TARGETS.grazing
     rows = np.flatnonzero(visible)[: SETTINGS.facets]
-    n, item, normal = len(rows), np.arange(len(rows)), normal[rows] * np.sign(slant[rows])[:, None]
+    n = len(rows)
+    item = np.arange(len(rows))
+    normal = normal[rows] * np.sign(slant[rows])[:, None]
     noise = OBSERVE.surface_sigma**2 + survey.scanner.range_noise**2 / SETTINGS.facet_points
-    place, time, brightness = place[rows], time[rows], np.full(n, SETTINGS.brightness)
+    place = place[rows]
+    time = time[rows]
+    brightness = np.full(n, SETTINGS.brightness)
     pulses = sample_pulses(survey, item, np.ones(n), place, time, brightness, normal)
     return assemble(
-        survey, "surface", item, time, place, normal, np.zeros(n), np.full(n, noise),
-        np.full(n, SETTINGS.facet_points), pulses, number[rows],
-    )  # fmt: skip
+        survey,
+        "surface",
+        item,
+        time,
+        place,
+        normal,
+        np.zeros(n),
+        np.full(n, noise),
+        np.full(n, SETTINGS.facet_points),
+        pulses,
+        number[rows],
+    )
 
 
 def _sweeps(survey, place):
@@ -111,7 +134,8 @@ def _sweeps(survey, place):
 
     Index, time and pass, (n,) each.
     """
-    trajectory, times = survey.trajectory, []
+    trajectory = survey.trajectory
+    times = []
     origin = trajectory.position.mean(axis=0)
     for number, span in enumerate(trajectory.passes, start=1):
         time = np.linspace(*span, max(2, int((span[1] - span[0]) / SIGNATURES.epoch_step)))
@@ -125,7 +149,8 @@ def _sweeps(survey, place):
         nearest = np.argmin(np.where(crossed, square[:, :-1], np.inf), axis=1)
         k = np.flatnonzero(crossed[np.arange(len(place)), nearest])
         i = nearest[k]
-        a, b = out[k, i], out[k, i + 1]
+        a = out[k, i]
+        b = out[k, i + 1]
         share = np.where(a != b, a / np.where(a != b, a - b, 1.0), 0.0)
         times.append((k, time[i] + share * (time[i + 1] - time[i]), np.full(len(k), number)))
     return tuple(np.concatenate(parts) for parts in zip(*times, strict=True))
@@ -148,7 +173,8 @@ def event_sizes(
     dict of (names of p parameters, units, (p,) array)
         By the events' names.
     """
-    whitener, events = observed.whitener(), {}
+    whitener = observed.whitener()
+    events = {}
     for sign in signs:
         if sign.is_noise or not (sign.kind.moment() or sign.kind.is_on_target()):
             continue

@@ -66,9 +66,12 @@ def additions(rows: Rows, survey: Survey) -> dict[str, tuple[Rows, Survey]]:
 
 
 def next_data(
-    rows: Rows, survey: Survey, kinds: Iterable[type[Effect]], effects: Iterable[str],
+    rows: Rows,
+    survey: Survey,
+    kinds: Iterable[type[Effect]],
+    effects: Iterable[str],
     compared: Separability,
-) -> tuple[NextData, ...]:  # fmt: skip
+) -> tuple[NextData, ...]:
     """Which additions tell effects apart that this survey can't, best first.
 
     Parameters
@@ -86,7 +89,8 @@ def next_data(
     if len(names) < 2:
         return ()
     kinds = [kind for kind in kinds if kind.name in names]
-    before, data = _largest(compared, names), []
+    before = _largest(compared, names)
+    data = []
     for name, added in additions(rows, survey).items():
         signs, _ = signatures(*added, kinds)
         observed = Observations.of(added[0], background(*added))
@@ -120,7 +124,8 @@ def _another_pass(rows, survey, backwards=False, faster=1.0):
 
     turn = Rotation.from_euler("z", np.pi if backwards else 0.0)
     order = slice(None, None, -1 if backwards else 1)
-    time, attitude = anew(trajectory.gps_time)[order], (trajectory.attitude * turn)[order]
+    time = anew(trajectory.gps_time)[order]
+    attitude = (trajectory.attitude * turn)[order]
     longer = _followed(trajectory, order, time, attitude=attitude)
     wider = replace(survey, trajectory=longer)
     more = _placed(once, wider, anew, lambda pulses: pulses.xyz, once.survey_item)
@@ -140,10 +145,14 @@ def _more_targets(rows, survey, items, farther=1.0):
     once = rows.select((rows.channel == "target") & np.isin(rows.item, items))
     trajectory = survey.trajectory
     visits = np.sort(np.unique(once.gps_time))
-    later = 0.5 * np.median(np.diff(visits)) if len(visits) > 1 else 1.0
+    if len(visits) > 1:
+        later = 0.5 * np.median(np.diff(visits))
+    else:
+        later = 1.0
 
     def anew(time):
-        moved, own = time, trajectory.segment(time)
+        moved = time
+        own = trajectory.segment(time)
         for other in (time - later, time + later):
             moved = np.where(trajectory.segment(other) == own, other, moved)
         return moved
@@ -155,15 +164,17 @@ def _stop(rows, survey, items):
     """The items' targets set up around one place, where the vehicle stands."""
     trajectory = survey.trajectory
     once = rows.select((rows.channel == "target") & np.isin(rows.item, items))
-    middle = trajectory.at(np.median(trajectory.gps_time[trajectory.segment(
-        trajectory.gps_time) == 0]))  # fmt: skip
+    middle = trajectory.at(
+        np.median(trajectory.gps_time[trajectory.segment(trajectory.gps_time) == 0])
+    )
     step = np.median(np.diff(trajectory.gps_time))
     start = trajectory.gps_time[-1] + SETTINGS.pause
     time = start + np.arange(0.0, SETTINGS.pause, step)
     n = len(time)
     nearest = np.full(n, np.argmin(np.abs(trajectory.gps_time - middle.gps_time[0])))
     longer = _followed(trajectory, nearest, time)
-    low, high = once.gps_time.min(), once.gps_time.max()
+    low = once.gps_time.min()
+    high = once.gps_time.max()
 
     def anew(recorded):
         share = (recorded - low) / max(high - low, 1.0)  # pulses come before and after their target
@@ -174,23 +185,29 @@ def _stop(rows, survey, items):
 
 def _new_targets(rows, survey, once, anew, farther):
     """Rows of new targets, which stand to the vehicle as those of `once` did."""
-    trajectory, arm = survey.trajectory, np.zeros(3)
+    trajectory = survey.trajectory
+    arm = np.zeros(3)
     if survey.mounting is not None:
         arm = survey.mounting.lever_arm
 
     def place(pulses):
-        then, now = trajectory.at(pulses.gps_time), trajectory.at(anew(pulses.gps_time))
+        then = trajectory.at(pulses.gps_time)
+        now = trajectory.at(anew(pulses.gps_time))
         body = then.attitude.inv().apply(pulses.xyz - then.position)
         return now.position + now.attitude.apply(arm + farther * (body - arm))
 
     items, number = np.unique(once.item, return_inverse=True)
     old = once.survey_item[np.unique(number, return_index=True)[1]]
-    known, targets = survey.surveyed, rows.targets
+    known = survey.surveyed
+    targets = rows.targets
     added = ControlPoints(
         tuple(f"new {i + 1}" for i in range(len(items))),
-        targets.position[old], targets.sigma[old], tuple(targets.kind[i] for i in old),
-        targets.size[old], targets.normal[old],
-    )  # fmt: skip
+        targets.position[old],
+        targets.sigma[old],
+        tuple(targets.kind[i] for i in old),
+        targets.size[old],
+        targets.normal[old],
+    )
     wider = replace(survey, check=survey.check + added)
     more = _placed(once, wider, anew, place, len(known) + number)
     return _both(replace(rows, targets=wider.surveyed), more), wider
@@ -208,11 +225,21 @@ def _placed(once, survey, anew, place, survey_item):
     time = anew(once.gps_time)
     factor = once.survey_factor
     return assemble(
-        survey, once.channel, once.item, time, pulses.xyz[first][number], once.direction,
-        np.zeros(len(once)), once.noise, once.points, pulses,
-        survey.trajectory.segment(time) + 1, survey_item=survey_item, survey_factor=factor,
+        survey,
+        once.channel,
+        once.item,
+        time,
+        pulses.xyz[first][number],
+        once.direction,
+        np.zeros(len(once)),
+        once.noise,
+        once.points,
+        pulses,
+        survey.trajectory.segment(time) + 1,
+        survey_item=survey_item,
+        survey_factor=factor,
         believed=once.believed,
-    )  # fmt: skip
+    )
 
 
 def _both(rows, more):

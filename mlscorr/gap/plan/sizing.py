@@ -108,7 +108,10 @@ def draw_effect(
     if fixed is None:
         return None
     sign = signature(Bench(ruler.rows, ruler.survey), kind, fixed, rng)
-    way = _random(ruler, sign, mdb) if kind.random else _systematic(ruler, sign, mdb, rng)
+    if kind.random:
+        way = _random(ruler, sign, mdb)
+    else:
+        way = _systematic(ruler, sign, mdb, rng)
     if way is None:
         return None
     way, size = _credible(sign, way, mdb)
@@ -124,30 +127,40 @@ def _systematic(ruler, sign, mdb, rng):
     """Parameters (p,) in a random direction."""
     way = rng.standard_normal(len(sign.typical)) * sign.typical
     unit = ruler.size(sign.jacobian @ way)
-    return None if unit == 0.0 else way * mdb / unit
+    if unit == 0.0:
+        return None
+    return way * mdb / unit
 
 
 def _random(ruler, sign, mdb):
     """Magnitude (1,) of an effect that shows as noise or lost returns."""
     size = detectable_size(ruler.rows, ruler.observations, sign, mdb)
-    return np.array([size]) if np.isfinite(size) else None
+    if np.isfinite(size):
+        return np.array([size])
+    return None
 
 
 def _credible(sign, way, mdb):
     """Parameters within the largest credible value, and the size that is left."""
     quantities = sign.kind.quantities()
     largest = quantities["magnitude"].largest * (1 - 1e-3)  # rounding can't take it beyond
-    size = np.hypot(*way) if sign.kind.is_wave() else np.abs(way).max()
+    if sign.kind.is_wave():
+        size = np.hypot(*way)
+    else:
+        size = np.abs(way).max()
     share = min(1.0, largest / size)
     return way * share, mdb * share
 
 
 def _fixed(kind, ruler, rng):
     """What an effect has besides its magnitude, at random; None where nothing was seen."""
-    rows, fixed = ruler.rows, {}
+    rows = ruler.rows
+    fixed = {}
     if kind.is_on_target():
         used = np.unique(rows.survey_item[rows.survey_item >= 0])
-        return {"target": rows.targets.name[rng.choice(used)]} if len(used) else None
+        if len(used):
+            return {"target": rows.targets.name[rng.choice(used)]}
+        return None
     if "time" in kind.moment():
         times = np.sort(rows.gps_time[rows.metric])
         if len(times) == 0:
@@ -168,7 +181,9 @@ def shift_by(ruler: Ruler, move: Callable[[RecordedPoints], np.ndarray]) -> np.n
     move : function
         From points to displacements (k, 3) on the map, as DisplacedSurvey has it. Units: m.
     """
-    rows, pulses, survey = ruler.rows, ruler.rows.pulses, ruler.survey
+    rows = ruler.rows
+    pulses = ruler.rows.pulses
+    survey = ruler.survey
     points = RecordedPoints(
         pulses.gps_time, pulses.xyz, pulses.scanner_xyz, survey.trajectory, survey.mounting
     )
@@ -195,7 +210,8 @@ def likeness(ruler: Ruler, shift: np.ndarray, known: Sequence[Signature]) -> dic
     columns = np.hstack([shift[:, None], *(sign.jacobian for sign in known)])
     white = ruler.whitener.whiten(ruler.observations.columns(columns))
     across = white.product(white[np.array([0])])[:, 0]
-    shares, start = {}, 1
+    shares = {}
+    start = 1
     for sign in known:
         index = np.arange(start, start + len(sign.parameters))
         start += len(index)

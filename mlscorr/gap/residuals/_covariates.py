@@ -48,9 +48,14 @@ def to_scanner_or_nan(survey: Survey, xyz: np.ndarray, gps_time: np.ndarray) -> 
 
 
 def covariates(
-    survey: Survey, gps_time: np.ndarray, position: np.ndarray, pulses: SamplePulses,
-    item: np.ndarray, pass_number: np.ndarray, direction: np.ndarray,
-) -> dict[str, np.ndarray]:  # fmt: skip
+    survey: Survey,
+    gps_time: np.ndarray,
+    position: np.ndarray,
+    pulses: SamplePulses,
+    item: np.ndarray,
+    pass_number: np.ndarray,
+    direction: np.ndarray,
+) -> dict[str, np.ndarray]:
     """Covariates (m,) of items or rows by their names; see Rows.
 
     Parameters
@@ -108,7 +113,8 @@ def poses_about(
         Units: s.
     """
     start, end = trajectory.passes[trajectory.segment(gps_time)].T
-    before, after = np.maximum(gps_time - lag, start), np.minimum(gps_time + lag, end)
+    before = np.maximum(gps_time - lag, start)
+    after = np.minimum(gps_time + lag, end)
     return trajectory.at(before), trajectory.at(after)
 
 

@@ -13,9 +13,12 @@ from mlscorr.survey import Survey
 
 
 def shared_rows(
-    survey: Survey, patches: Patches, rng: np.random.Generator, limit: int = SETTINGS.patches // 2,
+    survey: Survey,
+    patches: Patches,
+    rng: np.random.Generator,
+    limit: int = SETTINGS.patches // 2,
     correction: Correction | None = None,
-) -> Rows | None:  # fmt: skip
+) -> Rows | None:
     """Rows of the planes that were seen twice, or None where there are none.
 
     The residual is how far the earlier look lies from the later one, along their mean normal.
@@ -32,7 +35,9 @@ def shared_rows(
     """
     tried = [(there, *_pairs(near)) for there, near in places(survey, patches, correction)]
     there, early, late, normal, between, residual = max(tried, key=lambda pair: support(pair[-1]))
-    first, second, apart = patches[early], patches[late], np.linalg.norm(between, axis=1)
+    first = patches[early]
+    second = patches[late]
+    apart = np.linalg.norm(between, axis=1)
     kept = np.flatnonzero(np.abs(residual) <= gate(there, first.gps_time))
     kept = kept[consistent(first.gps_time[kept], normal[kept], residual[kept])]
     residual = np.einsum("ni,ni->n", normal, first.centre - second.centre)
@@ -40,15 +45,27 @@ def shared_rows(
         return None
     columns = [first.gps_time[kept], second.gps_time[kept], *np.abs(normal[kept].T)]
     kept = kept[spread(columns, limit, rng)]
-    first, second = first[kept], second[kept]
-    normal, apart, residual = normal[kept], apart[kept], residual[kept]
+    first = first[kept]
+    second = second[kept]
+    normal = normal[kept]
+    apart = apart[kept]
+    residual = residual[kept]
     item = np.arange(len(kept))
     pulses = [patch_pulses(survey, first, item), patch_pulses(survey, second, item, -1.0)]
     return assemble(
-        survey, "shared", item, first.gps_time, (first.centre + second.centre) / 2, normal,
-        residual, plane_noise(first, second, apart**2), np.minimum(first.points, second.points),
-        SamplePulses.concatenate(pulses), first.pass_number, gps_time_2=second.gps_time,
-    )  # fmt: skip
+        survey,
+        "shared",
+        item,
+        first.gps_time,
+        (first.centre + second.centre) / 2,
+        normal,
+        residual,
+        plane_noise(first, second, apart**2),
+        np.minimum(first.points, second.points),
+        SamplePulses.concatenate(pulses),
+        first.pass_number,
+        gps_time_2=second.gps_time,
+    )
 
 
 def compare_planes(first: Patches, second: Patches) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -83,14 +100,17 @@ def _pairs(patches):
     other = patches.pass_number[early] != patches.pass_number[late]
     other |= np.abs(patches.gps_time[early] - patches.gps_time[late]) > SETTINGS.pair_pause
     pair = (cosine >= np.cos(SETTINGS.parallel / 2)) & other
-    early, late = early[pair], late[pair]
+    early = early[pair]
+    late = late[pair]
     order = np.argsort(np.linalg.norm(patches.centre[early] - patches.centre[late], axis=1))
-    early, late = early[order], late[order]
+    early = early[order]
+    late = late[order]
     for forward in (True, False):  # the nearest partner in each pass, of both
         a, b = (early, late) if forward else (late, early)
         key = a * (patches.pass_number.max(initial=0) + 1) + patches.pass_number[b]
         nearest = np.sort(np.unique(key, return_index=True)[1])
-        early, late = early[nearest], late[nearest]
+        early = early[nearest]
+        late = late[nearest]
     return early, late, *compare_planes(patches[early], patches[late])
 
 

@@ -83,7 +83,8 @@ def _compare(survey, patches, mesh, origin):
     hit = triangle < len(mesh)
     triangle = np.where(hit, triangle, 0)
     own = np.repeat(patches.normal, samples, axis=0)
-    normal, offset = mesh.normal[triangle], mesh.offset[triangle]
+    normal = mesh.normal[triangle]
+    offset = mesh.offset[triangle]
     cosine = np.einsum("ni,ni->n", normal, own)
     facing = normal * np.sign(cosine)[:, None]
     off = np.einsum("ni,ni->n", own, end - np.repeat(patches.centre - origin, samples, axis=0))
@@ -104,8 +105,12 @@ def _elsewhere(survey, patches, mesh, origin):
     """The sentence for a reference surface that lies where the cloud is not."""
     centre = (patches.centre - origin).astype(np.float32)
     apart = mesh.caster.compute_closest_points(centre)["points"].numpy() - centre
-    distance, up = np.median(np.linalg.norm(apart, axis=1)), np.median(apart[:, 2])
-    what = "in another height datum" if abs(up) > 0.9 * distance else "in another CRS or place"
+    distance = np.median(np.linalg.norm(apart, axis=1))
+    up = np.median(apart[:, 2])
+    if abs(up) > 0.9 * distance:
+        what = "in another height datum"
+    else:
+        what = "in another CRS or place"
     limit = float(np.median(gate(survey, patches.gps_time)))
     return (
         f"Of {len(patches)} flat patches of the cloud hardly any lies within {limit:.2f} m of the "

@@ -44,8 +44,11 @@ class AbsentRun:
 
     def document(self) -> dict:
         """The run as gap.json has it."""
-        return {"names": list(self.name), "gps_time": list(self.gps_time),
-                "reasons": list(self.reason)}  # fmt: skip
+        return {
+            "names": list(self.name),
+            "gps_time": list(self.gps_time),
+            "reasons": list(self.reason),
+        }
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,8 @@ def rounding_sigma() -> float:
 def _believed_variance(survey, patches):
     """Variance (p,) about the plane that range and angle noise should make. Units: m^2."""
     p, samples = patches.time.shape
-    time, xyz = patches.time.ravel(), patches.xyz.reshape(-1, 3)
+    time = patches.time.ravel()
+    xyz = patches.xyz.reshape(-1, 3)
     normal = np.repeat(patches.normal, samples, axis=0)
     sight = xyz - scanner_origin(survey, time)
     slant = np.einsum("ni,ni->n", sight, normal) / np.linalg.norm(sight, axis=1)
@@ -38,7 +39,8 @@ def _sweep(survey, sight, time):
     """How a point moves (n, 3) as its scan angle grows, m per rad; as if the scanner turned about
     the driving direction where the mounting is not known.
     """
-    mounting, axis = survey.mounting, np.array([0.0, 1.0, 0.0])
+    mounting = survey.mounting
+    axis = np.array([0.0, 1.0, 0.0])
     if mounting is not None:
         axis = mounting.boresight.apply([0.0, 0.0, 1.0])
     return np.cross(survey.trajectory.at(time).attitude.apply(axis), sight)
@@ -93,7 +95,10 @@ def beside_seen_noise(rows: Rows) -> tuple[Rows, tuple[str, ...]]:
     rows : Rows
     """
     rough = (rows.channel == "roughness") & np.isfinite(rows.residual)
-    offset = float(np.median(rows.residual[rough])) if rough.any() else 0.0
+    if rough.any():
+        offset = float(np.median(rows.residual[rough]))
+    else:
+        offset = 0.0
     if offset > -np.log(2):  # half the variance: more than planes differ by among themselves
         return rows, ()
     quiet = replace(
@@ -121,7 +126,8 @@ def return_rate(patches: Patches) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         median share is so low that the cloud must have been thinned.
     """
     fired = np.maximum(patches.fired, 1)
-    share, counted = patches.returned / fired, patches.fired >= SETTINGS.fired
+    share = patches.returned / fired
+    counted = patches.fired >= SETTINGS.fired
     counted &= np.median(share[counted]) >= SETTINGS.thinned if counted.any() else False
     return share - 1.0, loss_variance(share, fired, counted), counted
 
@@ -142,8 +148,14 @@ def loss_variance(share: np.ndarray, fired: np.ndarray, counted: np.ndarray) -> 
         Patches that say so; of these the tenth that loses most, crowns and edges, is left out.
     """
     share_lost = 1.0 - share[counted]
-    usual = share_lost <= np.quantile(share_lost, 0.9) if counted.any() else counted[:0]
-    loss = float(np.average(share_lost[usual], weights=fired[counted][usual])) if usual.any() else 0
+    if counted.any():
+        usual = share_lost <= np.quantile(share_lost, 0.9)
+    else:
+        usual = counted[:0]
+    if usual.any():
+        loss = float(np.average(share_lost[usual], weights=fired[counted][usual]))
+    else:
+        loss = 0
     loss = min(max(loss, SETTINGS.least_loss), 1.0 - SETTINGS.least_loss)
     return loss * (1.0 - loss) / fired
 

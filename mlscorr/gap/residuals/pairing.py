@@ -46,9 +46,13 @@ class Pairing:
 
 
 def build_rows(
-    survey: Survey, matched: TargetObservations, candidates: Candidates, patches: Patches | None,
-    limit: int = SETTINGS.patches, correction: Correction | None = None,
-) -> Pairing:  # fmt: skip
+    survey: Survey,
+    matched: TargetObservations,
+    candidates: Candidates,
+    patches: Patches | None,
+    limit: int = SETTINGS.patches,
+    correction: Correction | None = None,
+) -> Pairing:
     """Compare a survey with what its simulator believes: targets, surfaces, channels.
 
     The believed simulation puts targets where they were surveyed, surfaces where the reference
@@ -95,7 +99,8 @@ def build_rows(
     """
     is_check = np.array([name in survey.check.name for name in matched.name], dtype=bool)
     parts = [target_rows(survey, matched[~is_check], candidates)]
-    check, notes = target_rows(survey, matched[is_check], candidates), [NO_INTENSITY]
+    check = target_rows(survey, matched[is_check], candidates)
+    notes = [NO_INTENSITY]
     if patches is not None:
         parts += _patch_rows(survey, patches, limit, correction, notes)
     else:
@@ -127,16 +132,24 @@ def target_rows(survey: Survey, matched: TargetObservations, candidates: Candida
     axes, variance = _axes(matched.covariance)
     residual = np.einsum("nij,nj->ni", axes, -pairs.misclosure)
     factor = axes * pairs.surveyed.sigma[:, None, :]
-    item, near = np.arange(len(matched)), _near(matched, candidates)
+    item = np.arange(len(matched))
+    near = _near(matched, candidates)
     pulses = [_target_pulses(survey, matched, i, candidates.cloud[near[i]]) for i in item]
     return assemble(
-        survey, "target", np.repeat(item, 3), np.repeat(matched.gps_time, 3),
-        np.repeat(matched.position, 3, axis=0), axes.reshape(-1, 3), residual.ravel(),
-        variance.ravel(), np.repeat(matched.points, 3),
-        SamplePulses.concatenate([_no_pulses(), *pulses]), np.repeat(matched.pass_number, 3),
+        survey,
+        "target",
+        np.repeat(item, 3),
+        np.repeat(matched.gps_time, 3),
+        np.repeat(matched.position, 3, axis=0),
+        axes.reshape(-1, 3),
+        residual.ravel(),
+        variance.ravel(),
+        np.repeat(matched.points, 3),
+        SamplePulses.concatenate([_no_pulses(), *pulses]),
+        np.repeat(matched.pass_number, 3),
         survey_item=np.repeat(survey.surveyed.rows(matched.name), 3),
         survey_factor=factor.reshape(-1, 3),
-    )  # fmt: skip
+    )
 
 
 def _axes(covariance):
@@ -148,7 +161,8 @@ def _axes(covariance):
     axes = axes.swapaxes(1, 2)
     for i in range(len(axes)):
         _, order = linear_sum_assignment(-np.abs(axes[i].T))
-        axes[i], variance[i] = axes[i][order], variance[i][order]
+        axes[i] = axes[i][order]
+        variance[i] = variance[i][order]
         axes[i] *= np.sign(np.diag(axes[i]))[:, None] + (np.diag(axes[i]) == 0)[:, None]
     return axes, variance
 
@@ -171,24 +185,30 @@ def _near(matched, candidates):
 def _target_pulses(survey, matched, i, cloud):
     """Pulses on one observed target, evenly taken; its centre alone where no point is near."""
     if len(cloud) == 0:
-        xyz, time, intensity = matched.position[[i]], matched.gps_time[[i]], np.ones(1)
+        xyz = matched.position[[i]]
+        time = matched.gps_time[[i]]
+        intensity = np.ones(1)
     else:
         samples = SETTINGS.samples
         taken = cloud[((np.arange(samples) + 0.5) * len(cloud) / samples).astype(int)]
-        xyz, time, intensity = taken.xyz, taken.gps_time, taken.intensity
+        xyz = taken.xyz
+        time = taken.gps_time
+        intensity = taken.intensity
     k = len(xyz)
     normal = np.broadcast_to(matched.normal[i], (k, 3))
     return sample_pulses(survey, np.full(k, i), np.full(k, 1 / k), xyz, time, intensity, normal)
 
 
 def _no_pulses():
-    none, place = np.empty(0), np.empty((0, 3))
+    none = np.empty(0)
+    place = np.empty((0, 3))
     return SamplePulses(none.astype(int), none, none, place, place, none, place, none)
 
 
 def _patch_rows(survey, patches, limit, correction, notes):
     """Parts of the Rows that patches give; appends to the notes what they don't."""
-    parts, rng = [], np.random.default_rng(0)
+    parts = []
+    rng = np.random.default_rng(0)
     shared = shared_rows(survey, patches, rng, limit, correction)
     if shared is None:
         notes.append("No plane was seen twice: passes are not compared with each other.")
@@ -196,11 +216,13 @@ def _patch_rows(survey, patches, limit, correction, notes):
         parts.append(shared)
     if survey.reference is None:
         notes.append("No [scene] reference is given: surfaces are not compared with it.")
-        patches, surface = patches[spread(_covered(survey, patches), limit, rng)], None
+        patches = patches[spread(_covered(survey, patches), limit, rng)]
+        surface = None
     else:
         surface = on_reference(survey, patches, correction)
         kept = spread(_covered(survey, patches[surface.patch]), limit, rng)
-        patches, surface = patches[surface.patch[kept]], surface[kept]
+        patches = patches[surface.patch[kept]]
+        surface = surface[kept]
     parts.append(patch_rows(survey, patches, surface))
     if "return_rate" not in parts[-1].channel:
         notes.append(
@@ -231,7 +253,9 @@ def patch_rows(survey: Survey, patches: Patches, surface: OnReference | None = N
     """
     rough, rough_noise, believed, flat = roughness(survey, patches)
     lost, lost_noise, counted = return_rate(patches)
-    flat, counted, p = np.flatnonzero(flat), np.flatnonzero(counted), len(patches)
+    flat = np.flatnonzero(flat)
+    counted = np.flatnonzero(counted)
+    p = len(patches)
     if surface is None:
         surface = OnReference(np.empty(0, int), np.empty((0, 3)), *np.empty((2, 0)))
     on = np.arange(len(surface))
@@ -241,10 +265,16 @@ def patch_rows(survey: Survey, patches: Patches, surface: OnReference | None = N
     channel = ["surface"] * len(on) + ["roughness"] * len(flat) + ["return_rate"] * len(counted)
     points = [patches.points[on], patches.points[flat], patches.fired[counted]]
     return assemble(
-        survey, channel, item, patches.gps_time[item], patches.centre[item], direction,
+        survey,
+        channel,
+        item,
+        patches.gps_time[item],
+        patches.centre[item],
+        direction,
         np.concatenate([surface.residual, rough[flat], lost[counted]]),
         np.concatenate([surface.noise, rough_noise[flat], lost_noise[counted]]),
-        np.concatenate(points), patch_pulses(survey, patches, np.arange(p)),
+        np.concatenate(points),
+        patch_pulses(survey, patches, np.arange(p)),
         patches.pass_number[item],
         believed=np.concatenate([np.full(len(on), np.nan), believed[flat], np.ones(len(counted))]),
-    )  # fmt: skip
+    )

@@ -30,8 +30,12 @@ class PatchCollector:
     """
 
     def __init__(self, survey: Survey, pool: int = SETTINGS.pool):
-        self._survey, self._pool = survey, pool
-        self._parts, self._starts, self._share, self._read = [], {}, 1.0, 0
+        self._survey = survey
+        self._pool = pool
+        self._parts = []
+        self._starts = {}
+        self._share = 1.0
+        self._read = 0
         self._file: CloudFile | None = None
         self._held, self._number = NO_POINTS, np.empty(0, int)
 
@@ -39,7 +43,8 @@ class PatchCollector:
         """Take a chunk of a file; the chunks of a file follow each other."""
         if file != self._file:
             self._close(np.inf)
-            self._file, self._read = file, 0
+            self._file = file
+            self._read = 0
         segment = self._survey.trajectory.segment(chunk.gps_time)
         for number in np.unique(segment[segment >= 0]).tolist():
             start = chunk.gps_time[segment == number].min()
@@ -62,7 +67,8 @@ class PatchCollector:
             while sum(len(patches) for _, patches in self._parts) > self._pool:
                 self._share /= 2
                 self._parts = [(key, p[p.block < self._share]) for key, p in self._parts]
-        self._held, self._number = self._held[is_open], self._number[is_open]
+        self._held = self._held[is_open]
+        self._number = self._number[is_open]
 
     def patches(self) -> Patches | None:
         """Patches of all chunks, of which none follows, by pass and place; None where none is."""

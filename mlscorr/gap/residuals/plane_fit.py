@@ -28,7 +28,8 @@ def fit_patches(
     """
     key = place_key(cloud.xyz[rows], cloud.gps_time[rows])
     order = np.argsort(key, kind="stable")
-    rows, key = rows[order], key[order]
+    rows = rows[order]
+    key = key[order]
     first = np.flatnonzero(np.append(True, key[1:] != key[:-1])[: len(key)])
     count = np.diff(np.append(first, len(rows)))
     keep = count >= SETTINGS.plane_points
@@ -100,7 +101,8 @@ def chance(*numbers: np.ndarray) -> np.ndarray:
 
 def _fit(survey, chunk, number, rows, count):
     """Planes through groups of points: rows (n,) of the chunk, count (g,) of each group."""
-    first, group = np.cumsum(count) - count, np.repeat(np.arange(len(count)), count)
+    first = np.cumsum(count) - count
+    group = np.repeat(np.arange(len(count)), count)
     local = chunk.xyz[rows] - chunk.xyz[rows[first]][group]
     weight, (mean, values, normal) = _trimmed(local, first, group)
     held = np.add.reduceat(weight, first)
@@ -152,7 +154,8 @@ def _trimmed(local, first, group):
 
 def _on_planes(chunk, rows, count, sample, normal):
     """PointCloud of the points on each plane (g,), of groups of rows (n,) with counts (g,)."""
-    first, group = np.cumsum(count) - count, np.repeat(np.arange(len(count)), count)
+    first = np.cumsum(count) - count
+    group = np.repeat(np.arange(len(count)), count)
     origin = chunk.xyz[sample[:, 0]]
     height = _heights(chunk.xyz[rows], origin, normal, group)
     heights = np.einsum("gsi,gi->gs", chunk.xyz[sample] - origin[:, None], normal)
@@ -161,10 +164,14 @@ def _on_planes(chunk, rows, count, sample, normal):
     _narrow(height, first, middle, sigma, SETTINGS.trims[-1], SETTINGS.file_step / 2)
     on = np.flatnonzero(np.abs(height - middle[group]) <= SETTINGS.trims[-1] * sigma[group])
     on = on[np.lexsort((chunk.gps_time[rows[on]], group[on]))]
-    clouds, limit = np.empty(len(count), dtype=object), SETTINGS.patch_pulses
+    clouds = np.empty(len(count), dtype=object)
+    limit = SETTINGS.patch_pulses
     half = np.arange(limit) + 0.5
     for i, part in enumerate(np.split(rows[on], np.searchsorted(group[on], range(1, len(count))))):
-        some = part[(half * len(part) / limit).astype(int)] if len(part) > limit else part
+        if len(part) > limit:
+            some = part[(half * len(part) / limit).astype(int)]
+        else:
+            some = part
         clouds[i] = PointCloud(chunk.xyz[some], chunk.gps_time[some], chunk.intensity[some])
     return clouds
 
@@ -222,7 +229,8 @@ def moments(
 @njit(cache=True, nogil=True)
 def _sums(local, weight, first):
     """Means, and below them the lower halves of covariances, of groups of points: (g, 4, 3)."""
-    sums, ends = np.zeros((len(first), 4, 3)), np.append(first[1:], len(local))
+    sums = np.zeros((len(first), 4, 3))
+    ends = np.append(first[1:], len(local))
     for g in range(len(first)):
         total = max(weight[first[g] : ends[g]].sum(), 1.0)
         for i in range(first[g], ends[g]):
@@ -277,8 +285,10 @@ def _misses(gps_time, number, first, group):
     def count(which):
         return np.add.reduceat(which.astype(int), first)
 
-    pauses, lines = count(near), count(near & ~np.append(False, near[:-1]))
-    whole, interrupted = count(near & (np.abs(pulses % 1 - 0.5) > 0.4)), count(longer)
+    pauses = count(near)
+    lines = count(near & ~np.append(False, near[:-1]))
+    whole = count(near & (np.abs(pulses % 1 - 0.5) > 0.4))
+    interrupted = count(longer)
     regular = (whole >= SETTINGS.rule * pauses) & (interrupted <= (1 - SETTINGS.rule) / 2 * pauses)
     # a line's first and last returns are there by choice: what lies between them counts
     fired = np.add.reduceat(np.round(pulses).astype(int), first) - lines

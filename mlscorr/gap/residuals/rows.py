@@ -154,7 +154,8 @@ class Rows:
     @classmethod
     def concatenate(cls, subsets: Iterable["Rows"]) -> "Rows":
         """All rows of parts of one survey; items are numbered anew from 0, part after part."""
-        parts, first = [], 0
+        parts = []
+        first = 0
         for rows in subsets:
             known = np.unique(np.append(rows.item, rows.pulses.item))
             pulses = replace(rows.pulses, item=first + np.searchsorted(known, rows.pulses.item))
@@ -235,16 +236,22 @@ def background(rows: Rows, survey: Survey) -> Background:
     survey : Survey
         Of which they are.
     """
-    first, second = np.flatnonzero(rows.metric), np.flatnonzero(rows.two_times)
+    first = np.flatnonzero(rows.metric)
+    second = np.flatnonzero(rows.two_times)
     row = np.append(first, second)
     gps_time = np.append(rows.gps_time[first], rows.gps_time_2[second])
     partials = np.vstack([rows.partials[first], rows.partials_2[second]])
     sigma = stated_sigma(survey.trajectory, survey.pos, gps_time)
     return Background(
-        row, gps_time, partials[:, :3] * sigma.position,
-        np.einsum("li,lij->lj", partials[:, 3:], sigma.attitude), survey.pos.correlation_time,
-        survey.pos.windows, sigma.clock, sigma.history.raised(gps_time),
-    )  # fmt: skip
+        row,
+        gps_time,
+        partials[:, :3] * sigma.position,
+        np.einsum("li,lij->lj", partials[:, 3:], sigma.attitude),
+        survey.pos.correlation_time,
+        survey.pos.windows,
+        sigma.clock,
+        sigma.history.raised(gps_time),
+    )
 
 
 def reference_of(survey: Survey) -> Reference:
@@ -256,5 +263,8 @@ def reference_of(survey: Survey) -> Reference:
     """
     start, end = survey.trajectory.gps_time[[0, -1]]
     targets = survey.surveyed
-    place = targets.position if len(targets) else survey.trajectory.position
+    if len(targets):
+        place = targets.position
+    else:
+        place = survey.trajectory.position
     return Reference(float(start), float(end), place.mean(axis=0))

@@ -20,7 +20,9 @@ def moved_by(correction: Correction | None, xyz: np.ndarray, gps_time: np.ndarra
     xyz, gps_time : (n, 3), (n,) array
         Units: m, s.
     """
-    return np.zeros(xyz.shape) if correction is None else correction.increments(xyz, gps_time)[0]
+    if correction is None:
+        return np.zeros(xyz.shape)
+    return correction.increments(xyz, gps_time)[0]
 
 
 def places(
@@ -94,7 +96,8 @@ def consistent(gps_time: np.ndarray, direction: np.ndarray, residual: np.ndarray
     """
     order = np.argsort(gps_time, kind="stable")
     size = SETTINGS.plane_points  # in a street they come within a second
-    group, moment = np.arange(len(order)) // size, np.floor(gps_time[order] / SETTINGS.window)
+    group = np.arange(len(order)) // size
+    moment = np.floor(gps_time[order] / SETTINGS.window)
     begins = np.flatnonzero((np.diff(group) != 0) | (np.diff(moment) != 0)) + 1
     agree = np.ones(len(gps_time), dtype=bool)
     for rows in np.split(order, begins):

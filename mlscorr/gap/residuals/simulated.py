@@ -55,15 +55,18 @@ class SimulatedBeams:
         apart = np.abs(self._time[near] - chunk.gps_time)
         row = near[apart.argmin(axis=0), np.arange(len(chunk))]
         same = np.flatnonzero(apart.min(axis=0) <= SETTINGS.same_time)
-        place, xyz = self._place[row[same]], chunk.xyz[same]
-        distance, known = self._distance(xyz, place), self._distance(self.xyz[place], place)
+        place = self._place[row[same]]
+        xyz = chunk.xyz[same]
+        distance = self._distance(xyz, place)
+        known = self._distance(self.xyz[place], place)
         closer = np.flatnonzero((distance <= SETTINGS.cell) & ~(distance >= known))
         closer = closer[np.argsort(-distance[closer], kind="stable")]  # the nearest comes last
         self.xyz[place[closer]] = xyz[closer]
 
     def _distance(self, xyz, place):
         """How far points (n, 3) lie from the observed, or the corrected one at a place."""
-        apart, moved = xyz - self._observed[place], self._moved[place]
+        apart = xyz - self._observed[place]
+        moved = self._moved[place]
         return np.minimum(*(np.linalg.norm(each, axis=1) for each in (apart, apart - moved)))
 
     @property
@@ -97,9 +100,13 @@ class SimulatedClouds:
 
 
 def rows_against(
-    survey: Survey, matched: TargetObservations, candidates: Candidates, patches: Patches | None,
-    simulated: SimulatedClouds, correction: Correction | None = None,
-) -> tuple[Rows, str]:  # fmt: skip
+    survey: Survey,
+    matched: TargetObservations,
+    candidates: Candidates,
+    patches: Patches | None,
+    simulated: SimulatedClouds,
+    correction: Correction | None = None,
+) -> tuple[Rows, str]:
     """Rows of observed minus simulated, NaN where nothing is paired, and a sentence on the pairs.
 
     Parameters
@@ -129,7 +136,8 @@ def rows_against(
         near = replace(near, centre=near.centre - moved)
         direction, residual, noise = _by_beams(corrected, patches, near, simulated.beams)
         known = np.isfinite(residual)
-        by_beams, other = int(known.sum()), None
+        by_beams = int(known.sum())
+        other = None
         if simulated.patches is not None:
             other = _nearest(near, simulated.patches)
             also = _by_place(corrected, patches, near, simulated.patches, other)
@@ -163,7 +171,8 @@ def spread_patches(patches: Patches) -> Patches:
     ----------
     patches : Patches
     """
-    columns, rng = [patches.gps_time, *patches.normal.T], np.random.default_rng(0)
+    columns = [patches.gps_time, *patches.normal.T]
+    rng = np.random.default_rng(0)
     return patches[spread(columns, SETTINGS.patches, rng)]
 
 
@@ -181,14 +190,17 @@ def without_unpaired(compared: Sequence[Rows]) -> list[Rows]:
 
 def _against_targets(survey, matched, candidates, simulated):
     """Target rows, of the same name at about the same time."""
-    rows, other = target_rows(survey, matched, candidates), simulated.matched
-    residual, noise = np.full(len(rows), np.nan), rows.noise.copy()
+    rows = target_rows(survey, matched, candidates)
+    other = simulated.matched
+    residual = np.full(len(rows), np.nan)
+    noise = rows.noise.copy()
     for i in range(len(matched)):
         same = np.flatnonzero(np.array(other.name, dtype=object) == matched.name[i])
         apart = np.abs(other.gps_time[same] - matched.gps_time[i])
         if len(same) == 0 or apart.min() > SETTINGS.pair_pause:
             continue
-        j, on = same[np.argmin(apart)], np.flatnonzero(rows.item == i)
+        j = same[np.argmin(apart)]
+        on = np.flatnonzero(rows.item == i)
         axes = rows.direction[on]
         residual[on] = axes @ (matched.position[i] - other.position[j])
         noise[on] += np.einsum("ai,ij,aj->a", axes, other.covariance[j], axes)
@@ -197,13 +209,16 @@ def _against_targets(survey, matched, candidates, simulated):
 
 def _by_beams(survey, patches, near, beams):
     """Direction (p, 3), residual and its variance (p,) by pulses of the same times; else NaN."""
-    normal, p = patches.normal, len(patches)
+    normal = patches.normal
+    p = len(patches)
     along = np.einsum("ni,ni->n", beams.apart, normal[beams.patch])
-    residual, noise = np.full(p, np.nan), np.ones(p)
+    residual = np.full(p, np.nan)
+    noise = np.ones(p)
     ends = np.searchsorted(beams.patch, np.arange(p + 1))
     for i in range(p):
         values = along[ends[i] : ends[i + 1]]
-        count, values = len(values), values[np.isfinite(values)]
+        count = len(values)
+        values = values[np.isfinite(values)]
         if len(values) < max(SETTINGS.plane_points, SETTINGS.facet_share * count):
             continue
         off = np.abs(values - np.median(values))
@@ -252,15 +267,18 @@ def _by_place(survey, patches, near, simulated, other):
 
 def _against_channels(rows, survey, simulated, other):
     """Roughness and return rates less those of the simulated patches; NaN without one."""
-    residual, noise, believed = rows.residual.copy(), rows.noise.copy(), rows.believed.copy()
+    residual = rows.residual.copy()
+    noise = rows.noise.copy()
+    believed = rows.believed.copy()
     channels = np.isin(rows.channel, ("roughness", "return_rate"))
     if simulated is None:
         return replace(rows, residual=np.where(channels, np.nan, residual))
     ratio, ratio_noise, _, flat = roughness(survey, simulated)
     share, share_noise, counted = return_rate(simulated)
     for channel, value, variance, known in (
-        ("roughness", ratio, ratio_noise, flat), ("return_rate", share, share_noise, counted),
-    ):  # fmt: skip
+        ("roughness", ratio, ratio_noise, flat),
+        ("return_rate", share, share_noise, counted),
+    ):
         on = np.flatnonzero(rows.channel == channel)
         pair = other[rows.item[on]]
         has = (pair >= 0) & known[pair]

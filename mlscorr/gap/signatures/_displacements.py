@@ -46,12 +46,19 @@ def displacements(rows: Rows, survey: Survey) -> Displacements:
     def mean(values):
         return np.column_stack([np.bincount(number, v) / count for v in values.T])
 
-    time, xyz = mean(pulses.gps_time[:, None])[:, 0], mean(pulses.xyz)
+    time = mean(pulses.gps_time[:, None])[:, 0]
+    xyz = mean(pulses.xyz)
     common = covariates(
-        survey, time, xyz, replace(pulses, item=number), np.arange(len(known)),
-        survey.trajectory.segment(time) + 1, np.zeros((len(known), 3)),
-    )  # fmt: skip
-    sign, directions = np.where(known % 2, -1.0, 1.0), _directions(survey, time, xyz)
+        survey,
+        time,
+        xyz,
+        replace(pulses, item=number),
+        np.arange(len(known)),
+        survey.trajectory.segment(time) + 1,
+        np.zeros((len(known), 3)),
+    )
+    sign = np.where(known % 2, -1.0, 1.0)
+    directions = _directions(survey, time, xyz)
     more = common | _motion(survey.trajectory, time)
     return Displacements(known // 2, sign, directions, more, xyz)
 
@@ -61,7 +68,8 @@ def _directions(survey, time, xyz):
     pose, (before, after) = survey.trajectory.at(time), _about(survey.trajectory, time)
     right, forward, up = np.moveaxis(pose.attitude.as_matrix(), 2, 0)
     velocity = (after.position - before.position) / (after.gps_time - before.gps_time)[:, None]
-    arm, sight = xyz - pose.position, xyz - scanner_origin(survey, time)
+    arm = xyz - pose.position
+    sight = xyz - scanner_origin(survey, time)
     beam = sight / np.linalg.norm(sight, axis=1, keepdims=True)
     unit = np.broadcast_to(np.eye(3)[:, None], (3, len(time), 3))
     moved = {

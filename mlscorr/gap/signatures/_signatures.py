@@ -74,10 +74,14 @@ class Signature:
         """
         estimate = np.asarray(estimate, dtype=float)
         if self.kind.is_wave():
-            size, phase = np.hypot(*estimate), np.arctan2(estimate[1], estimate[0])
+            size = np.hypot(*estimate)
+            phase = np.arctan2(estimate[1], estimate[0])
             return self.kind(magnitude=float(size), phase=float(phase), **self.fixed)
         values = np.abs(estimate) if self.kind.random else estimate
-        magnitude = float(values[0]) if len(values) == 1 else values.tolist()
+        if len(values) == 1:
+            magnitude = float(values[0])
+        else:
+            magnitude = values.tolist()
         return self.kind(magnitude=magnitude, **self.fixed)
 
 
@@ -111,7 +115,9 @@ def signatures(
     tuple of Signature, dict of str
         Sentences by the names of effects without one.
     """
-    bench, signs, left_out = Bench(rows, survey), [], {}
+    bench = Bench(rows, survey)
+    signs = []
+    left_out = {}
     rng = np.random.default_rng(0) if rng is None else rng
     for kind in known_effects() if effects is None else effects:
         if kind.needs_mounting() and survey.mounting is None:
@@ -172,11 +178,14 @@ def too_far(rows: Rows, moved: np.ndarray, what: str) -> str:
     number = np.unique(rows.item[part], return_inverse=True)[1]
     worst = np.zeros(number.max(initial=0) + 1)
     np.maximum.at(worst, number, np.abs(moved[part]))
-    usual, largest = np.median(worst), SETTINGS.largest_shift
-    return "" if usual <= largest else (
+    usual = np.median(worst)
+    largest = SETTINGS.largest_shift
+    if usual <= largest:
+        return ""
+    return (
         f"{what} moves points by {usual:.3g} m in the median: more than {largest:g} m no survey is "
         "off everywhere. Is its unit right?"
-    )  # fmt: skip
+    )
 
 
 def signature(bench: Bench, kind: type[Effect], fixed: dict, rng: np.random.Generator) -> Signature:
@@ -191,18 +200,33 @@ def signature(bench: Bench, kind: type[Effect], fixed: dict, rng: np.random.Gene
     rng : numpy.random.Generator
         For random effects.
     """
-    rows, size = bench.rows, kind.quantities()["magnitude"]
-    m, none = len(rows), np.zeros(len(rows))
-    typical = size.typical if size.typical is not None else 1e-3 * size.largest
+    rows = bench.rows
+    size = kind.quantities()["magnitude"]
+    m = len(rows)
+    none = np.zeros(len(rows))
+    if size.typical is not None:
+        typical = size.typical
+    else:
+        typical = 1e-3 * size.largest
     if kind.is_scatter() or kind.stage == "return":
-        step = SETTINGS.loss * min(1.0, size.largest) if kind.stage == "return" else typical
+        if kind.stage == "return":
+            step = SETTINGS.loss * min(1.0, size.largest)
+        else:
+            step = typical
         change = bench.change(kind(magnitude=step, **fixed), rng)
         return Signature(
-            kind, fixed, ("magnitude",), (size.unit,), np.array([typical]),
-            (change.shift / step)[:, None], change.variance / step**2, change.growth / step**2,
-        )  # fmt: skip
+            kind,
+            fixed,
+            ("magnitude",),
+            (size.unit,),
+            np.array([typical]),
+            (change.shift / step)[:, None],
+            change.variance / step**2,
+            change.growth / step**2,
+        )
     tries = _tries(kind, size, fixed)
-    jacobian, step = np.zeros((m, len(tries))), SETTINGS.step * typical
+    jacobian = np.zeros((m, len(tries)))
+    step = SETTINGS.step * typical
     for column, (_, unit, more) in enumerate(tries if _is_seen(rows, fixed) else ()):
         ends = [
             bench.change(kind(magnitude=np.multiply(unit, sign * step).tolist(), **more)).shift
@@ -211,9 +235,15 @@ def signature(bench: Bench, kind: type[Effect], fixed: dict, rng: np.random.Gene
         jacobian[:, column] = (ends[1] - ends[0]) / (step * (2 if size.least is None else 1))
     names = tuple(name for name, _, _ in tries)
     return Signature(
-        kind, fixed, names, (size.unit,) * len(tries), np.full(len(tries), typical),
-        jacobian, none, none,
-    )  # fmt: skip
+        kind,
+        fixed,
+        names,
+        (size.unit,) * len(tries),
+        np.full(len(tries), typical),
+        jacobian,
+        none,
+        none,
+    )
 
 
 def _is_seen(rows, fixed):
@@ -243,7 +273,8 @@ def _bank(kind, rows, survey):
     if kind.is_on_target():
         used = np.unique(rows.survey_item[rows.survey_item >= 0])
         return [{"target": rows.targets.name[i]} for i in used]
-    known, moment = kind.quantities(), kind.moment()
+    known = kind.quantities()
+    moment = kind.moment()
     rest = {name: known[name].typical for name in kind.circumstances() if name not in moment}
     if not moment:
         return [rest]
@@ -261,7 +292,8 @@ def _times(rows, survey, spacing):
     if len(known) == 0:
         return []
     known = np.append(known, rows.gps_time_2[rows.two_times])
-    low, high = known.min(), known.max()
+    low = known.min()
+    high = known.max()
     inside = np.clip(survey.trajectory.gaps, low, high)
     lost = float((inside[:, 1] - inside[:, 0]).sum())
     number = int(np.clip((high - low - lost) / spacing, 1, SETTINGS.events))
@@ -283,7 +315,8 @@ def select(signs: Iterable[Signature], rows: Rows, used: np.ndarray) -> tuple[Si
         Of which the signatures are.
     used : (m,) bool array
     """
-    names, part = ("jacobian", "variance", "growth"), rows.select(used)
+    names = ("jacobian", "variance", "growth")
+    part = rows.select(used)
     return tuple(
         replace(sign, **{name: getattr(sign, name)[used] for name in names})
         for sign in signs

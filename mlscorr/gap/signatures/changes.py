@@ -60,9 +60,12 @@ class Bench:
         ValueError
             For a stage that needs the mounting where that isn't known.
         """
-        m, stage = len(self.rows), effect.stage
+        m = len(self.rows)
+        stage = effect.stage
         check_mounting(self.survey, [effect])
-        shift, variance, growth = np.zeros(m), np.zeros(m), np.zeros(m)
+        shift = np.zeros(m)
+        variance = np.zeros(m)
+        growth = np.zeros(m)
         rng = np.random.default_rng(0) if rng is None else rng
         if stage == "return":
             shift = self._lost(effect, rng)
@@ -114,7 +117,8 @@ class Bench:
 
     def _moved(self, returns=None, mounting=None):
         """How far pulses (k, 3) move on the map when these are recorded instead. Units: m."""
-        body, pose = self._body, self._pose
+        body = self._body
+        pose = self._pose
         recorded = self.survey.mounting
         if returns is not None and not self._same(returns, "angle", "range"):
             body = recorded.boresight.apply(self._scanner_xyz(returns)) + recorded.lever_arm
@@ -184,8 +188,10 @@ class Bench:
                 if getattr(changed, name) is not getattr(pulses, name):
                     error = getattr(changed, name) - getattr(pulses, name)
                     sums[name] = sums.get(name, 0.0) + error**2
-        m, rows = len(self.rows), self.rows
-        variance, along_normal = np.zeros(m), np.zeros(m)
+        m = len(self.rows)
+        rows = self.rows
+        variance = np.zeros(m)
+        along_normal = np.zeros(m)
         for name, total in sums.items():
             moved = self._speeds[name] * np.sqrt(total / SETTINGS.replicas)[pulse, None]
             along_normal += self._mean(np.einsum("ki,ki->k", moved, self._pulses.normal) ** 2)
@@ -210,7 +216,8 @@ class Bench:
         """The recorded trajectory, thinned as far as its gaps stay what they are, and with the
         epochs about each row, between which alone a jump may pass for a slope.
         """
-        whole, last = self.survey.trajectory, len(self.survey.trajectory) - 1
+        whole = self.survey.trajectory
+        last = len(self.survey.trajectory) - 1
         step = max(1, int(SETTINGS.epoch_step / np.median(np.diff(whole.gps_time))))
         ends = np.searchsorted(whole.gps_time, whole.gaps).ravel()
         times = self.rows.gps_time, self.rows.gps_time_2[self.rows.two_times]
@@ -219,7 +226,9 @@ class Bench:
         session = None if whole.session is None else whole.session[rows]
         pose = whole.gps_time[rows], whole.position[rows], whole.attitude[rows]
         thin = Trajectory(*pose, session=session)
-        return thin if np.array_equal(thin.gaps, whole.gaps) else whole
+        if np.array_equal(thin.gaps, whole.gaps):
+            return thin
+        return whole
 
     def _pose_shift(self, changed):
         """Shift (m,) of the residuals when this is recorded instead of the thinned trajectory."""
@@ -235,9 +244,11 @@ class Bench:
         """Derivative, sparse (m, 6 e), of the rows by the poses at the e epochs: each look, the
         first and the second, lies between two of them.
         """
-        rows, epochs = self.rows, self._trajectory.gps_time
+        rows = self.rows
+        epochs = self._trajectory.gps_time
         second = np.where(rows.two_times, rows.gps_time_2, rows.gps_time)
-        m, legs = len(rows), []
+        m = len(rows)
+        legs = []
         for time, partials in ((rows.gps_time, rows.partials), (second, rows.partials_2)):
             before = np.clip(np.searchsorted(epochs, time, side="right") - 1, 0, len(epochs) - 2)
             weight = (time - epochs[before]) / (epochs[before + 1] - epochs[before])
@@ -249,12 +260,14 @@ class Bench:
 
     def _pose_variance(self, effect, rng):
         """Variance (m,) by noise of the recorded trajectory, which rows of a moment share."""
-        given, replicas = (self._trajectory, self.rows.reference, rng), SETTINGS.replicas
+        given = (self._trajectory, self.rows.reference, rng)
+        replicas = SETTINGS.replicas
         return sum(self._pose_shift(effect.apply(*given)) ** 2 for _ in range(replicas)) / replicas
 
     def _control_shift(self, effect):
         """Shift (m,) of the residuals, observed - surveyed, by moved surveyed targets."""
-        rows, targets = self.rows, self.rows.targets
+        rows = self.rows
+        targets = self.rows.targets
         shift = np.zeros(len(rows))
         if len(targets) == 0:
             return shift

@@ -29,7 +29,8 @@ def expected(rows: Rows, survey: Survey, effects: Iterable[Effect]) -> Change:
     ValueError
         For a user's own that moves everything by more than any survey is off.
     """
-    bench, total = Bench(rows, survey), np.zeros((3, len(rows)))
+    bench = Bench(rows, survey)
+    total = np.zeros((3, len(rows)))
     for effect in effects:
         change = bench.change(effect)
         what = f"The simulator's {effect.name} of {effect.magnitude}"
@@ -79,7 +80,8 @@ def curvature(
     parts : iterable of (Signature, (p,) array)
         With their sizes. Random ones are left out.
     """
-    bench, curved = Bench(rows, survey), np.zeros(len(rows))
+    bench = Bench(rows, survey)
+    curved = np.zeros(len(rows))
     for part, size in (pair for pair in parts if not pair[0].kind.random):
         with suppress(ValueError):  # of an effect that has no other sign
             # truth is what was recorded, less the effect

@@ -30,7 +30,8 @@ def as_believed(survey: Survey, simulator: Simulator) -> tuple[Survey, tuple[Eff
         For a difference of mountings that no survey can have, or a simulator with a mounting where
         the survey has none.
     """
-    recorded, believed = survey.mounting, simulator.mounting
+    recorded = survey.mounting
+    believed = simulator.mounting
     effects = list(simulator.effects)
     if believed is not None and recorded is None:
         raise SurveyFileError(
@@ -44,7 +45,9 @@ def as_believed(survey: Survey, simulator: Simulator) -> tuple[Survey, tuple[Eff
             effects.append(LeverArm(magnitude=arm.tolist()))
         if np.abs(turn).max() > 1e-9:
             effects.append(Boresight(magnitude=np.degrees(turn).tolist()))
-    trajectory, old, new = survey.trajectory, survey.pos, simulator.pos
+    trajectory = survey.trajectory
+    old = survey.pos
+    new = simulator.pos
     scales = {
         "position_sigma": new.position_sigma / old.position_sigma,
         "attitude_sigma": np.asarray(new.attitude_sigma) / np.asarray(old.attitude_sigma),
@@ -75,7 +78,8 @@ def with_cause(simulator: Simulator, survey: Survey, cause: Any) -> Simulator:
     if simulator.mounting is not None:  # differences of the mounting have become effects
         added += as_believed(survey, replace(simulator, effects=()))[1]
     effects = reduce(joined, added, list(simulator.effects))
-    scale, pos = cause.model.scale, simulator.pos
+    scale = cause.model.scale
+    pos = simulator.pos
     if scale != 1.0:  # what was found is no default any more
         sigmas = "position_sigma", "attitude_sigma"
         pos = replace(
@@ -100,7 +104,8 @@ def joined(effects: Sequence[Effect], new: Effect) -> list[Effect]:
     fixed = _fixed(new)
     for i, old in enumerate(effects):
         if old.name == new.name and _fixed(old) == fixed:
-            a, b = np.asarray(old.magnitude, float), np.asarray(new.magnitude, float)
+            a = np.asarray(old.magnitude, float)
+            b = np.asarray(new.magnitude, float)
             total = np.hypot(a, b) if new.random else a + b
             if new.name == Dropout.name:  # of the pulses that are left
                 total = a + b - a * b

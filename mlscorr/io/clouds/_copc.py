@@ -54,7 +54,8 @@ def check_hierarchy(layout: LasLayout, file: BinaryIO, chunks: Sequence[tuple[in
 
 def _pages(layout, file, start, size, chunks) -> Iterator[np.ndarray]:
     """Entries of each page of a hierarchy."""
-    pages, known = [(start, size)], {start}
+    pages = [(start, size)]
+    known = {start}
     while pages:
         start, size = pages.pop()
         if start + size > layout.size:

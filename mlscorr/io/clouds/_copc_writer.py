@@ -43,7 +43,9 @@ class CopcWriter:
         for user, record in {layout.owner(start) for start, _ in layout.vlrs} - {COPC}:
             if user == COPC[0]:  # of an octree that is no more
                 layout = replace(layout, head=layout.head_with(user, record, None))
-        self._layout, self._output, self._folder = layout, output, folder
+        self._layout = layout
+        self._output = output
+        self._folder = folder
         self._vlr = lazrs.LazVlr.new_for_compression(
             layout.point_format, layout.extra_bytes, use_variable_size_chunks=True
         )
@@ -98,7 +100,8 @@ class CopcWriter:
 
     def _write_evlrs(self, file):
         """Append the EVLRs of a file with a new hierarchy; returns start and size of its page."""
-        start, kept = self._output.tell(), 0
+        start = self._output.tell()
+        kept = 0
         for position, size in evlrs(self._layout, file):
             file.seek(position)
             if not file.read(EVLR_HEADER.size).startswith(COPC[0], 2):
@@ -121,7 +124,10 @@ class CopcWriter:
         """State the octree in the first VLR of the head."""
         cube = octree.cube
         half = cube.edge / 2
-        times = self._times if np.isfinite(self._times).all() else np.zeros(2)
+        if np.isfinite(self._times).all():
+            times = self._times
+        else:
+            times = np.zeros(2)
         info = INFO.pack(*(cube.corner + half), half, cube.edge / (1 << GRID_BITS), *page, *times)
         start = self._layout.vlrs[0][0] + VLR_HEADER.size
         self.head[start : start + INFO.size] = info
@@ -129,12 +135,14 @@ class CopcWriter:
 
 def _batches(nodes) -> Iterator[list[tuple[Key, np.ndarray]]]:
     """Some nodes at a time, about as many points as memory holds."""
-    batch, points = [], 0
+    batch = []
+    points = 0
     for node in nodes:
         batch.append(node)
         points += len(node[1])
         if points >= SETTINGS.chunk_points:
             yield batch
-            batch, points = [], 0
+            batch = []
+            points = 0
     if batch:
         yield batch

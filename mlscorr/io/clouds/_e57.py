@@ -22,7 +22,8 @@ from mlscorr.io.trajectories import DAY
 CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
 SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")  # m, rad
 COLOURS = ("colorRed", "colorGreen", "colorBlue")
-TIME, INTENSITY = "timeStamp", "intensity"
+TIME = "timeStamp"
+INTENSITY = "intensity"
 INVALID = ("cartesianInvalidState", "sphericalInvalidState", "isTimeStampInvalid")
 FIELDS = {*CARTESIAN, *SPHERICAL, *COLOURS, *INVALID, TIME, INTENSITY}
 
@@ -45,9 +46,10 @@ def open_e57(path: Path) -> CloudSource:
     """
     with _opened(path) as root:
         scans = _scans(path, root)
-        metadata = (
-            root["coordinateMetadata"].value() if root.isDefined("coordinateMetadata") else ""
-        )
+        if root.isDefined("coordinateMetadata"):
+            metadata = root["coordinateMetadata"].value()
+        else:
+            metadata = ""
         if not scans:
             raise ValueError(f"{path} holds no points.")
         dropped = sorted({name for scan in scans for name in scan.fields} - FIELDS)
@@ -55,11 +57,15 @@ def open_e57(path: Path) -> CloudSource:
         starts = {scan.starts for scan in scans}
     times = "and their acquisitionStart" if True in starts else ""
     return CloudSource(
-        path, sum(scan.points for scan in scans),
+        path,
+        sum(scan.points for scan in scans),
         f"of {len(scans)} scan{'s' * (len(scans) > 1)}, times by timeStamp {times}".strip(),
-        tuple(dropped), max(limits), metadata or None, partial(_intensities, path),
+        tuple(dropped),
+        max(limits),
+        metadata or None,
+        partial(_intensities, path),
         partial(_blocks, path),
-    )  # fmt: skip
+    )
 
 
 @contextmanager
@@ -87,7 +93,8 @@ class _Scan:
     def __init__(self, path, node, number):
         from pye57 import libe57
 
-        self.path, self.node = path, node
+        self.path = path
+        self.node = node
         self.vector = node["points"]
         self.points = self.vector.childCount()
         self._prototype = libe57.StructureNode(self.vector.prototype())

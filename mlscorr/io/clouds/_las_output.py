@@ -88,7 +88,9 @@ class PlainWriter:
     """
 
     def __init__(self, layout: LasLayout, output: LasOutput, is_laz: bool):
-        self._layout, self._output, self._is_laz = layout, output, is_laz
+        self._layout = layout
+        self._output = output
+        self._is_laz = is_laz
         self._vlr = lazrs.LazVlr.new_for_compression(layout.point_format, layout.extra_bytes)
         data = bytes(self._vlr.record_data()) if is_laz else None
         if layout.is_copc:  # and the new one is none

@@ -49,7 +49,8 @@ class PlainPoints:
 
     def __init__(self, file: BinaryIO, start: int, record_length: int):
         self._file: Any = file
-        self._start, self._length = start, record_length
+        self._start = start
+        self._length = record_length
 
     def seek(self, point: int) -> None:
         """Go on with a point.
@@ -91,7 +92,9 @@ class ChunkedPoints:
     """
 
     def __init__(self, file: BinaryIO, laszip: bytes, selection: lazrs.DecompressionSelection):
-        self._file, self._laszip, self._selection = file, laszip, selection
+        self._file = file
+        self._laszip = laszip
+        self._selection = selection
         vlr = lazrs.LazVlr(laszip)
         self._length = vlr.item_size()
         self._chunks = lazrs.read_chunk_table(file, vlr)  # leaves the file at the first chunk
@@ -130,7 +133,8 @@ class ChunkedPoints:
                 self._held = self._decoded(len(rest) // self._length)
             taken = min(len(rest), len(self._held))
             rest[:taken] = self._held[:taken]
-            rest, self._held = rest[taken:], self._held[taken:]
+            rest = rest[taken:]
+            self._held = self._held[taken:]
 
     def _decoded(self, points):
         """Bytes of the next chunks, which hold so many points at least, if there are as many."""

@@ -14,14 +14,20 @@ from mlscorr.io.store import open_file
 
 def decoding_points(layout: LasLayout, first: int, end: int) -> AbstractContextManager:
     """Where lazrs reads some points of a file."""
-    points = f"Points {first} to {end - 1}" if end - first > 1 else f"Point {first}"
+    if end - first > 1:
+        points = f"Points {first} to {end - 1}"
+    else:
+        points = f"Point {first}"
     return decoding(f"{points} of {layout.points} in {layout.path} cannot be decoded")
 
 
 def read_records(
-    layout: LasLayout, chunk_size: int, first: int = 0, end: int | None = None,
+    layout: LasLayout,
+    chunk_size: int,
+    first: int = 0,
+    end: int | None = None,
     is_brief: bool = False,
-) -> Iterator[np.ndarray]:  # fmt: skip
+) -> Iterator[np.ndarray]:
     """Records chunk by chunk, each in the memory of the one before.
 
     Parameters

@@ -84,7 +84,9 @@ class Octree:
     """
 
     def __init__(self, layout: LasLayout, blocks: Blocks, folder: Path):
-        self._layout, self._blocks, self._folder = layout, blocks, folder
+        self._layout = layout
+        self._blocks = blocks
+        self._folder = folder
         limit = SETTINGS.largest_coordinate
         cube = Cube.around(np.nan_to_num(cloud_box(layout)).clip(-limit, limit), layout.scale)
         while True:  # once more where points have left the cube about the box of the header
@@ -154,7 +156,8 @@ class Octree:
 
     def _parts(self, blocks, above, counts):
         """Cubes with the records in each, which memory holds, one beside the other."""
-        groups, numbers = [], np.zeros(counts.shape, int)
+        groups = []
+        numbers = np.zeros(counts.shape, int)
         _merge(counts, above, groups, numbers)
         with tempfile.TemporaryFile(dir=self._folder) as file:
             spool = Spool(file, [count for _, count in groups], self._layout.record_length)

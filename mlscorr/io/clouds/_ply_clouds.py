@@ -84,17 +84,25 @@ def open_ply(path: Path) -> CloudSource:
     """
     vertices = _header(path)
     names = vertices.kind.names
-    time, intensity = vertices.first(TIMES), vertices.first(INTENSITIES)
+    time = vertices.first(TIMES)
+    intensity = vertices.first(INTENSITIES)
     if time is None:
         raise lacking_time(path, names, "", "gps_time (double)")
     used = {*map(vertices.names.get, AXES), time, intensity, *vertices.colours}
-    colour = vertices.kind[vertices.colours[0]] if vertices.colours else np.dtype("u1")
+    if vertices.colours:
+        colour = vertices.kind[vertices.colours[0]]
+    else:
+        colour = np.dtype("u1")
     return CloudSource(
-        path, vertices.points, f"with times by {shown(time)}",
+        path,
+        vertices.points,
+        f"with times by {shown(time)}",
         tuple(shown(name) for name in names if name not in used),
-        float(np.iinfo(colour).max) if colour.kind in "iu" else 1.0, None,
-        partial(_intensities, vertices, intensity), partial(_blocks, vertices, time, intensity),
-    )  # fmt: skip
+        float(np.iinfo(colour).max) if colour.kind in "iu" else 1.0,
+        None,
+        partial(_intensities, vertices, intensity),
+        partial(_blocks, vertices, time, intensity),
+    )
 
 
 def _cut_off(path, there, announced):
@@ -112,7 +120,10 @@ def _header(path) -> _Vertices:
     form = next((line[1] for line in lines if line[0] == "format" and len(line) > 1), "")
     elements = [line for line in lines if line[0] == "element"]
     first = elements[0] if elements else []
-    count = first[2] if len(first) == 3 and first[1] == "vertex" else ""
+    if len(first) == 3 and first[1] == "vertex":
+        count = first[2]
+    else:
+        count = ""
     places = [place for place, line in enumerate(lines) if line[0] == "element"] + [len(lines)]
     rows = [line for line in lines[places[0] : places[1 % len(places)]] if line[0] == "property"]
     is_plain = all(len(line) == 3 and line[1] in KINDS for line in rows)
@@ -141,8 +152,11 @@ def _blocks(vertices, time, intensity, size) -> Iterator[SourceBlock]:
     """SourceBlocks of a PLY."""
     axes = [vertices.names[axis] for axis in AXES]
     named = {"coordinates": axes[0], "times": time}
-    singles = [what for what, name in named.items() if vertices.kind[name].itemsize == 4
-               and vertices.kind[name].kind == "f"]  # fmt: skip
+    singles = [
+        what
+        for what, name in named.items()
+        if vertices.kind[name].itemsize == 4 and vertices.kind[name].kind == "f"
+    ]
     for rows in vertices.read(size):
         xyz = np.column_stack([rows[axis].astype(float) for axis in axes])
         times = rows[time].astype(float)

@@ -90,7 +90,8 @@ def _count_seconds(layout, new_week, done):
 
     Units: s.
     """
-    seconds, counts = np.empty(0), np.empty(0, np.int64)
+    seconds = np.empty(0)
+    counts = np.empty(0, np.int64)
     for records in read_records(layout, SETTINGS.chunk_points, is_brief=True):
         some, number = np.unique(_second(records, new_week), return_counts=True)
         seconds, which = np.unique(np.concatenate([seconds, some]), return_inverse=True)

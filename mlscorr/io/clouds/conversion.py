@@ -82,7 +82,9 @@ def written_name(path: Path) -> str:
     >>> written_name(Path("a/scan.las")), written_name(Path("a/scan.e57"))
     ('scan.las', 'scan.laz')
     """
-    return path.with_suffix(".laz").name if is_foreign(path) else path.name
+    if is_foreign(path):
+        return path.with_suffix(".laz").name
+    return path.name
 
 
 def converted(path: Path) -> Converted:
@@ -119,7 +121,9 @@ def recorded_points(file: CloudFile) -> int:
     ----------
     file : CloudFile
     """
-    return converted(file.path).source.points if read_in_part(file.path) else file.points
+    if read_in_part(file.path):
+        return converted(file.path).source.points
+    return file.points
 
 
 @cache
@@ -143,7 +147,8 @@ def _on_disk(path):
 
 def _convert(source, target, limit):
     """Write a source's points, or the first of them, as LAZ."""
-    size, end = SETTINGS.chunk_points, limit or source.points
+    size = SETTINGS.chunk_points
+    end = limit or source.points
     base, gain, scaled = _scale(source, size, end)
     blocks = _first(source.blocks(size), end)
     first = next((block for block in blocks if len(block.xyz)), None)
@@ -151,17 +156,24 @@ def _convert(source, target, limit):
         raise ValueError(f"{source.path} holds no valid points.")
     is_standard, taken = _time_system(source.path, first.gps_time)
     crs, crs_note = _known_crs(source.crs)
-    done, count = progress_of(f"Reading {source.path.name}", end), 0
+    done = progress_of(f"Reading {source.path.name}", end)
+    count = 0
     has_colours = first.colours is not None
     with cloud_writer(target, first.xyz[0], crs, RESOLUTION, None, is_standard, has_colours) as laz:
         for block in chain([first], blocks):
             number = len(block.xyz)
             _check_extent(source.path, block.xyz - first.xyz[0])
-            intensity = np.zeros(number) if block.intensity is None else block.intensity
+            if block.intensity is None:
+                intensity = np.zeros(number)
+            else:
+                intensity = block.intensity
             intensity = _in_16_bits((np.nan_to_num(intensity) - base) * gain)
             is_timed = ~np.isin(block.gps_time, NO_TIMES)
             cloud = PointCloud(block.xyz, block.gps_time - taken * is_timed, intensity)
-            colours = np.zeros((number, 3)) if block.colours is None else block.colours
+            if block.colours is None:
+                colours = np.zeros((number, 3))
+            else:
+                colours = block.colours
             colours = _in_16_bits(colours * (LARGEST / source.colour_limit))
             laz.write(cloud, colours=colours if has_colours else None)
             count += number
@@ -197,9 +209,12 @@ def _first(blocks, end):
 
 def _scale(source, size, end):
     """What brings intensities into 16 bits: base, gain, and a phrase on it."""
-    low, high, count = np.inf, -np.inf, 0
+    low = np.inf
+    high = -np.inf
+    count = 0
     for values in source.intensities(size):
-        low, high = np.fmin(low, np.fmin.reduce(values)), np.fmax(high, np.fmax.reduce(values))
+        low = np.fmin(low, np.fmin.reduce(values))
+        high = np.fmax(high, np.fmax.reduce(values))
         if (count := count + len(values)) >= end:
             break
     if not np.isfinite([low, high]).all():
@@ -240,10 +255,19 @@ def _known_crs(wkt):
 
 def _note(source, count, limit, phrases):
     """The sentence on a conversion."""
-    taken = f"the first {count} points of {source.points}" if limit else f"{count} points"
+    if limit:
+        taken = f"the first {count} points of {source.points}"
+    else:
+        taken = f"{count} points"
     invalid = 0 if limit else source.points - count
-    left = f"; {invalid} invalid points were left out" if invalid else ""
-    dropped = f"; without its {', '.join(source.dropped)}" if source.dropped else ""
+    if invalid:
+        left = f"; {invalid} invalid points were left out"
+    else:
+        left = ""
+    if source.dropped:
+        dropped = f"; without its {', '.join(source.dropped)}"
+    else:
+        dropped = ""
     return (
         f"{source.path.name} was read through LAZ at {RESOLUTION * 1e3:g} mm, {taken} "
         f"{source.parts}{phrases}{left}{dropped}. What is corrected is written as "

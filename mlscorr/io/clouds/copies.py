@@ -53,7 +53,9 @@ def find_copies(paths: Iterable[Path]) -> dict[Path, Path]:
 def _announced_points(path: Path) -> int:
     """Number of points by the header alone; zero where it can't tell."""
     if is_foreign(path):
-        return 0 if is_remote(path) else OPENERS[path.suffix.lower()](path).points
+        if is_remote(path):
+            return 0
+        return OPENERS[path.suffix.lower()](path).points
     with open_file(path, is_scattered=True) as file:
         head = file.read(HEADER_SIZES[-1])
     if head[:4] != b"LASF" or len(head) < HEADER_SIZES[0]:
@@ -61,7 +63,9 @@ def _announced_points(path: Path) -> int:
     minor = head[25]
     if minor < 4:
         return struct.unpack_from("<I", head, 107)[0]
-    return struct.unpack_from("<Q", head, 247)[0] if len(head) >= HEADER_SIZES[4] else 0
+    if len(head) >= HEADER_SIZES[4]:
+        return struct.unpack_from("<Q", head, 247)[0]
+    return 0
 
 
 def _copies(paths: list[Path]) -> dict[Path, Path]:
@@ -117,7 +121,8 @@ class _Points:
         )
         if _differ_by_system(own - others):
             return True
-        own, others = self.moments(), other.moments()
+        own = self.moments()
+        others = other.moments()
         is_alike = np.abs(own[1:] - others[1:]).max() <= SETTINGS.single_time_step
         return bool(is_alike) and _differ_by_system(own[:1] - others[:1])
 
@@ -131,7 +136,9 @@ class _Points:
 def _time_moments(layout: LasLayout) -> np.ndarray:
     """First time; last, mean and root mean square (4,) since then of all points. Units: s."""
     origin = records_at(layout, [0])["gps_time"][0]
-    first, last, count = np.inf, -np.inf, 0
+    first = np.inf
+    last = -np.inf
+    count = 0
     total = np.zeros(2)  # of times since the origin, and of their squares
     for records in read_records(layout, SETTINGS.chunk_points, is_brief=True):
         since = records["gps_time"] - origin

@@ -88,5 +88,6 @@ def _descriptor(name, description=b"", scale=None, no_data=None, **fields):
     for key, value in {"name": name, "description": description, **fields}.items():
         setattr(field, key, value)
     if scale is not None:
-        field.scale, field.no_data = scale, no_data
+        field.scale = scale
+        field.no_data = no_data
     return bytes(field)

@@ -109,7 +109,8 @@ def read_chunks(
         For a file that is cut off or damaged.
     """
     layout = in_time_order(read_layout(cloud_file.path), cloud_file.new_week)
-    scale, offset = layout.scale, layout.offset
+    scale = layout.scale
+    offset = layout.offset
     flagged = read = 0
     for whole in read_records(layout, chunk_size, first, end):
         records = whole[cloud_file.rows(whole["point_source_id"])]
@@ -162,7 +163,9 @@ def records_at(layout: LasLayout, places: ArrayLike) -> np.ndarray:
     """
     places = np.asarray(places)
     records = np.empty(len(places), layout.record)
-    length, size, reached = layout.record_length, layout.chunk_size, -1
+    length = layout.record_length
+    size = layout.chunk_size
+    reached = -1
     with open_file(layout.path, is_scattered=True) as file:
         decoder = layout.decoder(file, threads=False, is_brief=True)
         for k, place in enumerate(places.tolist()):

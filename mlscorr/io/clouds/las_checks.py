@@ -60,7 +60,10 @@ def read_layout(path: str | Path) -> LasLayout:
             raise ValueError(_cut_off(path, f"its points start at byte {start} of {size}"))
         layout = LasLayout(path, head + file.read(max(0, start - len(head))), size, source)
         _check_header(layout)
-        points_end = _check_chunks(layout, file) if layout.is_compressed else _check_size(layout)
+        if layout.is_compressed:
+            points_end = _check_chunks(layout, file)
+        else:
+            points_end = _check_size(layout)
         _check_tail(layout, file, points_end)
     return layout
 
@@ -110,7 +113,8 @@ def _check_header(layout):
 
 def _check_kind(layout):
     """That a LAS 1.5 or COPC file is what these may be."""
-    path, number = layout.path, layout.point_format
+    path = layout.path
+    number = layout.point_format
     if layout.version >= (1, 5) and number < 6:
         raise ValueError(
             f"{path} is damaged: LAS 1.5 has point formats 6 to 10, not {number}. Export it anew."
@@ -129,7 +133,8 @@ def _check_kind(layout):
 
 def _check_size(layout):
     """Byte where uncompressed points end."""
-    start, end = len(layout.head), min(layout.tail, layout.size)
+    start = len(layout.head)
+    end = min(layout.tail, layout.size)
     whole = (end - start) // layout.record_length
     if whole < layout.points and end == layout.size:
         evidence = f"{whole} of the {layout.points} points that its header announces fit into"
@@ -148,7 +153,8 @@ def _other_count(layout, points):
 
 def _check_chunks(layout, file):
     """Byte where compressed points end and the chunk table starts."""
-    path, start = layout.path, len(layout.head)
+    path = layout.path
+    start = len(layout.head)
     _check_laszip(layout)
     file.seek(start)
     table = int.from_bytes(file.read(8), "little", signed=True)
@@ -187,7 +193,9 @@ def _check_chunks(layout, file):
 
 def _check_chunk_points(layout, points):
     """That chunks of these points (the last may hold fewer) hold the file's, and fit memory."""
-    path, whole, longest = layout.path, sum(points), max(points)
+    path = layout.path
+    whole = sum(points)
+    longest = max(points)
     if whole < layout.points:
         evidence = f"its LAZ chunks hold at most {whole} of the {layout.points} points"
         raise ValueError(_cut_off(path, f"{evidence} that its header announces"))
@@ -203,7 +211,8 @@ def _check_chunk_points(layout, points):
 
 def _check_laszip(layout):
     """That the LASzip VLR describes the points of the header, in a way that lazrs knows."""
-    path, data = layout.path, layout.laszip
+    path = layout.path
+    data = layout.laszip
     expected = lazrs.LazVlr.new_for_compression(layout.point_format, layout.extra_bytes)
     if int.from_bytes(data[:2], "little") == 1:
         raise ValueError(
@@ -221,13 +230,15 @@ def _check_laszip(layout):
 
 def _items(laszip):
     """Number of items in a LASzip VLR, and kind and length of each; their versions left out."""
-    count, rows = laszip[32:34], laszip[34:]
+    count = laszip[32:34]
+    rows = laszip[34:]
     return count, [row[:2] for row in struct.iter_unpack("<HHH", rows[: len(rows) // 6 * 6])]
 
 
 def _check_tail(layout, file, points_end):
     """That EVLRs and waveforms lie between the points and the end of the file."""
-    path, size = layout.path, layout.size
+    path = layout.path
+    size = layout.size
     if not points_end <= layout.tail <= size:
         raise ValueError(
             _cut_off(path, f"data behind the points should be at byte {layout.tail} of {size}")

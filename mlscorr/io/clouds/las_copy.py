@@ -101,7 +101,8 @@ def write_parts(parts: Sequence[CorrectedPart], target: str | Path) -> list[int]
     OSError
         When the target cannot be written.
     """
-    layout, target = read_layout(parts[0].file.path), Path(target)
+    layout = read_layout(parts[0].file.path)
+    target = Path(target)
     _check_target(layout.path, target)
     corrected = _Corrected(layout, target, parts)
     with output_file(target) as copy:
@@ -117,7 +118,10 @@ def write_parts(parts: Sequence[CorrectedPart], target: str | Path) -> list[int]
         is_number = np.isfinite(value)
         if not count or (is_number and count > corrected.outside.sum()):  # a time of the drive
             continue
-        what = f"of {value:.15g} s" if is_number else "that is not a number"
+        if is_number:
+            what = f"of {value:.15g} s"
+        else:
+            what = "that is not a number"
         warnings.warn(
             f"{count} of {layout.points} points of {layout.path} have a gps_time {what}. They "
             "can't be placed on the trajectory: nothing that goes by time moves them.",
@@ -142,21 +146,33 @@ class _Corrected:
     """
 
     def __init__(self, layout, target, parts):
-        self._layout, self._target, self._parts = layout, target, parts
+        self._layout = layout
+        self._target = target
+        self._parts = parts
         self.is_laz = target.suffix.lower() == ".laz"
         self._has_sigmas = parts[0].sigma is not None
-        self.written = add_sigma_fields(layout) if self._has_sigmas else layout
+        if self._has_sigmas:
+            self.written = add_sigma_fields(layout)
+        else:
+            self.written = layout
 
     def blocks(self, is_final):
         """All records, (n,) at a time, as bytes of each; those who watch are told the last time."""
-        layout, has_sigmas = self._layout, self._has_sigmas
-        parts = self._parts if is_final else [replace(part, watch=None) for part in self._parts]
+        layout = self._layout
+        has_sigmas = self._has_sigmas
+        if is_final:
+            parts = self._parts
+        else:
+            parts = [replace(part, watch=None) for part in self._parts]
         self.outside = np.zeros(len(parts), int)
         self.untimed = dict.fromkeys((np.nan, *PLACEHOLDERS), 0)
         self.bounds = np.array([np.full(3, -np.inf), np.full(3, np.inf)])
         for records in read_records(layout, SETTINGS.chunk_points):
             _check_channels(layout, self._target, records)
-            sigmas = np.full((len(records), 3), np.nan) if has_sigmas else None
+            if has_sigmas:
+                sigmas = np.full((len(records), 3), np.nan)
+            else:
+                sigmas = None
             self.outside += [part.move(layout, records, sigmas) for part in parts]
             times = records["gps_time"]
             self.untimed[np.nan] += np.count_nonzero(~np.isfinite(times))
@@ -165,7 +181,10 @@ class _Corrected:
             xyz = [records[name] for name in "XYZ"]
             self.bounds[0] = np.maximum(self.bounds[0], [values.max() for values in xyz])
             self.bounds[1] = np.minimum(self.bounds[1], [values.min() for values in xyz])
-            raw = records.view(np.uint8) if sigmas is None else with_sigmas(records, sigmas)
+            if sigmas is None:
+                raw = records.view(np.uint8)
+            else:
+                raw = with_sigmas(records, sigmas)
             yield raw.view(f"V{self.written.record_length}")
 
 

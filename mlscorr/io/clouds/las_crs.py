@@ -14,8 +14,14 @@ from mlscorr.io.clouds.las_layout import LasLayout
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.trajectories import crs_name
 
-OWNER, WKT, GEO_KEYS = b"LASF_Projection", 2112, 34735  # LAS 1.4 R15, section 3
-PROJECTED, GEOGRAPHIC, VERTICAL = 3072, 2048, 4096  # keys of GeoTIFF 1.1
+# LAS 1.4 R15, section 3
+OWNER = b"LASF_Projection"
+WKT = 2112
+GEO_KEYS = 34735
+# keys of GeoTIFF 1.1
+PROJECTED = 3072
+GEOGRAPHIC = 2048
+VERTICAL = 4096
 UNITS_OF_LENGTH = (3076, 4099)  # keys, in plan and of heights
 FEET = {9002: "feet", 9003: "US survey feet"}  # their values
 
@@ -61,7 +67,9 @@ def _code(keys):
     )  # beyond are those that a user defined
     if plan == 0:
         return ""
-    return f"EPSG:{plan}+{heights}" if heights else f"EPSG:{plan}"
+    if heights:
+        return f"EPSG:{plan}+{heights}"
+    return f"EPSG:{plan}"
 
 
 def crs_conflict(layout: LasLayout, crs: str) -> str:
@@ -75,7 +83,8 @@ def crs_conflict(layout: LasLayout, crs: str) -> str:
     crs : str
         Of survey.toml; one that can be used.
     """
-    stated, survey_crs = stated_crs(layout), CRS.from_user_input(crs)
+    stated = stated_crs(layout)
+    survey_crs = CRS.from_user_input(crs)
     if stated is None:
         return ""
     what = _other_units(layout, stated) or _other_place(layout, stated, survey_crs)
@@ -93,7 +102,9 @@ def _other_units(layout, stated):
     keys = {} if layout.states_wkt else _geo_keys(layout)
     units = [FEET[keys[key]] for key in UNITS_OF_LENGTH if keys.get(key) in FEET]
     units += [axis.unit_name for axis in stated.axis_info if axis.unit_name != "metre"]
-    return f"the cloud is in {units[0]}, and a correction needs metres" if units else ""
+    if units:
+        return f"the cloud is in {units[0]}, and a correction needs metres"
+    return ""
 
 
 def _other_place(layout, stated, survey_crs):
@@ -108,7 +119,10 @@ def _other_place(layout, stated, survey_crs):
         apart = np.inf
     if apart <= SETTINGS.same_place:
         return ""
-    length = f"{apart / 1e3:.1f} km" if apart >= 1e3 else f"{apart:.2f} m"
+    if apart >= 1e3:
+        length = f"{apart / 1e3:.1f} km"
+    else:
+        length = f"{apart:.2f} m"
     if not np.isfinite(apart):
         return "one has no place for the cloud's middle"
     return f"by the two the cloud's middle lies in places {length} apart"
@@ -119,8 +133,13 @@ def _other_heights(stated, survey_crs):
     if not (stated.is_compound and survey_crs.is_compound):
         return ""
     first, second = (crs.sub_crs_list[1] for crs in (stated, survey_crs))
-    same = first.to_epsg() == second.to_epsg() if first.to_epsg() else first.name == second.name
-    return "" if same else "heights are of two systems"
+    if first.to_epsg():
+        same = first.to_epsg() == second.to_epsg()
+    else:
+        same = first.name == second.name
+    if same:
+        return ""
+    return "heights are of two systems"
 
 
 def cloud_box(layout: LasLayout) -> np.ndarray:

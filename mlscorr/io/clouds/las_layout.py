@@ -25,9 +25,15 @@ from mlscorr.io.clouds._las_points import ChunkedPoints, PlainPoints
 from mlscorr.io.trajectories import ADJUSTMENT
 
 VLR_HEADER = struct.Struct("<2x16sHH32s")  # owner, record, length of data, description
-LASZIP, LASZIP_RECORD = b"laszip encoded", 22204  # of the VLR that says how points are compressed
-OLD_CLASS, NEW_CLASS, NEW_FLAGS = "raw_classification", "classification", "classification_flags"
-COPC, HIERARCHY = (b"copc", 1), (b"copc", 1000)  # of the VLR and the EVLR that tell an octree
+# of the VLR that says how points are compressed
+LASZIP = b"laszip encoded"
+LASZIP_RECORD = 22204
+OLD_CLASS = "raw_classification"
+NEW_CLASS = "classification"
+NEW_FLAGS = "classification_flags"
+# of the VLR and the EVLR that tell an octree
+COPC = (b"copc", 1)
+HIERARCHY = (b"copc", 1000)
 
 
 @dataclass(frozen=True)
@@ -98,7 +104,9 @@ class LasLayout:
 
         Source: ASPRS LAS 1.5 R00, Time Offset, in units of 1e6 s.
         """
-        return 1e6 * self.field("H", 391)[0] - ADJUSTMENT if self.has_time_offset else 0.0
+        if self.has_time_offset:
+            return 1e6 * self.field("H", 391)[0] - ADJUSTMENT
+        return 0.0
 
     @property
     def point_format(self) -> int:
@@ -166,7 +174,8 @@ class LasLayout:
     @cached_property
     def vlrs(self) -> list[tuple[int, int]]:
         """Start and end in head of each VLR. Raises ValueError when they don't fit."""
-        count, bounds = self.field("I", 100)[0], []
+        count = self.field("I", 100)[0]
+        bounds = []
         position = self.field("H", 94)[0]
         for _ in range(count):
             end = position + VLR_HEADER.size
@@ -262,7 +271,9 @@ class LasLayout:
     def chunk_size(self) -> int:
         """Number of points that are decoded together; 1 where it is none or differs by chunk."""
         vlr = lazrs.LazVlr(self.laszip) if self.is_compressed else None
-        return 1 if vlr is None or vlr.uses_variable_size_chunks() else vlr.chunk_size()
+        if vlr is None or vlr.uses_variable_size_chunks():
+            return 1
+        return vlr.chunk_size()
 
     @cached_property
     def laszip(self) -> bytes:
@@ -309,5 +320,8 @@ class LasLayout:
         selection = lazrs.DecompressionSelection(fields)
         if lazrs.LazVlr(self.laszip).uses_variable_size_chunks():
             return ChunkedPoints(file, self.laszip, selection)
-        kind = lazrs.ParLasZipDecompressor if threads else lazrs.LasZipDecompressor
+        if threads:
+            kind = lazrs.ParLasZipDecompressor
+        else:
+            kind = lazrs.LasZipDecompressor
         return kind(file, self.laszip, selection)

@@ -60,7 +60,8 @@ def read_windows(
         first = max(done, _place(layout, file, places, times, span[0], 0))
         end = _place(layout, file, places, times, span[1], 1)
         surplus = max(0, end - first - limit)
-        first, done = first + surplus // 2, end - surplus // 2
+        first = first + surplus // 2
+        done = end - surplus // 2
         if first < done:
             yield from read_chunks(file, first=first, end=done)
 

@@ -22,9 +22,14 @@ INTEGER_LIMIT = np.iinfo(np.int32).max  # of coordinates
 
 @contextmanager
 def cloud_writer(
-    path: str | Path, corner: np.ndarray, crs: str | None = None, scale: float = 0.001,
-    created: date | None = None, is_standard: bool = False, has_colours: bool = False,
-) -> Iterator[CloudWriter]:  # fmt: skip
+    path: str | Path,
+    corner: np.ndarray,
+    crs: str | None = None,
+    scale: float = 0.001,
+    created: date | None = None,
+    is_standard: bool = False,
+    has_colours: bool = False,
+) -> Iterator[CloudWriter]:
     """A CloudWriter for one new LAS or LAZ file, which appears whole or not at all.
 
     Parameters
@@ -96,10 +101,13 @@ class CloudWriter:
         self.points = 0
 
     def write(
-        self, cloud: PointCloud, scan_angle: np.ndarray | None = None,
-        return_number: np.ndarray | int = 1, number_of_returns: np.ndarray | int = 1,
+        self,
+        cloud: PointCloud,
+        scan_angle: np.ndarray | None = None,
+        return_number: np.ndarray | int = 1,
+        number_of_returns: np.ndarray | int = 1,
         colours: np.ndarray | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Append a PointCloud.
 
         Parameters

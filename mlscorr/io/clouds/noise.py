@@ -65,7 +65,10 @@ def noise_sentence(flagged: int, points: int, classes: list[int]) -> str:
     classes : list of int
         That count as noise.
     """
-    kinds = f"withheld or of class {' or '.join(map(str, classes))}" if classes else "withheld"
+    if classes:
+        kinds = f"withheld or of class {' or '.join(map(str, classes))}"
+    else:
+        kinds = "withheld"
     return (
         f"{flagged} of {points} points read are flagged as noise ({kinds}). They take no part in "
         "any measurement, and are corrected like all others; cloud.noise_classes in survey.toml "

@@ -51,4 +51,6 @@ def announced_faces(path: str | Path) -> int:
     with open(path, "rb") as file:
         head = file.read(1 << 16).split(b"end_header")[0]
     faces = re.search(rb"^element face (\d{1,18})\s*$", head, re.MULTILINE)
-    return int(faces[1]) if faces else 0
+    if faces:
+        return int(faces[1])
+    return 0

@@ -26,9 +26,14 @@ def take_along(out: Path, part: Path) -> None:
 
 def exchange(out: Path, part: Path) -> None:
     """Exchange two folders, at once where the system can."""
-    library = None if os.name == "nt" else ctypes.CDLL(None, use_errno=True)
+    if os.name == "nt":
+        library = None
+    else:
+        library = ctypes.CDLL(None, use_errno=True)
     rename = getattr(library, "renameat2", None)
-    here, swap = -100, 2  # AT_FDCWD and RENAME_EXCHANGE of linux/fs.h
+    # AT_FDCWD and RENAME_EXCHANGE of linux/fs.h
+    here = -100
+    swap = 2
     if rename is None or rename(here, os.fsencode(part), here, os.fsencode(out), swap):
         move_into(out, part)
 
@@ -36,7 +41,8 @@ def exchange(out: Path, part: Path) -> None:
 def move_into(out: Path, part: Path) -> None:
     """Move the files of part into out file by file; on failure what they replace is put back."""
     files = [path.relative_to(part) for path in sorted(part.rglob("*")) if path.is_file()]
-    replaced, made = Path(tempfile.mkdtemp(dir=part)), []
+    replaced = Path(tempfile.mkdtemp(dir=part))
+    made = []
     try:
         for file in files:
             if not (out / file).parent.exists():

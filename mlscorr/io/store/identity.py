@@ -53,4 +53,6 @@ class FileIdentity:
     @property
     def content(self) -> FileIdentity:
         """The same without the time of the last change, where the digest tells of the contents."""
-        return self if str(self.changed).startswith(ETAG) else replace(self, changed=0)
+        if str(self.changed).startswith(ETAG):
+            return self
+        return replace(self, changed=0)

@@ -42,8 +42,12 @@ def check_unchanged(inputs: Sequence[InputFile]) -> None:
     """
     changed = [file for file in inputs if _state(file.path) != file.state]
     if changed:
-        file, state = changed[0], _state(changed[0].path)
-        size = f"{state[0]} bytes now, {file.state[0]} then" if any(state) else "it is gone"
+        file = changed[0]
+        state = _state(changed[0].path)
+        if any(state):
+            size = f"{state[0]} bytes now, {file.state[0]} then"
+        else:
+            size = "it is gone"
         raise OSError(
             f"{len(changed)} of {len(inputs)} input files were replaced or changed since they were "
             f"read (first: the {file.what} {file.path}, {size}): another program may still be "

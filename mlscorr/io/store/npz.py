@@ -102,7 +102,8 @@ class NpzWriter:
 
     def _assemble(self, archive):
         for name, (file, none) in self._growing.items():
-            path, shape = Path(file.name), none.shape[1:]
+            path = Path(file.name)
+            shape = none.shape[1:]
             length = path.stat().st_size // (none.dtype.itemsize * math.prod(shape))
             header = np.lib.format.header_data_from_array_1_0(none) | {"shape": (length, *shape)}
             # the date that ZipInfo starts with, so that the same arrays give the same bytes

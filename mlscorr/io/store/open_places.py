@@ -49,12 +49,17 @@ class OpenPlace:
         >>> OpenPlace(("control", "size"), (0.6,)).option
         "--set 'control.size = 0.6'"
         """
-        value = json.dumps(self.examples[0], ensure_ascii=False) if self.examples else "..."
+        if self.examples:
+            value = json.dumps(self.examples[0], ensure_ascii=False)
+        else:
+            value = "..."
         return f"--set '{self.key} = {value}'"
 
     def __str__(self) -> str:
         values = ", ".join(json.dumps(value, ensure_ascii=False) for value in self.examples)
-        return f"{self.about}: {values}" if self.about and values else self.about or values
+        if self.about and values:
+            return f"{self.about}: {values}"
+        return self.about or values
 
 
 PLACE_OF_CRS = OpenPlace(("crs",), (), 'projected CRS of cloud and control, as "EPSG:32650"')
@@ -82,7 +87,9 @@ def places_of(error: BaseException) -> tuple[OpenPlace, ...]:
     ----------
     error : exception
     """
-    return error.places if isinstance(error, OpenQuestion) else ()
+    if isinstance(error, OpenQuestion):
+        return error.places
+    return ()
 
 
 def check_answered(path: Path, document: Mapping[str, Any]) -> None:
@@ -101,7 +108,10 @@ def check_answered(path: Path, document: Mapping[str, Any]) -> None:
     """
     keys = [OpenPlace(keys).key for keys in _open_keys(document, ())]
     if keys:
-        number = "1 open place" if len(keys) == 1 else f"{len(keys)} open places"
+        if len(keys) == 1:
+            number = "1 open place"
+        else:
+            number = f"{len(keys)} open places"
         raise SurveyFileError(
             f'{path} has {number}: {", ".join(keys)}. Replace each "{MARK}" with the value; the '
             "comment behind it names what is possible."
@@ -123,4 +133,6 @@ def _open_keys(value, keys):
 def _quoted(key):
     """A key as TOML has it: bare where it can be."""
     is_bare = key.isascii() and key.replace("_", "").replace("-", "").isalnum()
-    return key if is_bare else json.dumps(key, ensure_ascii=False)
+    if is_bare:
+        return key
+    return json.dumps(key, ensure_ascii=False)

@@ -11,9 +11,12 @@ from mlscorr.io.store.storage import asking, is_remote
 
 
 def open_file(
-    path: str | Path, encoding: str | None = None, newline: str | None = None,
-    errors: str = "strict", is_scattered: bool = False,
-) -> Any:  # fmt: skip
+    path: str | Path,
+    encoding: str | None = None,
+    newline: str | None = None,
+    errors: str = "strict",
+    is_scattered: bool = False,
+) -> Any:
     """A file open for reading, of text where its encoding is given; of a store by ranges.
 
     Parameters
@@ -32,9 +35,14 @@ def open_file(
     if not is_remote(path):
         how: dict[str, Any] = {"newline": newline, "errors": errors} if encoding else {}
         return open(path, "r" if encoding else "rb", encoding=encoding, **how)
-    size = SETTINGS.identified_bytes if is_scattered else SETTINGS.copied_bytes
+    if is_scattered:
+        size = SETTINGS.identified_bytes
+    else:
+        size = SETTINGS.copied_bytes
     reader = _Reader(_Ranges(path, size))
-    return io.TextIOWrapper(reader, encoding, errors, newline) if encoding else reader
+    if encoding:
+        return io.TextIOWrapper(reader, encoding, errors, newline)
+    return reader
 
 
 class _Ranges(io.RawIOBase):
@@ -42,7 +50,8 @@ class _Ranges(io.RawIOBase):
 
     def __init__(self, path, block_size):
         super().__init__()
-        self.name, self.interruption = str(path), None
+        self.name = str(path)
+        self.interruption = None
         with asking(path):
             path.fs.invalidate_cache(path.path)
             how = {"block_size": block_size, "cache_type": "blockcache"}

@@ -26,9 +26,11 @@ PART = ".part"  # ends the name of what isn't whole yet
 
 
 def check_output(
-    out: str | Path, inputs: Iterable[str | Path], overwrite: bool = False,
+    out: str | Path,
+    inputs: Iterable[str | Path],
+    overwrite: bool = False,
     folders: Iterable[str] = (),
-) -> None:  # fmt: skip
+) -> None:
     """Refuse an output folder that holds an input, or anything that may not be replaced.
 
     Parameters
@@ -74,7 +76,10 @@ def check_output(
 
 def _entries(out):
     """Names in a folder, but those of results that aren't whole yet."""
-    names = sorted(path.name for path in out.iterdir()) if out.is_dir() else []
+    if out.is_dir():
+        names = sorted(path.name for path in out.iterdir())
+    else:
+        names = []
     return [n for n in names if not (n.startswith(_prefix(out)) and n.endswith(PART))]
 
 
@@ -147,9 +152,11 @@ def output_file(path: str | Path) -> Iterator[Path]:
 
 @contextmanager
 def output_folder(
-    out: str | Path, inputs: Sequence[InputFile] = (), overwrite: bool = False,
+    out: str | Path,
+    inputs: Sequence[InputFile] = (),
+    overwrite: bool = False,
     folders: Iterable[str] = (),
-) -> Iterator[Path]:  # fmt: skip
+) -> Iterator[Path]:
     """A folder to write into, which takes its name only when all went well.
 
     It stands beside its place until then, locked by this process. What processes left there that
@@ -265,7 +272,9 @@ def _finite(value):
         return {key: _finite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
         return [_finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
 
 
 def write_json(path: str | Path, content: dict) -> None:

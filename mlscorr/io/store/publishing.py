@@ -33,7 +33,9 @@ def names_in(folder: Any) -> list[str]:
         Where a store doesn't tell, or its bucket is missing.
     """
     if not is_remote(folder):
-        return sorted(path.name for path in folder.iterdir()) if folder.is_dir() else []
+        if folder.is_dir():
+            return sorted(path.name for path in folder.iterdir())
+        return []
     try:
         with asking(folder):
             folder.fs.invalidate_cache()
@@ -157,7 +159,8 @@ class _StoredText(io.StringIO):
 
     def __init__(self, path):
         super().__init__()
-        self.path, self.due = path, 0.0
+        self.path = path
+        self.due = 0.0
         if is_there(path):
             self.write(read_bytes(path).decode())
 
@@ -180,7 +183,9 @@ def appended(path: Path) -> TextIO:
     ----------
     path : Path
     """
-    return _StoredText(path) if is_remote(path) else open(path, "a", encoding="utf-8")
+    if is_remote(path):
+        return _StoredText(path)
+    return open(path, "a", encoding="utf-8")
 
 
 @contextmanager
@@ -209,7 +214,8 @@ def locked_in_store(lock: Any, beat: float = SETTINGS.beat) -> Iterator[None]:
     ValueError
         Where another run is at work.
     """
-    owner, ended = f"{socket.gethostname()}, process {os.getpid()}", threading.Event()
+    owner = f"{socket.gethostname()}, process {os.getpid()}"
+    ended = threading.Event()
 
     def sign():
         return f"{owner}\n{secrets.token_hex(8)}"
@@ -264,7 +270,8 @@ def _is_new(lock, content):
 
 def _wait_for_end(lock, beat):
     """Return once a lock has not changed for three beats, or is gone; refuse one that changes."""
-    first, end = _content(lock), monotonic() + 3 * beat
+    first = _content(lock)
+    end = monotonic() + 3 * beat
     while monotonic() < end:
         sleep(beat / 4)
         if not (now := _content(lock)):

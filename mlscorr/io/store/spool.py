@@ -27,7 +27,8 @@ class Spool:
     """
 
     def __init__(self, file: BinaryIO, counts: np.ndarray, record_length: int):
-        self._file, self._length = file, record_length
+        self._file = file
+        self._length = record_length
         self.counts = np.asarray(counts, np.int64)
         self._starts = file.tell() + (np.cumsum(self.counts) - self.counts) * record_length
         self._filled = np.zeros(len(self.counts), np.int64)

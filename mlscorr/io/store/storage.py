@@ -64,7 +64,9 @@ def as_path(name: str | Path) -> Path:
         Where the package is missing that reads it.
     """
     if is_remote(name) or not is_url(name):
-        return cast(Path, name) if is_remote(name) else Path(name)
+        if is_remote(name):
+            return cast(Path, name)
+        return Path(name)
     scheme = str(name).partition("://")[0]
     try:
         from fsspec import get_filesystem_class
@@ -86,7 +88,9 @@ def as_path(name: str | Path) -> Path:
             "and what else fsspec has a package for."
         ) from None
     path = UPath(name)
-    return Path(path.path) if scheme in ("file", "local") else cast(Path, path)
+    if scheme in ("file", "local"):
+        return Path(path.path)
+    return cast(Path, path)
 
 
 def beside(path: Path, name: str) -> Path:
@@ -101,7 +105,9 @@ def beside(path: Path, name: str) -> Path:
     if is_url(name):
         return as_path(name)
     there = path.parent / name
-    return resolved(there) if is_remote(there) else there
+    if is_remote(there):
+        return resolved(there)
+    return there
 
 
 def resolved(path: Path) -> Path:
@@ -214,7 +220,10 @@ def file_state(path: str | Path) -> tuple[int, int | str]:
     with asking(path):
         info = _info(path)
     tag = info.get("ETag") or info.get("etag")
-    changed = f"{ETAG} {tag}" if tag else str(info.get("LastModified") or info.get("created"))
+    if tag:
+        changed = f"{ETAG} {tag}"
+    else:
+        changed = str(info.get("LastModified") or info.get("created"))
     return info.get("size") or 0, changed
 
 

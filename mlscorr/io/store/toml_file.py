@@ -116,7 +116,8 @@ def _sentence(item, model):
     if item["type"] == "extra_forbidden":
         name = ".".join(part for part in item["loc"] if isinstance(part, str) and part.strip())
         keys = _keys(model)
-        near, tail = nearest(name, keys), name.rpartition(".")[2]
+        near = nearest(name, keys)
+        tail = name.rpartition(".")[2]
         if "." in name and tail in keys and not _sections(model.model_fields[tail].annotation):
             return f"{shown(key)} is an unknown key; {tail} stands above the first [section]."
         if near == name:
@@ -131,7 +132,9 @@ def _sentence(item, model):
         return f"{key} is missing."
     if item["type"] == "value_error":  # raised by a validator of ours, a sentence already
         message = str(item["ctx"]["error"]).rstrip(".")
-        return f"{key}: {message}." if key else f"{message}."
+        if key:
+            return f"{key}: {message}."
+        return f"{message}."
     if item["type"] in ("tuple_type", "list_type") and isinstance(item["input"], dict):
         return f"{key} is a list of sections; write [[{key}]], not [{key}]."
     message = item["msg"].replace("valid string", "valid string in quotation marks")

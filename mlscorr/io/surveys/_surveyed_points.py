@@ -70,9 +70,11 @@ def scaled(points: ControlList, section: ControlSection, crs: str | None) -> Con
                 "survey.toml has no crs: add it, or give scale_factor as a number."
             )
         ground = map_factors(crs, middle)
-        factor, words = ground.combined, f", from ground distances to {crs}: {ground}"
+        factor = ground.combined
+        words = f", from ground distances to {crs}: {ground}"
     else:
-        factor, words = float(section.scale_factor), ""
+        factor = float(section.scale_factor)
+        words = ""
     sentence = (
         f"Eastings and northings of the control were multiplied by {factor:.7f} about E "
         f"{origin[0]:.3f}, N {origin[1]:.3f} m (scale_factor under [control]{words})."

@@ -32,7 +32,9 @@ def check_area(crs: CRS, trajectory: Trajectory) -> None:
             f"{crs_name(crs)}. Does a zone's number stand in front of its eastings? "
             "Take it off clouds, trajectory and control, or give the crs that has it: EPSG:4647."
         )
-    area, margin = crs.area_of_use, 1.0  # deg, by which zones are used beyond their edges
+    # deg, by which zones are used beyond their edges
+    area = crs.area_of_use
+    margin = 1.0
     if area is None or (
         area.west - margin <= longitude <= area.east + margin
         and area.south - margin <= latitude <= area.north + margin
@@ -83,7 +85,10 @@ def describe_projection(crs: str) -> tuple[str, str, str]:
     tuple of str
     """
     projected: Any = check_crs(crs)
-    vertical = projected.sub_crs_list[1].name if projected.is_compound else None
+    if projected.is_compound:
+        vertical = projected.sub_crs_list[1].name
+    else:
+        vertical = None
     return (
         f"The trajectory's latitude and longitude are taken as {projected.geodetic_crs.name}, "
         f"the datum of {projected.name}; nothing in an SBET says otherwise.",

@@ -93,7 +93,9 @@ def _role(path) -> FileRole:
     if suffix in CLOUDS:
         return _cloud(path)
     if suffix in MESHES:
-        return FileRole(path, "reference", "a mesh") if announced_faces(path) else _cloud(path)
+        if announced_faces(path):
+            return FileRole(path, "reference", "a mesh")
+        return _cloud(path)
     if suffix in TRAJECTORIES:
         return FileRole(path, "trajectory", f"its suffix is {path.suffix}")
     if suffix == POQ_SUFFIX:
@@ -118,7 +120,8 @@ def _cloud(path):
 
 def _records(path) -> Iterator[FileRole]:
     """What a headerless file of float64 may be, whole or cut off: its times and angles tell."""
-    size, sbet = path.stat().st_size, 8 * len(SBET_FIELDS)
+    size = path.stat().st_size
+    sbet = 8 * len(SBET_FIELDS)
     if not size % sbet and _is_timed(path, SBET_FIELDS, 2 * np.pi):
         yield FileRole(path, "trajectory", "whole SBET records with increasing times")
     if not size % (8 * len(SMRMSG_FIELDS)) and _is_timed(path, SMRMSG_FIELDS, np.inf):
@@ -165,4 +168,6 @@ def _table(path) -> tuple[Role, str]:
 def _unnamed_epoch(cells):
     """The column of times in a row of numbers alone, as many as an epoch has, with parts of s."""
     is_epoch = len(cells) >= len(COLUMNS) and all(map(NUMBER.fullmatch, cells))
-    return {"gps_time": 0} if is_epoch and not cells[0].isdecimal() else {}
+    if is_epoch and not cells[0].isdecimal():
+        return {"gps_time": 0}
+    return {}

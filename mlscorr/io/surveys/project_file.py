@@ -148,15 +148,20 @@ def read_project(project: str | Path | StatedProject) -> ProjectParts:
     FileNotFoundError
         For files that aren't there.
     """
-    stated = project if isinstance(project, StatedProject) else stated_project(project)
-    path, settings = stated.path, stated.settings
+    if isinstance(project, StatedProject):
+        stated = project
+    else:
+        stated = stated_project(project)
+    path = stated.path
+    settings = stated.settings
     drives = tuple(
         DriveParts(name, read_parts(toml, own, files), notes, ids)
         for name, toml, own, files, notes, ids in stated.drives
     )
     check_systems([drive.name for drive in drives], [drive.trajectory for drive in drives])
     crs = settings.crs or drives[0].parts.settings.crs
-    inputs, surveyed = [input_file("project", path)], NOTHING_SURVEYED
+    inputs = [input_file("project", path)]
+    surveyed = NOTHING_SURVEYED
     if settings.control is not None:
         file = existing(path, "control.file", settings.control.file)
         inputs.append(input_file("control", file))
@@ -196,7 +201,9 @@ def stated_project(path: str | Path) -> StatedProject:
 
 def _stated(path, settings, name, section):
     """StatedDrive of a [[drive]]."""
-    toml, key, notes = path, f"files of [[drive]] {name}", ()
+    toml = path
+    key = f"files of [[drive]] {name}"
+    notes = ()
     names = SHARED if section.survey is None else BELIEFS
     given = {n: getattr(settings, n) for n in names if n in settings.model_fields_set}
     if section.survey is None:
@@ -206,7 +213,8 @@ def _stated(path, settings, name, section):
         given = {"name": name, "crs": settings.crs, "cloud": files} | given | own
         whole = SurveyFile(trajectory=section.trajectory, **given)
     else:
-        toml, key = survey_toml(beside(path, section.survey)), "cloud.files"
+        toml = survey_toml(beside(path, section.survey))
+        key = "cloud.files"
         whole = read_survey_file(toml)
         if whole.control is not None:
             own = whole.control.file

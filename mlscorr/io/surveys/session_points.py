@@ -53,7 +53,9 @@ def check_belongings(
     for cloud in clouds if stated else ():
         records = timed_records(read_layout(cloud.path))
         times = cloud.trajectory_time(records["gps_time"])
-        belongs, inside, names = np.zeros(len(times), bool), np.zeros(len(times), bool), []
+        belongs = np.zeros(len(times), bool)
+        inside = np.zeros(len(times), bool)
+        names = []
         for name, part, ids, own in stated:
             rows = np.isin(records["point_source_id"], ids or records["point_source_id"])
             rows &= cloud in own

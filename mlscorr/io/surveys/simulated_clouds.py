@@ -77,7 +77,8 @@ def _check_crs(simulated, survey):
 
 def _check_trajectory(simulated, survey):
     """Refuse a simulated survey that was driven elsewhere or at other times."""
-    recorded, other = survey.trajectory, simulated.trajectory
+    recorded = survey.trajectory
+    other = simulated.trajectory
     inside = other.gps_time[recorded.segment(other.gps_time) >= 0]
     if len(inside) < 0.5 * len(other):
         start, end = other.gps_time[[0, -1]]

@@ -19,10 +19,15 @@ PATHS = (("control", "file"), ("scene", "reference"))
 
 
 def write_survey_copy(
-    source: str | Path, target: str | Path, folder: str | Path, mountings: Sequence[Mounting] = (),
-    clouds: Sequence[Sequence[str]] = (), trajectory: str | None = None,
-    control: Sequence[str] = (), notes: Sequence[str] = (),
-) -> None:  # fmt: skip
+    source: str | Path,
+    target: str | Path,
+    folder: str | Path,
+    mountings: Sequence[Mounting] = (),
+    clouds: Sequence[Sequence[str]] = (),
+    trajectory: str | None = None,
+    control: Sequence[str] = (),
+    notes: Sequence[str] = (),
+) -> None:
     """Copy a survey.toml; all that isn't changed stays as it is, comments and order too.
 
     Parameters
@@ -51,7 +56,8 @@ def write_survey_copy(
     for section, key in PATHS:
         if key in document.get(section, {}):
             document[section][key] = _moved(there, document[section][key])
-    sessions, scanners = _listed(document["trajectory"]), _listed(document.get("scanner"))
+    sessions = _listed(document["trajectory"])
+    scanners = _listed(document.get("scanner"))
     for section in sessions or [document["trajectory"]]:
         for key in {"file", "accuracy"} & set(section):
             section[key] = _moved(there, section[key])
@@ -65,7 +71,8 @@ def write_survey_copy(
             document["cloud"]["mounting"] = "recorded"
     if trajectory is not None:
         _set_trajectory(document, trajectory, sorted(set(control)))
-    sections, notes = scanners or [document], notes or [""] * len(mountings)
+    sections = scanners or [document]
+    notes = notes or [""] * len(mountings)
     for section, mounting, note in zip(sections, mountings, notes, strict=bool(mountings)):
         is_inside = isinstance(section, InlineTable)  # where no comment can stand
         _set_mounting(section["mounting"], mounting, "" if is_inside else note)
@@ -97,7 +104,9 @@ def _set_trajectory(document, name, control):
 
 def _listed(section):
     """Sections of a list of tables; none of a table."""
-    return section if isinstance(section, list) else []
+    if isinstance(section, list):
+        return section
+    return []
 
 
 def _set_mounting(section, mounting, note):

@@ -107,13 +107,17 @@ class SurveyParts:
     @property
     def system(self) -> str:
         """What is said of the clouds' times."""
-        return self.settings.cloud.gps_time if self.settings.cloud else "auto"
+        if self.settings.cloud:
+            return self.settings.cloud.gps_time
+        return "auto"
 
     @property
     def noise_classes(self) -> tuple[int, ...]:
         """Classes of the clouds' points that are noise."""
         cloud = self.settings.cloud
-        return NOISE_CLASSES if cloud is None else tuple(cloud.noise_classes)
+        if cloud is None:
+            return NOISE_CLASSES
+        return tuple(cloud.noise_classes)
 
     def cloud_file(self, cloud: Path) -> tuple[CloudFile, str]:
         """The CloudFile of a path; as the function of this name."""
@@ -133,7 +137,9 @@ class SurveyParts:
         ValueError
             Where clouds, trajectories and scanners don't go together.
         """
-        settings, recorded, path = self.settings, self.recorded, self.path
+        settings = self.settings
+        recorded = self.recorded
+        path = self.path
         trajectory = recorded.trajectory
         layouts = [*recorded.layouts, *filter(None, [self.layout])]
         layouts += [converted(file.path).note for file, _ in read if is_foreign(file.path)]
@@ -146,17 +152,26 @@ class SurveyParts:
         if trajectory.position_sigma is None and "pos" not in settings.model_fields_set:
             notes.append(UNKNOWN_POS)
         return Survey(
-            name=settings.name or path.absolute().parent.name, path=path, crs=settings.crs,
-            clouds=clouds_of(scanners, cloud_files), trajectory=trajectory,
-            mounting=scanners[0].mounting if is_one else None, control=self.control,
-            check=self.check, scanner=scanners[0].scanner if is_one else Scanner(),
-            pos=settings.pos.pos(), reference=self.files.reference,
-            search_radius=settings.matching.search_radius, use_ties=settings.ties.use == "auto",
-            notes=tuple(notes), layouts=tuple(layouts), inputs=self.inputs,
+            name=settings.name or path.absolute().parent.name,
+            path=path,
+            crs=settings.crs,
+            clouds=clouds_of(scanners, cloud_files),
+            trajectory=trajectory,
+            mounting=scanners[0].mounting if is_one else None,
+            control=self.control,
+            check=self.check,
+            scanner=scanners[0].scanner if is_one else Scanner(),
+            pos=settings.pos.pos(),
+            reference=self.files.reference,
+            search_radius=settings.matching.search_radius,
+            use_ties=settings.ties.use == "auto",
+            notes=tuple(notes),
+            layouts=tuple(layouts),
+            inputs=self.inputs,
             scanners=() if is_one else scanners,
             corrected_by=tuple(n for part in settings.trajectories for n in part.corrected_by),
             is_remounted=settings.cloud is not None and settings.cloud.mounting == "recorded",
-        )  # fmt: skip
+        )
 
 
 def read_parts(path: Path, settings: PlannedSurveyFile, files: SurveyPaths) -> SurveyParts:
@@ -184,7 +199,9 @@ def stated_pos(settings: PlannedSurveyFile) -> Pos | None:
     ----------
     settings : PlannedSurveyFile
     """
-    return settings.pos.pos() if "pos" in settings.model_fields_set else None
+    if "pos" in settings.model_fields_set:
+        return settings.pos.pos()
+    return None
 
 
 def read_survey_file(path: str | Path, planned: bool = False) -> PlannedSurveyFile:
@@ -260,9 +277,13 @@ def survey_toml(path: str | Path) -> Path:
 
 
 def cloud_file(
-    path: Path, trajectory: Trajectory, setting: str, crs: str | None,
-    ids: tuple[int, ...] | None = None, noise_classes: tuple[int, ...] = NOISE_CLASSES,
-) -> tuple[CloudFile, str]:  # fmt: skip
+    path: Path,
+    trajectory: Trajectory,
+    setting: str,
+    crs: str | None,
+    ids: tuple[int, ...] | None = None,
+    noise_classes: tuple[int, ...] = NOISE_CLASSES,
+) -> tuple[CloudFile, str]:
     """CloudFile of a path, and the sentence on its time system.
 
     Parameters

@@ -68,7 +68,10 @@ def files_of(path: Path, settings: PlannedSurveyFile, key: str = "cloud.files") 
         check_distinct(path, clouds, key)
     sessions = [session_file(path, section) for section in settings.trajectories]
     check_sessions(path, sessions)
-    control = None if settings.control is None else settings.control.file
+    if settings.control is None:
+        control = None
+    else:
+        control = settings.control.file
     return SurveyPaths(
         clouds,
         sessions,
@@ -138,7 +141,10 @@ def matching(path: Path, key: str, name: str) -> list[Path]:
     if not glob.has_magic(name) or is_there(there):
         return [existing(path, key, name)]
     matches = files_like(path.parent, name)
-    below = {file.parent for file in matches} - {path.parent} if "**" in name else set()
+    if "**" in name:
+        below = {file.parent for file in matches} - {path.parent}
+    else:
+        below = set()
     if results := {folder for folder in below if _holds_results(folder)}:
         matches = [file for file in matches if file.parent not in results]
         warnings.warn(
@@ -159,9 +165,12 @@ def _holds_results(folder):
 
 
 def own_clouds(
-    path: Path, key: str, patterns: Sequence[str] | None, clouds: Sequence[CloudFile],
+    path: Path,
+    key: str,
+    patterns: Sequence[str] | None,
+    clouds: Sequence[CloudFile],
     owner: str = "",
-) -> list[CloudFile]:  # fmt: skip
+) -> list[CloudFile]:
     """Those of a survey's clouds that patterns name; all without patterns.
 
     Parameters
@@ -196,7 +205,9 @@ def own_clouds(
 
 def given_file(path: Path, key: str, name: str | None) -> Path | None:
     """Path of a file that a survey.toml may name; as existing, None without a name."""
-    return None if name is None else existing(path, key, name)
+    if name is None:
+        return None
+    return existing(path, key, name)
 
 
 def existing(path: Path, key: str, name: str) -> Path:
@@ -227,7 +238,9 @@ def _lack(there):
         return "is a folder: name a file in it, or its clouds by a pattern, as FOLDER/*.laz"
     is_listed = not is_remote(there) and there.parent.is_dir()
     near = nearest(there.name, os.listdir(there.parent) if is_listed else ())
-    return f"does not exist; the nearest there is {near}" if near else "does not exist"
+    if near:
+        return f"does not exist; the nearest there is {near}"
+    return "does not exist"
 
 
 def check_distinct(path: Path, clouds: list[Path], key: str = "cloud.files") -> None:

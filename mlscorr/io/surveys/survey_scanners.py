@@ -38,7 +38,10 @@ def mounted_scanners(
     if isinstance(settings.scanner, ScannerSection):
         mounting = _mounting(settings.mounting)
         return (MountedScanner("", settings.scanner.scanner(), mounting, clouds),)
-    measured = _measured(path, settings.scanners, clouds) if clouds else {}
+    if clouds:
+        measured = _measured(path, settings.scanners, clouds)
+    else:
+        measured = {}
     return tuple(
         MountedScanner(
             name, section.scanner(), _mounting(section.mounting), tuple(measured.get(name, ()))
@@ -63,7 +66,9 @@ def clouds_of(
 
 
 def _mounting(section):
-    return None if section is None else section.mounting()
+    if section is None:
+        return None
+    return section.mounting()
 
 
 def _measured(path, sections, clouds):
@@ -123,13 +128,17 @@ def _parts(path, cloud, own):
         for name, numbers in own.items()
         if (n := counts[sorted(set(numbers))].sum())
     ]
-    return parts if len(parts) > 1 else [(name, cloud) for name, _ in parts]
+    if len(parts) > 1:
+        return parts
+    return [(name, cloud) for name, _ in parts]
 
 
 def _listed(ids):
     """The first ids in words."""
     first = ", ".join(map(str, sorted(ids)[:10]))
-    return first if len(ids) <= 10 else f"{first} and {len(ids) - 10} more"
+    if len(ids) <= 10:
+        return first
+    return f"{first} and {len(ids) - 10} more"
 
 
 def scanner_notes(scanners: tuple[MountedScanner, ...]) -> list[str]:

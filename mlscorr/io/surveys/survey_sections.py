@@ -61,14 +61,18 @@ class CalibratedMountingSection(MountingSection):
 
     def mounting(self) -> Mounting:
         """The Mounting with its covariance, and the sigmas of what was measured."""
-        mounting, unknown = super().mounting(), [np.nan] * 3
+        mounting = super().mounting()
+        unknown = [np.nan] * 3
         sigma = np.append(self.lever_arm_sigma or unknown, self.boresight_sigma or unknown)
         sigma[3:] = np.radians(sigma[3:])
         if self.correlation is None and not np.isnan(sigma).all():
             mounting = replace(mounting, measured=sigma)
         if np.isnan(sigma).any():
             return mounting
-        correlation = np.eye(6) if self.correlation is None else np.array(self.correlation)
+        if self.correlation is None:
+            correlation = np.eye(6)
+        else:
+            correlation = np.array(self.correlation)
         return replace(mounting, covariance=correlation * np.outer(sigma, sigma))
 
 
@@ -116,11 +120,14 @@ class MountedScannerSection(ScannerSection):
 
 
 def _kind_of_section(document):
-    return _LIST if isinstance(document, list | tuple) else _TABLE
+    if isinstance(document, list | tuple):
+        return _LIST
+    return _TABLE
 
 
 # Names of the alternatives, which keys in sentences leave out because they are blank
-_TABLE, _LIST = "", " "
+_TABLE = ""
+_LIST = " "
 Scanners = Annotated[
     Annotated[ScannerSection, Tag(_TABLE)]
     | Annotated[list[MountedScannerSection], Field(min_length=1), Tag(_LIST)],
@@ -206,12 +213,17 @@ class PlannedSurveyFile(CommonSections):
     @property
     def trajectories(self) -> list[TrajectorySection]:
         """That of [trajectory], or each [[trajectory]]."""
-        return [*self.trajectory] if isinstance(self.trajectory, list) else [self.trajectory]
+        if isinstance(self.trajectory, list):
+            return [*self.trajectory]
+        return [self.trajectory]
 
     @property
     def scanners(self) -> list[tuple[str, MountedScannerSection]]:
         """Each [[scanner]] with its name, or its number from 1; none with one [scanner]."""
-        sections = self.scanner if isinstance(self.scanner, list) else []
+        if isinstance(self.scanner, list):
+            sections = self.scanner
+        else:
+            sections = []
         return [(section.name or str(n), section) for n, section in enumerate(sections, start=1)]
 
 

@@ -54,4 +54,6 @@ def _rows(sheet):
 def _text(value):
     if value is None:
         return ""
-    return value.isoformat(" ") if hasattr(value, "isoformat") else str(value).strip()
+    if hasattr(value, "isoformat"):
+        return value.isoformat(" ")
+    return str(value).strip()

@@ -117,7 +117,9 @@ def section_of(names: Mapping[str, str]) -> str:
     names : mapping
         CONTROL_NAMES or TRAJECTORY_NAMES.
     """
-    return "control" if "name" in names else "trajectory"
+    if "name" in names:
+        return "control"
+    return "trajectory"
 
 
 def listed(cells: Sequence[str]) -> str:
@@ -128,7 +130,10 @@ def listed(cells: Sequence[str]) -> str:
     cells : sequence of str
     """
     limit = len(CONTROL_NAMES | TRAJECTORY_NAMES)
-    more = [f"and {len(cells) - limit} more"] if len(cells) > limit else []
+    if len(cells) > limit:
+        more = [f"and {len(cells) - limit} more"]
+    else:
+        more = []
     return ", ".join([*map(shown, cells[:limit]), *more])
 
 
@@ -174,7 +179,8 @@ class OfficeWord(NamedTuple):
         except ValueError:
             column = None
         if column is None or (size and column != "kind"):
-            kinds, roles = ", ".join(WORDS["kind"]), " or ".join(WORDS["role"])
+            kinds = ", ".join(WORDS["kind"])
+            roles = " or ".join(WORDS["role"])
             raise ValueError(
                 f"'{shown(text)}' is no meaning of a word: give a kind ({kinds}) and its size in "
                 f'm, as "circle 0.6", or a role ({roles})'
@@ -229,7 +235,9 @@ def unit_of(name: str) -> str | None:
     """
     match = BRACKETS.search(unicodedata.normalize("NFKC", name).casefold())
     unit = re.sub(r"^in\s+", "", match[1]) if match else ""  # as in: height (in m)
-    return unit if unit in UNITS or is_foreign(unit) else None
+    if unit in UNITS or is_foreign(unit):
+        return unit
+    return None
 
 
 def is_foreign(unit: str) -> bool:
@@ -273,9 +281,11 @@ def find_meanings(
     meanings = {}
     for name, others in names.items():
         column = (chosen or {}).get(name)
-        among, words = known, others.split()
+        among = known
+        words = others.split()
         if column is not None:
-            among, words = exact, [str(column).strip().casefold()]
+            among = exact
+            words = [str(column).strip().casefold()]
         elif plain(name) in known:
             words = [plain(name)]
         if positions := [i for i, cell in enumerate(among) if cell and cell in words]:

@@ -112,7 +112,10 @@ def read_control(
     if layout.sheet is None and layout.encoding != "utf-16":
         warn_of_cut(path)
     is_plain = layout.is_own and not layout.unused
-    sentence = None if is_plain else sentence_on(layout, has_axes, given, section.check)
+    if is_plain:
+        sentence = None
+    else:
+        sentence = sentence_on(layout, has_axes, given, section.check)
     return ControlList(control, check, sentence)
 
 
@@ -137,7 +140,8 @@ def holds_points(path: str | Path) -> bool:
 
 def _values(layout, lines, meanings):
     """Rows of values by column, and pairs (line, what is wrong) of each cell that holds none."""
-    rows, faults = [], []
+    rows = []
+    faults = []
     for line, cells in lines:
         row = {}
         for name, i in layout.columns.items():
@@ -146,7 +150,10 @@ def _values(layout, lines, meanings):
             except ValueError as fault:
                 faults.append((line, str(fault)))
         kind = layout.columns.get("kind")
-        word = None if kind is None else meanings.get(same_word(cells[kind]))
+        if kind is None:
+            word = None
+        else:
+            word = meanings.get(same_word(cells[kind]))
         if word is not None and word.size is not None:
             size = row.setdefault("size", word.size)
             if size != word.size:

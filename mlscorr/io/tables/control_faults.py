@@ -59,9 +59,13 @@ def refuse(
         f"{who} {what}" if not more else f"{who} and {len(more)} more have{what[len('has') :]}"
         for what, (who, *more) in groups.items()
     ]
-    number, limit = len(sentences), SETTINGS.named_faults
+    number = len(sentences)
+    limit = SETTINGS.named_faults
     if number > 1:
-        more = [f"And {number - limit} more like these."] if number > limit else []
+        if number > limit:
+            more = [f"And {number - limit} more like these."]
+        else:
+            more = []
         sentences = [f"{path} has {number} faults.", *sentences[:limit], *more]
     if places:
         sentences.append(OWN_WORDS)

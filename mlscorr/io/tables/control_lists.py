@@ -130,7 +130,10 @@ def _are_sized(layout, rows, meanings):
 def _unstated(layout, rows, missing, meanings):
     """The error on what neither a list nor survey.toml says of its points."""
     header = layout.header
-    used = {header[i] for i in layout.columns.values()} if header else set()
+    if header:
+        used = {header[i] for i in layout.columns.values()}
+    else:
+        used = set()
     seeming = {
         name: header[i] for name, i in _columns_of_words(layout, rows, meanings) if name in missing
     }
@@ -170,13 +173,18 @@ def _likely_kinds(layout, rows):
         are_words = all(any(c.isalpha() for c in word) for word in words)
         if are_words and 2 * len(words) <= len(rows):
             candidates.append(i)
-    return candidates[0] if len(candidates) == 1 else None
+    if len(candidates) == 1:
+        return candidates[0]
+    return None
 
 
 def _first_words(words):
     """The first of some words, as a message can show them."""
     limit = SETTINGS.named_faults
-    more = [f"and {len(words) - limit} more"] if len(words) > limit else []
+    if len(words) > limit:
+        more = [f"and {len(words) - limit} more"]
+    else:
+        more = []
     return ", ".join([*map(shown, words[:limit]), *more])
 
 
@@ -232,9 +240,11 @@ def _likely_meanings(name, word):
 
 
 def check_unused(
-    layout: TableLayout, rows: Sequence[Sequence[str]], given: Mapping[str, Any],
+    layout: TableLayout,
+    rows: Sequence[Sequence[str]],
+    given: Mapping[str, Any],
     meanings: Mapping[str, OfficeWord],
-) -> None:  # fmt: skip
+) -> None:
     """Refuse a column that isn't used but holds roles or kinds, and others than are given.
 
     Parameters
@@ -275,7 +285,8 @@ def role_doubts(layout: TableLayout, rows: Sequence[Sequence[str]]) -> Iterator[
         All cells.
     """
     for i in layout.unused if "role" not in layout.columns else ():
-        words, column = _cells(rows, i) - {""}, shown(layout.header[i])
+        words = _cells(rows, i) - {""}
+        column = shown(layout.header[i])
         is_few = 1 < len(words) <= len(WORDS["role"]) < len(rows)
         is_check = any(meant("role", word) == "check" for word in words)
         if is_check or (is_few and all(word.isalpha() for word in words)):
@@ -348,7 +359,8 @@ def placed(
     ValueError
         Where the trajectory does not tell.
     """
-    columns, sources = dict(layout.columns), {}
+    columns = dict(layout.columns)
+    sources = {}
     if "x" in columns:
         sources = dict(zip(AXES, _axes_east_and_north(layout, rows, trajectory), strict=False))
         columns |= {name: columns.pop(axis) for name, axis in sources.items()}
@@ -366,10 +378,13 @@ def _axes_east_and_north(layout, rows, trajectory):
         for places in (position, position[:, ::-1])
     ]
     if near[0] != near[1]:
-        return UNNAMED_AXES if near[0] else UNNAMED_AXES[::-1]
+        if near[0]:
+            return UNNAMED_AXES
+        return UNNAMED_AXES[::-1]
     x, y = (layout.name_of(axis) for axis in UNNAMED_AXES)
-    named = [OpenPlace(("control", "columns", our), (x, y), f"column of the {our}")
-             for our in AXES[:2]]  # fmt: skip
+    named = [
+        OpenPlace(("control", "columns", our), (x, y), f"column of the {our}") for our in AXES[:2]
+    ]
     raise AxesError(
         f"{layout.path} does not say which of {x} and {y} is easting, for X points east here and "
         f"north there, and {'both orders lie' if near[0] else 'neither order lies'} within "
@@ -396,5 +411,8 @@ def sentence_on(
     axes = ", easting and northing told by the trajectory" * has_axes
     values = [f"{k} {shown(v) if isinstance(v, str) else f'{v:g} m'}" for k, v in given.items()]
     values += [f"but check for {shown(', '.join(patterns))}"] * bool(patterns)
-    given_to_all = f"; of all points: {', '.join(values)}" if values else ""
+    if values:
+        given_to_all = f"; of all points: {', '.join(values)}"
+    else:
+        given_to_all = ""
     return f"{layout}{axes}{given_to_all}{layout.not_used}."

@@ -54,7 +54,8 @@ def find_layout(
         For columns that stand for the same, units that are not metric, thousands marks, and two
         sheets that hold a table.
     """
-    path, chosen = as_path(path), dict(chosen or {})
+    path = as_path(path)
+    chosen = dict(chosen or {})
     is_numbered = any(isinstance(column, int) for column in chosen.values())
     if is_numbered:
         positions = {name: int(number) - 1 for name, number in chosen.items()}
@@ -91,16 +92,18 @@ def _numbered(positions):
     def columns(cells):
         numbers = [i for name, i in positions.items() if name not in WORDS]
         is_row = max(positions.values()) < len(cells)
-        return positions if is_row and all(NUMBER.fullmatch(cells[i]) for i in numbers) else {}
+        if is_row and all(NUMBER.fullmatch(cells[i]) for i in numbers):
+            return positions
+        return {}
 
     return columns
 
 
 def _encodings(path):
     with open_file(path) as file:
-        return ("utf-16",) if file.read(2) in (b"\xff\xfe", b"\xfe\xff") else tuple(
-            name for name in layouts.ENCODINGS if name != "utf-16"
-        )  # fmt: skip
+        if file.read(2) in (b"\xff\xfe", b"\xfe\xff"):
+            return ("utf-16",)
+        return tuple(name for name in layouts.ENCODINGS if name != "utf-16")
 
 
 def _are_pairs(path):
@@ -209,7 +212,9 @@ def _uncommented(cells):
     """Cells of a header that may stand behind a comment mark."""
     if cells and cells[0].startswith(layouts.COMMENT_MARKS):
         first = cells[0].lstrip("".join(layouts.COMMENT_MARKS)).strip()
-        return [first, *cells[1:]] if first else cells[1:]
+        if first:
+            return [first, *cells[1:]]
+        return cells[1:]
     return cells
 
 
@@ -222,7 +227,8 @@ def _holds_units(cells, columns):
 
 def _with_numbers(layout, units, rows):
     """The layout with its decimal sign and the factors of its units."""
-    path, factors = layout.path, {}
+    path = layout.path
+    factors = {}
     for name, i in layout.columns.items():
         unit = units[i] if i < len(units) else None
         if unit is not None and unit not in UNITS:
@@ -260,7 +266,10 @@ def likely_header(path: str | Path, names: Mapping[str, str]) -> list[str]:
     list of str
     """
     path = as_path(path)
-    encodings = (None,) if path.suffix.lower() == SUFFIX else _encodings(path)
+    if path.suffix.lower() == SUFFIX:
+        encodings = (None,)
+    else:
+        encodings = _encodings(path)
     tables = [rows for encoding in encodings for _, rows in _candidates(path, encoding)]
     rows = [_uncommented(cells) for table in tables for _, cells in table]
     return max(rows, key=lambda cells: (len(find_meanings(cells, names)), len(cells)), default=[])

@@ -56,8 +56,14 @@ class TableLayout:
         ]
         identical = [name for name, other in names.items() if plain(other) == plain(name)]
         parts += [f"{', '.join(identical)} by name"] * bool(identical)
-        parted = f"sheet {shown(self.sheet)}" if self.sheet else SEPARATORS[self.separator]
-        letters = "" if self.encoding == ENCODING else f", letters of {ENCODINGS[self.encoding]}"
+        if self.sheet:
+            parted = f"sheet {shown(self.sheet)}"
+        else:
+            parted = SEPARATORS[self.separator]
+        if self.encoding == ENCODING:
+            letters = ""
+        else:
+            letters = f", letters of {ENCODINGS[self.encoding]}"
         sign = "comma" if self.decimal == "," else "point"
         form = f"{parted}, decimal {sign}{letters}"
         return f"{self.path.name} was read as {', '.join(parts)} ({form})"
@@ -72,7 +78,9 @@ class TableLayout:
     def not_used(self) -> str:
         """Words on the columns that aren't used; nothing without such."""
         names = ", ".join(shown(self.header[i]) for i in self.unused)
-        return f"; not used: {names}" if names else ""
+        if names:
+            return f"; not used: {names}"
+        return ""
 
     def name_of(self, column: str) -> str:
         """What a column is called in the table, or its number from 1.
@@ -83,7 +91,9 @@ class TableLayout:
             Our name.
         """
         place = self.columns[column]
-        return shown(self.header[place]) if self.header else f"column {place + 1}"
+        if self.header:
+            return shown(self.header[place])
+        return f"column {place + 1}"
 
     def number(self, cell: str) -> float:
         """The number in a cell.
@@ -115,7 +125,8 @@ def head(path: Path, encoding: str = ENCODING) -> list[tuple[int, str]]:
     list of (int, str)
         Empty where the file is no text in this encoding; up to a line too long for a table.
     """
-    lines, longest = [], SETTINGS.longest_line
+    lines = []
+    longest = SETTINGS.longest_line
     try:
         with open_file(path, encoding) as file:
             for number in range(1, SETTINGS.sampled_lines + 1):

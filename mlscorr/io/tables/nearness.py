@@ -38,7 +38,10 @@ def check_together(path: Path, points: ControlPoints, trajectory: Trajectory) ->
         swapped = distance_of(points.position[:, order[:2]], trajectory)
         if swapped < SETTINGS.near:
             under = [f"{AXES[i]} under {AXES[column]}" for i, column in enumerate(order)]
-            what = "Easting and northing" if order == orders[0] else f"Columns ({', '.join(under)})"
+            if order == orders[0]:
+                what = "Easting and northing"
+            else:
+                what = f"Columns ({', '.join(under)})"
             raise ValueError(
                 f"{what} seem to be swapped in {path}: its nearest point lies "
                 f"{distance / 1e3:.0f} km from the trajectory as it stands, {swapped:.0f} m when "
@@ -64,7 +67,8 @@ def _heights_in_feet(path, position, trajectory):
     """Whose heights are like the others when taken as feet, and not as they stand; else empty."""
     distance, epoch = nearest_epochs(position[:, :2], trajectory)
     near = distance < SETTINGS.near
-    up, driven = position[near, 2], trajectory.position[epoch[near], 2]
+    up = position[near, 2]
+    driven = trajectory.position[epoch[near], 2]
     if not near.any() or (apart := abs(np.median(up - driven))) < SEARCH_RADIUS:
         return ""
     feet = {path: up * FOOT - driven, "the trajectory": up - driven * FOOT}

@@ -27,7 +27,10 @@ def write_targets_csv(path: str | Path, targets: Sequence[dict]) -> None:
             for vector in vectors
             for value in (target[vector] or (None,) * len(AXES))
         ]
-        time = "" if target["gps_time"] is None else f"{target['gps_time']:.6f}"
+        if target["gps_time"] is None:
+            time = ""
+        else:
+            time = f"{target['gps_time']:.6f}"
         first = (target["name"], target["pass"] or "", time, target["role"])
         used, scanned = (str(target[key]).lower() for key in ("used", "scanned"))
         rows.append((*first, *numbers, used, target["reason"] or "", scanned))
@@ -98,4 +101,6 @@ def _inert(cell):
     ("'=1+1", '-0.0123', 'T01')
     """
     is_formula = isinstance(cell, str) and re.match(r"[=+@\t\r-](?![\d.]*$)", cell)
-    return f"'{cell}" if is_formula else cell
+    if is_formula:
+        return f"'{cell}"
+    return cell

@@ -35,7 +35,8 @@ def read_rows(layout: TableLayout, exact: bool = False) -> Iterator[tuple[str, l
     ValueError
         For a row that is too short or too long, and a file that is not text.
     """
-    width, last = len(layout.header), max(layout.columns.values())
+    width = len(layout.header)
+    last = max(layout.columns.values())
     for number, cells in _all_rows(layout):
         is_row = layout.is_own or not (is_comment(cells) or "".join(cells).strip("-=_") == "")
         if not any(cells) or not is_row:
@@ -70,7 +71,10 @@ def _all_rows(layout):
         try:
             for _ in range(layout.lines):
                 next(file)
-            lines = (" ".join(line.split()) for line in file) if layout.separator == " " else file
+            if layout.separator == " ":
+                lines = (" ".join(line.split()) for line in file)
+            else:
+                lines = file
             reader = csv.reader(lines, delimiter=layout.separator, skipinitialspace=True)
             for row in reader:
                 cells = (cell.strip() for cell in row)
@@ -125,9 +129,13 @@ def read_numbers(
 def _loaded(layout, converters, is_plain):
     """The table of numbers, of its plain lines or, which is faster, as the file is."""
     if is_plain:
-        source, form = _plain_lines(layout), {"delimiter": "\t"}
+        source = _plain_lines(layout)
+        form = {"delimiter": "\t"}
     else:
-        source = open_file(layout.path, ENCODING) if is_remote(layout.path) else layout.path
+        if is_remote(layout.path):
+            source = open_file(layout.path, ENCODING)
+        else:
+            source = layout.path
         form = {"delimiter": ",", "skiprows": layout.lines}
     columns = tuple(layout.columns.values())
     try:

@@ -30,7 +30,8 @@ def read_header(path: str | Path) -> tuple[list[str], int]:
     ValueError
         When the file holds nothing but blank lines or is not text.
     """
-    path, longest = as_path(path), SETTINGS.longest_line
+    path = as_path(path)
+    longest = SETTINGS.longest_line
     try:
         with open_file(path, ENCODING) as file:
             for number, line in enumerate(iter(lambda: file.readline(longest), ""), start=1):
@@ -90,13 +91,16 @@ def find_columns(
 
 
 def read_layout(
-    path: str | Path, required: Sequence[str], groups: Sequence[Sequence[str]],
-    names: Mapping[str, str], lacking: Callable[[Collection[str]], list[str]],
+    path: str | Path,
+    required: Sequence[str],
+    groups: Sequence[Sequence[str]],
+    names: Mapping[str, str],
+    lacking: Callable[[Collection[str]], list[str]],
     chosen: Mapping[str, str | int] | None = None,
     unnamed: Callable[[Sequence[str]], Mapping[str, int]] = lambda _: {},
     hints: Mapping[tuple[str, str], str] | None = None,
     hint_places: Mapping[tuple[str, str], OpenPlace] | None = None,
-) -> TableLayout:  # fmt: skip
+) -> TableLayout:
     """The layout of a table in our own columns, or of one as others write them.
 
     Parameters
@@ -121,12 +125,14 @@ def read_layout(
     ValueError
         For a table whose columns are missing or can be understood in two ways, and for no text.
     """
-    path, refusal = as_path(path), None
+    path = as_path(path)
+    refusal = None
     if path.suffix.lower() != SUFFIX:
         try:
             header, lines = read_header(path)
         except ValueError as error:
-            header, refusal = [], error
+            header = []
+            refusal = error
         if not chosen and set(required) <= set(header) and head(path):
             columns = find_columns(path, header, required, groups)
             return TableLayout(path, tuple(header), lines, columns, is_own=True)
@@ -149,7 +155,10 @@ def read_layout(
             for (name, other), place in (hint_places or {}).items()
             if name in missing and other in meanings
         ]
-        columns = [] if places or ways_out else _likely_places(header, missing, used, names)
+        if places or ways_out:
+            columns = []
+        else:
+            columns = _likely_places(header, missing, used, names)
         sentence = missing_sentence(path, header, missing, used, names) + ways_out
         raise OpenQuestion(sentence, [*places, *columns])
     return layout
@@ -224,9 +233,13 @@ def _likely_places(header, missing, used, names):
 
 
 def missing_sentence(
-    path: str | Path, header: Sequence[str], missing: Sequence[str], used: Collection[str],
-    names: Mapping[str, str], seeming: Mapping[str, str] | None = None,
-) -> str:  # fmt: skip
+    path: str | Path,
+    header: Sequence[str],
+    missing: Sequence[str],
+    used: Collection[str],
+    names: Mapping[str, str],
+    seeming: Mapping[str, str] | None = None,
+) -> str:
     """A sentence on columns that are missing, and on the one that may be meant, if one is like it.
 
     Parameters
@@ -245,7 +258,8 @@ def missing_sentence(
     others = [cell for cell in header if cell and cell not in used]
     near = _near_columns(others, missing, names) | dict(seeming or {})
     candidates = [name for name in missing if name in near]
-    hint, section = "", section_of(names)
+    hint = ""
+    section = section_of(names)
     numbers = sum(NUMBER.fullmatch(cell) is not None for cell in header)
     if numbers > 2:
         hint = (
@@ -257,7 +271,8 @@ def missing_sentence(
         if numbers == 2:
             hint = " It seems to hold a plan without heights: each point needs its own."
     elif candidates:
-        name, column = candidates[0], shown(near[candidates[0]])
+        name = candidates[0]
+        column = shown(near[candidates[0]])
         hint = (
             f" {name} may be meant by '{column}': if so, say under [{section}] in survey.toml, as "
             f"columns.{name} = '{column}'."

@@ -182,7 +182,9 @@ def _cause(heading, course, is_paired):
         "the POS may be mounted turned about its vertical axis, or headings from true north lack "
         "the meridian convergence"
     )
-    return cause if is_paired else f"{cause}, or wind or current sets the vehicle aside"
+    if is_paired:
+        return cause
+    return f"{cause}, or wind or current sets the vehicle aside"
 
 
 def _folded(angle):
@@ -237,7 +239,8 @@ def heading_and_course(
     if len(steps) == 0 or (steps <= 0).any():  # Trajectory says what is wrong
         return np.empty(0), np.empty(0)
     stride = max(1, round(SETTINGS.baseline / np.median(steps)))
-    start, end = np.arange(0, len(gps_time) - stride), np.arange(stride, len(gps_time))
+    start = np.arange(0, len(gps_time) - stride)
+    end = np.arange(stride, len(gps_time))
     moved = position[end] - position[start]
     seconds = gps_time[end] - gps_time[start]
     distance = np.hypot(moved[:, 0], moved[:, 1])

@@ -149,11 +149,13 @@ def attitude_of_quaternions(
     quaternion = np.column_stack([table[name] for name in QUATERNION])
     if not np.isclose(np.linalg.norm(quaternion, axis=1), 1.0, atol=UNIT_TOLERANCE).all():
         raise ValueError(f"{path} has quaternions whose length is not one: they are no attitudes.")
-    recorded, convergence = Rotation.from_quat(quaternion), 0.0
+    recorded = Rotation.from_quat(quaternion)
+    convergence = 0.0
     if "latitude" in table:
         table, convergence = _projected(path, table, crs)
     position = np.column_stack([table["easting"], table["northing"]])
-    tolerance, fitting = np.radians(SETTINGS.course_tolerance), []
+    tolerance = np.radians(SETTINGS.course_tolerance)
+    fitting = []
     for name, our_axes in OUR_AXES.items():
         attitude = recorded * Rotation.from_matrix(our_axes)
         angles = np.column_stack(angles_from_attitude(attitude))

@@ -17,7 +17,8 @@ from mlscorr.io.trajectories._leap_seconds import leap_seconds
 from mlscorr.io.trajectories.time_systems import DAY, counting_on
 from mlscorr.survey import WEEK
 
-POF_SUFFIX, POQ_SUFFIX = ".pof", ".poq"
+POF_SUFFIX = ".pof"
+POQ_SUFFIX = ".poq"
 HEADER = np.dtype(
     [
         ("signature", "V27"),
@@ -72,10 +73,14 @@ def read_pof(path: str | Path) -> tuple[dict[str, np.ndarray], float, str]:
     data = read_bytes(path)
     header, day = _header(path, data)
     names = (*FIELDS, "distance")[: 8 if header["minor"] >= 1 else 7]
-    width, count = 8 * len(names), int(header["entries"])
+    width = 8 * len(names)
+    count = int(header["entries"])
     whole = int(header["offset"]) + count * width
     if len(data) != whole:
-        cause = "it was cut off" if len(data) < whole else "its version may have another layout"
+        if len(data) < whole:
+            cause = "it was cut off"
+        else:
+            cause = "its version may have another layout"
         raise ValueError(
             f"{path} has {len(data)} bytes where its header announces {count} records of {width} "
             f"bytes, {whole} in all: {cause}. {WAY_OUT}"
@@ -116,7 +121,8 @@ def read_poq(path: str | Path) -> dict[str, np.ndarray]:
     ValueError
         For a file that was cut off.
     """
-    data, start = read_bytes(path), QUALITY_HEADER.itemsize
+    data = read_bytes(path)
+    start = QUALITY_HEADER.itemsize
     header = np.frombuffer(data[:start].ljust(start, b"\0"), QUALITY_HEADER)[0]
     satellites = 2 if header["minor"] >= 1 else 1  # counts, of GPS and of GLONASS
     kind = np.dtype([("values", "<f8", len(QUALITIES)), ("satellites", "<u2", satellites)])
@@ -155,7 +161,8 @@ def _header(path, data):
 
 def _constant(path, header, day):
     """What makes a POF's times seconds of the GPS week (s), and a sentence on it."""
-    unit, system = UNITS[header["unit"]], SYSTEMS[header["system"]]
+    unit = UNITS[header["unit"]]
+    system = SYSTEMS[header["system"]]
     version = f"{path.name} was read as RIEGL's POF {header['major']}.{header['minor']} of {day}"
     if header["unit"] == 0:
         raise ValueError(
@@ -168,7 +175,11 @@ def _constant(path, header, day):
             "is 18 s ahead since 2017. Export it with seconds of the GPS week.",
             stacklevel=4,
         )
-    days = day.isoweekday() % 7 * DAY if header["unit"] == 1 else 0.0  # GPS weeks start on Sunday
+    # GPS weeks start on Sunday
+    if header["unit"] == 1:
+        days = day.isoweekday() % 7 * DAY
+    else:
+        days = 0.0
     leaps = float(leap_seconds(day)) if system == "UTC" else 0.0
     parts = [f"{unit} ({system})"]
     parts += [f"{days:+.0f} s to {day:%A} in the GPS week"] * bool(header["unit"] == 1)

@@ -150,4 +150,6 @@ def _seconds(cell):
         elapsed = datetime.strptime(day, "%Y-%m-%d-%H-%M-%S") - datetime(1970, 1, 1)
         return elapsed.total_seconds() + float(milliseconds) / 1e3
     time = float(cell)
-    return time / 1e6 if time > SETTINGS.microseconds else time
+    if time > SETTINGS.microseconds:
+        return time / 1e6
+    return time

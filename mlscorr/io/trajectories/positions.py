@@ -53,7 +53,8 @@ def position_file(path: Path) -> str:
             "time, latitude, longitude, height and their sigmas), and without roll, pitch and "
             f"heading. {EXPORTS}"
         )
-    known, words = find_meanings(header, TRAJECTORY_NAMES), set(map(plain, header))
+    known = find_meanings(header, TRAJECTORY_NAMES)
+    words = set(map(plain, header))
     is_rtklib = words >= RTKLIB
     is_oriented = not {"roll", "pitch", "heading", "yaw", *QUATERNION}.isdisjoint(known)
     is_geocentric = any("ecef" in word for word in words) or _is_geocentric_table(path, known)
@@ -64,8 +65,14 @@ def position_file(path: Path) -> str:
     is_whole = "gps_time" in known and used == set(range(len(header)))
     if is_oriented or not (is_rtklib or (is_placed and (is_whole or is_geocentric))):
         return ""
-    kind = "an RTKLIB position file" if is_rtklib else "a file of positions"
-    frame = ", in geocentric coordinates X, Y, Z (ECEF)" if is_geocentric else ""
+    if is_rtklib:
+        kind = "an RTKLIB position file"
+    else:
+        kind = "a file of positions"
+    if is_geocentric:
+        frame = ", in geocentric coordinates X, Y, Z (ECEF)"
+    else:
+        frame = ""
     return f"{path} is {kind} without attitude (roll, pitch, heading){frame}. {EXPORTS}"
 
 

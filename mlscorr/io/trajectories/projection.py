@@ -79,7 +79,10 @@ class MapFactors:
 
     def __str__(self) -> str:
         """The factors in words."""
-        height = f", height factor {self.height:.6f}" if self.height != 1 else ""
+        if self.height != 1:
+            height = f", height factor {self.height:.6f}"
+        else:
+            height = ""
         return f"scale factor of the projection {self.projection:.6f}{height}"
 
 
@@ -133,7 +136,9 @@ def crs_name(crs: CRS) -> str:
     crs : pyproj.CRS
     """
     code = crs_code(crs)
-    return f"{code} ({crs.name})" if code else crs.name
+    if code:
+        return f"{code} ({crs.name})"
+    return crs.name
 
 
 def crs_code(crs: CRS) -> str | None:
@@ -184,7 +189,8 @@ def project(crs: str, record: dict[str, np.ndarray]) -> tuple[np.ndarray, np.nda
         Where a grid or the CRS does not reach.
     """
     crs = _by_greenwich(crs)
-    longitude, latitude = np.degrees(record["longitude"]), np.degrees(record["latitude"])
+    longitude = np.degrees(record["longitude"])
+    latitude = np.degrees(record["latitude"])
     try:
         easting, northing, height = _exact(crs.geodetic_crs.to_3d(), crs).transform(
             longitude, latitude, record["height"], errcheck=True

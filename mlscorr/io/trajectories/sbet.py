@@ -147,7 +147,8 @@ def is_sbet(path: str | Path) -> bool:
     ----------
     path : path
     """
-    size, width = file_state(path)[0], 8 * len(SBET_FIELDS)
+    size = file_state(path)[0]
+    width = 8 * len(SBET_FIELDS)
     if size % width or size < 2 * width:
         return False
     places = [0, size // width // 2, size // width - 1]
@@ -165,7 +166,8 @@ def is_sbet(path: str | Path) -> bool:
 
 def _read_records(path, fields, what):
     """Records of a headerless file as a dict of (n,) float64 arrays."""
-    size, width = file_state(path)[0], 8 * len(fields)
+    size = file_state(path)[0]
+    width = 8 * len(fields)
     if size == 0:
         raise ValueError(f"{path} is empty.")
     if size % width:
@@ -183,7 +185,10 @@ def _check_radians(path, record):
     for name, limit in LIMITS.items():
         worst = np.abs(record[name]).max()
         if worst > limit * (1 + 1e-9):
-            cause = "it may be in degrees" if worst <= 360 else "the file may not be an SBET"
+            if worst <= 360:
+                cause = "it may be in degrees"
+            else:
+                cause = "the file may not be an SBET"
             raise ValueError(
                 f"{path} has a {name} of {worst:.6g} where radians up to {limit:.4f} belong: "
                 f"{cause}."

@@ -68,9 +68,13 @@ class TimeMatch:
 
 
 def match_times(
-    name: str, times: ArrayLike, is_standard: bool, trajectory: Trajectory, setting: str = "auto",
+    name: str,
+    times: ArrayLike,
+    is_standard: bool,
+    trajectory: Trajectory,
+    setting: str = "auto",
     time_offset: float = 0.0,
-) -> TimeMatch:  # fmt: skip
+) -> TimeMatch:
     """Constant between a cloud's times and the trajectory's.
 
     Parameters
@@ -279,7 +283,8 @@ def _check_precision(name, times):
 
 def _candidates(times, span):
     """Constants (s) as a list of (constant, cloud system, trajectory system), simplest first."""
-    middle, goal = np.median(times), np.mean(span)
+    middle = np.median(times)
+    goal = np.mean(span)
     candidates = [(0.0, system, system) for system in SYSTEMS]
     candidates += [(WEEK * k, "week", "week") for k in (-1, 1)]  # one of the two rolled over
     to_gps = {"standard": ADJUSTMENT, "gps": 0.0}
@@ -334,7 +339,9 @@ def usual_systems(times: np.ndarray) -> tuple[str, ...]:
         return ("week",)
     if times.min() >= ADJUSTMENT:
         return ("gps",)
-    return ("gps", "standard") if times.min() >= SETTINGS.earliest_time else ("standard",)
+    if times.min() >= SETTINGS.earliest_time:
+        return ("gps", "standard")
+    return ("standard",)
 
 
 def utc_lag(*times: np.ndarray) -> int:

@@ -165,17 +165,22 @@ def write_trajectory_csv(path: str | Path, trajectory: Trajectory) -> None:
     """
     angles = np.degrees(np.column_stack(angles_from_attitude(trajectory.attitude)))
     blocks = [trajectory.file_time[:, None], trajectory.position, angles]
-    names, formats = COLUMNS, ["%.6f"] + ["%.5f"] * 3 + ["%.7f"] * 3
+    names = COLUMNS
+    formats = ["%.6f"] + ["%.5f"] * 3 + ["%.7f"] * 3
     if trajectory.position_sigma is not None:
         blocks.append(trajectory.position_sigma)
-        names, formats = names + POSITION_SIGMAS, formats + ["%.5f"] * 3
+        names = names + POSITION_SIGMAS
+        formats = formats + ["%.5f"] * 3
     if trajectory.attitude_sigma is not None:
         blocks.append(np.degrees(trajectory.attitude_sigma))
-        names, formats = names + ATTITUDE_SIGMAS, formats + ["%.7f"] * 3
+        names = names + ATTITUDE_SIGMAS
+        formats = formats + ["%.7f"] * 3
     if trajectory.session is not None:
         blocks.append(trajectory.session[:, None])
-        names, formats = names + SESSION, [*formats, "%d"]
-    table, line = np.hstack(blocks), ",".join(formats) + "\n"
+        names = names + SESSION
+        formats = [*formats, "%d"]
+    table = np.hstack(blocks)
+    line = ",".join(formats) + "\n"
     with output_file(path) as part, part.open("w", encoding="utf-8", newline="\n") as file:
         file.write(",".join(names) + "\n")
         for start in range(0, len(table), 10_000):  # one format call for many rows is fast
@@ -191,7 +196,9 @@ def _trajectory_of(path, table):
     check_units(path, table["gps_time"], position, angles)
 
     def sigmas(names):
-        return np.column_stack([table[name] for name in names]) if names[0] in table else None
+        if names[0] in table:
+            return np.column_stack([table[name] for name in names])
+        return None
 
     attitude_sigma = sigmas(ATTITUDE_SIGMAS)
     try:

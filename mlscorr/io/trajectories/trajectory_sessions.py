@@ -86,7 +86,8 @@ def read_sessions(
         replace(part.trajectory, gps_time=part.trajectory.gps_time + file.section.time_constant)
         for part, file in zip(read, files, strict=True)
     ]
-    joined, notes = parts[0], []
+    joined = parts[0]
+    notes = []
     if len(parts) > 1:
         check_systems(names, parts)
         parts = across_week_end(parts)
@@ -167,7 +168,10 @@ def across_week_end(parts: Sequence[Trajectory]) -> list[Trajectory]:
 
 def _week_later(part):
     """A trajectory with a week added to its times, which files have as they came."""
-    weeks = np.zeros(len(part), int) if part.weeks is None else part.weeks
+    if part.weeks is None:
+        weeks = np.zeros(len(part), int)
+    else:
+        weeks = part.weeks
     return replace(part, gps_time=part.gps_time + WEEK, weeks=weeks + 1)
 
 
@@ -254,8 +258,11 @@ def join_sessions(
     """
     parts = _with_weeks(parts)
     order = sorted(range(len(parts)), key=lambda i: (parts[i].gps_time[0], -len(parts[i])))
-    sessions, kept, notes = [_numbers(part) for part in parts], [], []
-    largest, bases = 1 + max(session.max() for session in sessions), {}
+    sessions = [_numbers(part) for part in parts]
+    kept = []
+    notes = []
+    largest = 1 + max(session.max() for session in sessions)
+    bases = {}
     for number, i in enumerate(order):
         bases[i], is_new = 1 + number * largest, np.ones(len(parts[i]), bool)
         for j in order[:number]:
@@ -265,7 +272,10 @@ def join_sessions(
             is_same = _compare([names[j], names[i]], parts[j], parts[i], is_common, pos)
             if is_same:
                 bases[i] = bases[j]
-            how = "the same, and join" if is_same else "alike within their sigmas, and part"
+            if is_same:
+                how = "the same, and join"
+            else:
+                how = "alike within their sigmas, and part"
             notes.append(
                 f"{is_common.sum()} epochs of {names[i]} lie within {names[j]}: they are {how} the "
                 f"two there; those of {names[j]} are taken."
@@ -290,7 +300,9 @@ def _with_weeks(parts):
 
 def _numbers(part):
     """Sessions (n,) of a part by itself, from 0."""
-    return np.zeros(len(part), int) if part.session is None else part.session - part.session.min()
+    if part.session is None:
+        return np.zeros(len(part), int)
+    return part.session - part.session.min()
 
 
 def _compare(names, first, second, is_common, pos):
@@ -307,7 +319,8 @@ def _compare(names, first, second, is_common, pos):
         else:
             both = np.hstack([getattr(there, key), stated[is_common]])
             limits.append(_rms(np.linalg.norm(both, axis=1)))
-    way, turn = _rms(apart), _rms(turned)
+    way = _rms(apart)
+    turn = _rms(turned)
     if way > limits[0] or turn > limits[1]:
         common = second.gps_time[is_common]
         raise ValueError(

@@ -41,7 +41,8 @@ COLUMNS = ("gps_time", *AXES, *ANGLES)
 POSITION_SIGMAS = ("sigma_easting", "sigma_northing", "sigma_height")
 ATTITUDE_SIGMAS = ("sigma_roll", "sigma_pitch", "sigma_heading")
 SESSION = ("session",)  # of the POS, in a trajectory that was joined of several
-GRID, TRUE = "clockwise from grid north", "clockwise from true north"
+GRID = "clockwise from grid north"
+TRUE = "clockwise from true north"
 FROM_EAST = "counterclockwise from east"
 TUM = ("gps_time", *AXES, *QUATERNION)
 ORDER = re.compile(r"q.{0,3}|.*(quat|orient|rot).*|w")  # plain names of a quaternion's columns
@@ -87,16 +88,21 @@ def read_table(
     ValueError
         For missing columns, cells that are no numbers, and conventions that are not known.
     """
-    groups, chosen = (POSITION_SIGMAS, ATTITUDE_SIGMAS, SESSION), section.columns.chosen
+    groups = (POSITION_SIGMAS, ATTITUDE_SIGMAS, SESSION)
+    chosen = section.columns.chosen
 
     def lacking(names: Collection[str]) -> list[str]:
         is_projected = "latitude" not in names or {"easting", "northing"} <= set(names)
-        place = AXES if is_projected else ("latitude", "longitude", "height")
+        if is_projected:
+            place = AXES
+        else:
+            place = ("latitude", "longitude", "height")
         angles = ("roll", "pitch", "yaw" if section.heading and "yaw" in names else "heading")
         if _is_quaternion(names, chosen):
             angles = QUATERNION
             is_named = {"easting", "northing"} & set(names) or not is_projected
-            place = place if is_named or "x" not in names else ("x", "y", "height")
+            if not (is_named or "x" not in names):
+                place = ("x", "y", "height")
         return [name for name in ("gps_time", *place, *angles) if name not in names]
 
     try:
@@ -116,7 +122,8 @@ def read_table(
             raise
         raise ValueError(other) from None
     _check_order(layout, lacking, chosen)
-    layout = layout if layout.is_own else _used(layout, _is_quaternion(layout.columns, chosen))
+    if not layout.is_own:
+        layout = _used(layout, _is_quaternion(layout.columns, chosen))
     if section.angles:
         angles = (*ANGLES, "yaw", *ATTITUDE_SIGMAS)
         factors = {name: UNITS[section.angles] for name in angles if name in layout.columns}
@@ -135,10 +142,14 @@ def read_table(
     if layout.is_own and not given:
         return table, f"{layout}{unit}." if unit else None
     table = in_our_conventions(path, table, conventions, crs)
-    degrees = "" if "roll" in layout.factors else ", angles in degrees"
-    where = (
-        f"; latitude and longitude in the datum of {crs}" if "latitude" in layout.columns else ""
-    )
+    if "roll" in layout.factors:
+        degrees = ""
+    else:
+        degrees = ", angles in degrees"
+    if "latitude" in layout.columns:
+        where = f"; latitude and longitude in the datum of {crs}"
+    else:
+        where = ""
     return table, f"{layout}{unit}{where}; {conventions}{degrees}{layout.not_used}."
 
 
@@ -178,7 +189,9 @@ def tum_columns(cells: Sequence[str]) -> Mapping[str, int]:
         return {}
     length = np.linalg.norm([float(cell.replace(",", ".")) for cell in cells[4:]])
     is_attitude = abs(length - 1.0) < UNIT_TOLERANCE
-    return dict(zip(TUM, range(len(TUM)), strict=True)) if is_attitude else {}
+    if is_attitude:
+        return dict(zip(TUM, range(len(TUM)), strict=True))
+    return {}
 
 
 def _is_quaternion(names, chosen):

@@ -185,7 +185,8 @@ def _epochs_in(drive, area):
 
 def _piece(drive, rows):
     """The Piece of some epochs of a drive."""
-    recorded, features = drive.survey.trajectory, drive.features
+    recorded = drive.survey.trajectory
+    features = drive.features
     last = len(recorded) - 1
 
     def within(gps_time):

@@ -63,7 +63,10 @@ def _surveys(project: ProjectParts, faults: Faults) -> list[Survey]:
     surveys = []
     for drive in project.drives:
         own = [tiles[drive.name] for _, tiles in read if tiles and drive.name in tiles]
-        planned = faults.of("data", stages.planned_drive, project, drive, own) if own else None
+        if own:
+            planned = faults.of("data", stages.planned_drive, project, drive, own)
+        else:
+            planned = None
         if planned is not None:
             surveys.append(planned.survey)
     for task in stages.refusals(project, read):
@@ -73,7 +76,8 @@ def _surveys(project: ProjectParts, faults: Faults) -> list[Survey]:
 
 def _checked(survey: Survey) -> tuple[Survey, CheckedSurvey]:
     """What a check says of a drive, by its name."""
-    checked, name = checked_survey(survey, Faults(), needs_control=False), survey.name
+    checked = checked_survey(survey, Faults(), needs_control=False)
+    name = survey.name
     return survey, replace(
         checked,
         faults=tuple(replace(f, sentence=f"{name}: {f.sentence}") for f in checked.faults),
@@ -132,7 +136,13 @@ def _sums(parts: Sequence[Sequence[Amount]]) -> tuple[Amount, ...]:
     for amount in (amount for own in parts for amount in own):
         key = amount.what, amount.unit
         before = total[key].number if key in total else 0.0
-        number = max(before, amount.number) if amount.what == "memory" else before + amount.number
-        source = f"{len(parts)} drives" if len(parts) > 1 else amount.source
+        if amount.what == "memory":
+            number = max(before, amount.number)
+        else:
+            number = before + amount.number
+        if len(parts) > 1:
+            source = f"{len(parts)} drives"
+        else:
+            source = amount.source
         total[key] = replace(amount, number=number, source=source)
     return tuple(total.values())

@@ -76,10 +76,13 @@ def in_turn(inputs: Iterable[AreaInput]) -> list[list[AreaResult]]:
 
 
 def project_drives(
-    drives: Sequence[FoundDrive], order: int, origin: np.ndarray, with_ties: bool,
+    drives: Sequence[FoundDrive],
+    order: int,
+    origin: np.ndarray,
+    with_ties: bool,
     work: Callable[[Iterable[AreaInput]], list[list[AreaResult]]] = in_turn,
     limit: int = SETTINGS.area_seconds,
-) -> Iterator[tuple[CorrectedSurvey, DriveState]]:  # fmt: skip
+) -> Iterator[tuple[CorrectedSurvey, DriveState]]:
     """The results of all drives.
 
     Parameters
@@ -96,7 +99,10 @@ def project_drives(
     limit : int
         Of the time that drives spend in an area and its margin. Units: s.
     """
-    groups = near_drives(drives) if with_ties else [[drive] for drive in drives]
+    if with_ties:
+        groups = near_drives(drives)
+    else:
+        groups = [[drive] for drive in drives]
     for group in groups:
         areas = drive_areas(group, limit)
         if with_ties and len(areas) > 1:
@@ -107,9 +113,12 @@ def project_drives(
 
 
 def drives_by_areas(
-    drives: Sequence[FoundDrive], areas: Sequence[Area], order: int, origin: np.ndarray,
+    drives: Sequence[FoundDrive],
+    areas: Sequence[Area],
+    order: int,
+    origin: np.ndarray,
     work: Callable[[Iterable[AreaInput]], list[list[AreaResult]]] = in_turn,
-) -> Iterator[tuple[CorrectedDrive, DriveState]]:  # fmt: skip
+) -> Iterator[tuple[CorrectedDrive, DriveState]]:
     """The results of drives, each merged of those of its pieces.
 
     Parameters

@@ -71,12 +71,17 @@ def corrected_drives(
     area : Area, optional
         Of which the drives are pieces: ties elsewhere don't count.
     """
-    joint, estimate = part.joint, part.estimate
+    joint = part.joint
+    estimate = part.estimate
     states = [_state(part, number, area) for number in range(len(joint.drives))]
     if joint.is_single and area is None:
         return [(CorrectedSurvey(**drive_fields(joint.drives[0], estimate)), states[0])]
     places = place_control(estimate)
-    section = {} if area is not None else tie_section(estimate) or {}  # an area is no drive
+    # an area is no drive
+    if area is not None:
+        section = {}
+    else:
+        section = tie_section(estimate) or {}
     results = []
     for number, (drive, shift) in enumerate(zip(joint.drives, joint.shifts, strict=True)):
         own = drive_estimate(joint, estimate, number, tied_sentence(states[number]))
@@ -110,7 +115,9 @@ def drive_fields(drive: FoundDrive, estimate: Estimate) -> dict[str, Any]:
 
 def _state(part, number, area):
     """The DriveState of one of some drives that were estimated together."""
-    joint, estimate, drive = part.joint, part.estimate, part.joint.drives[number]
+    joint = part.joint
+    estimate = part.estimate
+    drive = part.joint.drives[number]
     owner = np.repeat(np.arange(len(joint.drives)), [len(d.control) for d in joint.drives])
     if estimate.used[owner == number].any():
         state = "controlled"
@@ -181,7 +188,8 @@ def motion_of(corrected: CorrectedSurvey, with_sigma: bool) -> MovedClouds:
     with_sigma : bool
         Whether points get their sigmas.
     """
-    survey, correction = corrected.survey, corrected.estimate.correction
+    survey = corrected.survey
+    correction = corrected.estimate.correction
     if not with_sigma:
         correction = Correction(correction.recorded, correction.corrected)
     bare = replace(bare_survey(survey), trajectory=correction.recorded)

@@ -104,8 +104,12 @@ def correct_project(
     OSError
         When writing fails.
     """
-    options, out = options or Options(), as_path(out).absolute()
-    project = path if isinstance(path, ProjectParts) else read_project(path)
+    options = options or Options()
+    out = as_path(out).absolute()
+    if isinstance(path, ProjectParts):
+        project = path
+    else:
+        project = read_project(path)
     check_exports(options.trajectories, project.crs, is_read=True)
     check_project_output(project, out, options)
     store = TaskStore(out / STORE)
@@ -162,7 +166,8 @@ class _Work:
         keys = self._estimated(planned, np.floor(planned[0].survey.trajectory.position[0]))
         clouds = self._clouds(planned, keys)
         reports = self._reports(planned, keys, clouds)
-        store, written = self.run.store, [*reports.values()]
+        store = self.run.store
+        written = [*reports.values()]
         drives = [(store.get("states", keys[name]), own.value) for name, own in reports.items()]
         older = [*older_clouds(self.out, clouds), *older_results(store, written)]
         result = project_document(self.project, drives, self.run, older)
@@ -203,7 +208,8 @@ class _Work:
 
     def _estimated(self, planned, origin):
         """Keys of each drive's results in the store: (corrected, motion) by its name."""
-        with_ties, store = self.ties != "off", self.run.store
+        with_ties = self.ties != "off"
+        store = self.run.store
         tasks = {d.survey.name: stages.finding_tasks(store, d, origin, with_ties) for d in planned}
         every = [task for own in tasks.values() for task in own]
         self.progress.begin("findings", every)
@@ -265,7 +271,9 @@ class _Work:
 
     def _reports(self, planned, keys, clouds):
         """What each drive's report wrote, by the drive's name."""
-        store, page, exports = self.run.store.folder, self.options.page, self.options.trajectories
+        store = self.run.store.folder
+        page = self.options.page
+        exports = self.options.trajectories
         tasks = []
         for drive in planned:
             name = drive.survey.name

@@ -110,7 +110,8 @@ def older_results(store: TaskStore, reports: Sequence[Written]) -> list[str]:
         Of this run.
     """
     made = {name for each in reports for name, _ in each.outputs}
-    now, older = [each.value | {"outputs": ()} for each in reports], set()
+    now = [each.value | {"outputs": ()} for each in reports]
+    older = set()
     for key in store.keys("reports"):
         with suppress(KeyError):  # of another version, or damaged
             each: Written = store.get("reports", key)[0]
@@ -162,7 +163,9 @@ def project_document(
 
 def _row(result, report):
     """The row of a drive in project.json."""
-    state, control, check = result.state, report["control"], report["check"]
+    state = result.state
+    control = report["control"]
+    check = report["check"]
     tested = {"check": (check, "after"), "left_out": (control, "leave_one_out")}
     by = next((by for by, (points, after) in tested.items() if _rmse(points, after)), None)
     points, after = tested[by] if by else (control, "after")
@@ -249,8 +252,13 @@ def _reason(row, report):
     facts = [fact for fact in report["statements"] if fact["rating"] == row["rating"]]
     if not facts:
         return row["meaning"]
-    first, texts = facts[0], [item["text"] for item in facts[0]["items"]]
-    reason = "" if first["what"] == "Warnings" else first["sentence"]  # that counts them alone
+    first = facts[0]
+    texts = [item["text"] for item in facts[0]["items"]]
+    # that counts them alone
+    if first["what"] == "Warnings":
+        reason = ""
+    else:
+        reason = first["sentence"]
     if first["what"] == "Result" and texts:
         _, *worse = texts  # after the figures
         reason = worse[0] if worse else facts[1]["sentence"]  # check points: none, or some missing

@@ -20,7 +20,9 @@ class DriveEstimate(Estimate):
         return ()
 
     def _guard_warnings(self):
-        return super()._guard_warnings() if len(self.equations.names) else ()
+        if len(self.equations.names):
+            return super()._guard_warnings()
+        return ()
 
 
 @dataclass(frozen=True, repr=False)
@@ -51,7 +53,8 @@ def drive_estimate(joint: JointDrives, estimate: Estimate, number: int, note: st
     note : str
         A sentence on its ties with others.
     """
-    trajectory, shift = joint.drives[number].survey.trajectory, joint.shifts[number]
+    trajectory = joint.drives[number].survey.trajectory
+    shift = joint.shifts[number]
     owner = np.repeat(np.arange(len(joint.drives)), [len(d.control) for d in joint.drives])
     rows = owner == number
     correction, chainage = _cut(estimate.correction, trajectory, shift)
@@ -64,19 +67,27 @@ def drive_estimate(joint: JointDrives, estimate: Estimate, number: int, note: st
     equations = _equations(estimate.equations, rows[estimate.used], trajectory, shift)
     guards = guards_of(trajectory.scanned_passes, equations.observed, estimate.guards)
     return DriveEstimate(
-        correction=correction, equations=equations, screening=screening, used=estimate.used[rows],
-        left_out=estimate.left_out[rows], log_likelihood=estimate.log_likelihood,
-        sigma0=estimate.sigma0, guards=guards,
-        support=_held(estimate.support, trajectory, shift, chainage), notes=estimate.notes,
-        ties=_ties(joint, estimate.ties, number), untied=note or estimate.untied,
-    )  # fmt: skip
+        correction=correction,
+        equations=equations,
+        screening=screening,
+        used=estimate.used[rows],
+        left_out=estimate.left_out[rows],
+        log_likelihood=estimate.log_likelihood,
+        sigma0=estimate.sigma0,
+        guards=guards,
+        support=_held(estimate.support, trajectory, shift, chainage),
+        notes=estimate.notes,
+        ties=_ties(joint, estimate.ties, number),
+        untied=note or estimate.untied,
+    )
 
 
 def _cut(correction, trajectory, shift):
     """The Correction of a drive's epochs, and the way before these (m)."""
     whole = correction.corrected
     first, last = np.searchsorted(whole.gps_time, trajectory.gps_time[[0, -1]] + shift)
-    rows, way = slice(first, last + 1), np.diff(whole.position[: first + 1], axis=0)
+    rows = slice(first, last + 1)
+    way = np.diff(whole.position[: first + 1], axis=0)
     chainage = float(np.linalg.norm(way, axis=1).sum())
     times = {"gps_time": trajectory.gps_time, "session": trajectory.session}
     corrected = replace(whole.select(rows), **times)

@@ -22,7 +22,9 @@ LARGE_ARRAY = 1 << 20  # B; glibc keeps freed ones of up to 32 MB: 0.15 GB after
 class Loop:
     """No process but this, one call after the other: what loses it ends the run."""
 
-    width, lost, losses = 1, 0, ()
+    width = 1
+    lost = 0
+    losses = ()
 
     def submit(self, function: Callable, *arguments: object) -> Future:
         """A Future that is done."""
@@ -43,7 +45,8 @@ class Processes:
     losses = (BrokenProcessPool,)
 
     def __init__(self, width: int) -> None:
-        self.width, self.lost = width, 0
+        self.width = width
+        self.lost = 0
         self._executor: Executor | None = None
         self._others = {*multiprocessing.active_children()}
 
@@ -127,7 +130,8 @@ class Cluster:
         except ImportError:
             raise ImportError("A cluster needs dask: pip install 'mlscorr[cluster]'") from None
         patience = config.get("distributed.comm.timeouts.connect")  # with its unit, as "30s"
-        self._tell, self._waiting = tell, f"waiting at {scheduler}, {patience} at most."
+        self._tell = tell
+        self._waiting = f"waiting at {scheduler}, {patience} at most."
         try:
             self._client = Client(scheduler)
         except (OSError, ValueError) as error:
@@ -146,7 +150,9 @@ class Cluster:
                 f"some, as dask worker {scheduler} --nworkers 8 --nthreads 1, let its cluster "
                 f"scale, or wait for longer: {LONGER} in the environment."
             ) from None
-        self.lost, self.losses = 0, (KilledWorker,)  # tried in vain again and again
+        # tried in vain again and again
+        self.lost = 0
+        self.losses = (KilledWorker,)
         self._calls: WeakSet[Future] = WeakSet()
         self._executor = self._client.get_executor(pure=False)
         self._connection = self._client.scheduler_comm
@@ -231,7 +237,10 @@ def engine(
     if scheduler is None and workers == 1:
         yield Loop()
         return
-    chosen = Processes(workers) if scheduler is None else Cluster(scheduler, tell)
+    if scheduler is None:
+        chosen = Processes(workers)
+    else:
+        chosen = Cluster(scheduler, tell)
     before = {name: value for name, value in os.environ.items() if name in THREADS}
     os.environ.update(dict.fromkeys(THREADS, "1"))  # of the processes that are started from here
     try:

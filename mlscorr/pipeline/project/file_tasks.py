@@ -78,7 +78,8 @@ def read_tile(path: Path, owners: Sequence[TileOwner]) -> dict[str, Tile]:
         As of cloud_file, and for points of no drive.
     """
     layout = read_layout(path)
-    box, counts = cloud_box(layout), None
+    box = cloud_box(layout)
+    counts = None
     if owners[0].ids is not None:
         counts = count_sources(layout)
         every = [number for owner in owners for number in owner.ids or ()]
@@ -90,7 +91,10 @@ def read_tile(path: Path, owners: Sequence[TileOwner]) -> dict[str, Tile]:
             )
     tiles = {}
     for owner in owners:
-        points = layout.points if counts is None else int(counts[list(owner.ids or ())].sum())
+        if counts is None:
+            points = layout.points
+        else:
+            points = int(counts[list(owner.ids or ())].sum())
         if points:
             given = owner.ends, owner.system, owner.crs, owner.ids, owner.noise_classes
             file, note = cloud_file(path, *given)
@@ -129,9 +133,14 @@ def _kept(folder: Path, kind: str, key: str) -> Any:
 
 
 def find(
-    file: CloudFile, folder: Path, drive: str, identity: FileIdentity, surveyed: ControlPoints,
-    origin: np.ndarray, with_ties: bool,
-) -> FileFinding:  # fmt: skip
+    file: CloudFile,
+    folder: Path,
+    drive: str,
+    identity: FileIdentity,
+    surveyed: ControlPoints,
+    origin: np.ndarray,
+    with_ties: bool,
+) -> FileFinding:
     """What a cloud file holds.
 
     Parameters
@@ -166,9 +175,13 @@ def _check_same(path, identity):
 
 
 def write(
-    folder: Path, motions: tuple[str, ...], path: Path, identity: FileIdentity, target: Path,
+    folder: Path,
+    motions: tuple[str, ...],
+    path: Path,
+    identity: FileIdentity,
+    target: Path,
     with_sigma: bool,
-) -> Written:  # fmt: skip
+) -> Written:
     """Write the corrected copy of a file, whole or not at all.
 
     Parameters

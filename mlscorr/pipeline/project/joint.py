@@ -112,7 +112,8 @@ class JointDrives:
         names = list(self.survey.by_scanner)
         parts = []
         for drive, shift, base in zip(self.drives, self.shifts, self.bases, strict=True):
-            part, own = drive.features, list(drive.survey.by_scanner)
+            part = drive.features
+            own = list(drive.survey.by_scanner)
             number = np.array([names.index(n) if n in names else 0 for n in own])
             parts.append(
                 replace(
@@ -137,7 +138,8 @@ def join_drives(drives: Sequence[FoundDrive]) -> JointDrives:
     shifts = distinct_times([drive.survey.trajectory for drive in drives])
     starts = np.array([drive.survey.trajectory.gps_time[0] for drive in drives])
     order = np.argsort(starts + shifts)
-    drives, shifts = [drives[i] for i in order], shifts[order]
+    drives = [drives[i] for i in order]
+    shifts = shifts[order]
     surveys = [drive.survey for drive in drives]
     names = [survey.name for survey in surveys]
     parts = [
@@ -149,10 +151,15 @@ def join_drives(drives: Sequence[FoundDrive]) -> JointDrives:
     scanners = _scanners(surveys)
     mountings = {digest(survey.mounting) for survey in surveys}
     joint = replace(
-        surveys[0], name=", ".join(names), clouds=(), trajectory=trajectory,
-        mounting=surveys[0].mounting if len(mountings) == 1 else None, notes=tuple(notes),
-        inputs=(), scanners=scanners,
-    )  # fmt: skip
+        surveys[0],
+        name=", ".join(names),
+        clouds=(),
+        trajectory=trajectory,
+        mounting=surveys[0].mounting if len(mountings) == 1 else None,
+        notes=tuple(notes),
+        inputs=(),
+        scanners=scanners,
+    )
     return JointDrives(tuple(drives), shifts, joint)
 
 
@@ -174,7 +181,8 @@ def distinct_times(trajectories: Sequence[Trajectory]) -> np.ndarray:
     trajectories : sequence of Trajectory
     """
     spans = np.array([trajectory.gps_time[[0, -1]] for trajectory in trajectories])
-    shifts, placed = np.zeros(len(spans)), np.empty((0, 2))
+    shifts = np.zeros(len(spans))
+    placed = np.empty((0, 2))
     for number in np.argsort(spans[:, 0], kind="stable"):
         span = spans[number] + [-TIES.pause, TIES.pause]
         while ((span[0] < placed[:, 1]) & (span[1] > placed[:, 0])).any():

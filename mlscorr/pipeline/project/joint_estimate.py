@@ -52,7 +52,8 @@ def estimate_group(
     features = joint.features(origin) if with_ties else None
     least = order if len(group) == 1 else min(order, 0)
     estimate = estimate_together(joint.survey, joint.control(), features, least)
-    parts, results = _tied(joint, estimate), []
+    parts = _tied(joint, estimate)
+    results = []
     owner = np.repeat([d.survey.name for d in joint.drives], [len(d.control) for d in joint.drives])
     controlled = set(owner[estimate.used].tolist())
     for part in parts:
@@ -82,7 +83,8 @@ def near_drives(drives: Sequence[FoundDrive]) -> list[list[FoundDrive]]:
     drives : sequence of FoundDrive
     """
     radius = max(drive.survey.search_radius for drive in drives)
-    rows, cells = [np.empty(0, int)], [np.empty((0, 2), int)]
+    rows = [np.empty(0, int)]
+    cells = [np.empty((0, 2), int)]
     for number, drive in enumerate(drives):
         own = np.unique(np.floor(drive.features.centre[:, :2] / radius).astype(int), axis=0)
         wide = np.concatenate([own + np.array([i, j]) for i in (0, 1) for j in (0, 1)])

@@ -97,11 +97,13 @@ def _estimate(drive, parts, home, main):
     correction = _averaged(survey.trajectory, parts)
     used, left_out = _control(drive, parts, home)
     of_parts = [part.estimate.screening for part in parts]
-    at, names = _epochs(drive, drive.control.gps_time), np.array(drive.control.name, dtype=object)
+    at = _epochs(drive, drive.control.gps_time)
+    names = np.array(drive.control.name, dtype=object)
     at_home = list(zip(of_parts, [set(names[is_home[at]]) for is_home in home], strict=True))
     outliers = {out.name: out for part, own in at_home for out in part.outliers if out.name in own}
     tests = {test.name: test for part, own in at_home for test in part.tests if test.name in own}
-    order, filled = main.estimate.order, filled_sigmas(survey.trajectory)[0]
+    order = main.estimate.order
+    filled = filled_sigmas(survey.trajectory)[0]
     equations = position_equations(filled, drive.control[used], survey.pos, order, position_prior)
     return replace(
         main.estimate,
@@ -126,10 +128,12 @@ def _estimate(drive, parts, home, main):
 
 def _averaged(trajectory: Trajectory, parts: Sequence[AreaResult]) -> Correction:
     """The Correction by those of all areas; its sigmas are averaged, as if they erred alike."""
-    n, total = len(trajectory), np.zeros(len(trajectory))
+    n = len(trajectory)
+    total = np.zeros(len(trajectory))
     mean = np.zeros((n, 12))  # change, turn, sigmas of position and attitude
     for part in parts:
-        old, new = part.estimate.correction.recorded, part.estimate.correction.corrected
+        old = part.estimate.correction.recorded
+        new = part.estimate.correction.corrected
         weight = part.area.weight(old.position)
         turn = (new.attitude * old.attitude.inv()).as_rotvec()
         columns = new.position - old.position, turn, new.position_sigma, new.attitude_sigma
@@ -155,17 +159,20 @@ def _epochs(drive, gps_time):
 def _control(drive, parts, home):
     """Which observations of control points took part (m,), and what they leave (m, 3) left out."""
     at = _epochs(drive, drive.control.gps_time)
-    used, left_out = np.zeros(len(at), bool), np.full((len(at), 3), np.nan)
+    used = np.zeros(len(at), bool)
+    left_out = np.full((len(at), 3), np.nan)
     for part, is_home in zip(parts, home, strict=True):
         own = is_home[at[part.control]]
         rows = np.flatnonzero(part.control)[own]
-        used[rows], left_out[rows] = part.estimate.used[own], part.estimate.left_out[own]
+        used[rows] = part.estimate.used[own]
+        left_out[rows] = part.estimate.left_out[own]
     return used, left_out
 
 
 def _ties(parts, correction):
     """TieResiduals of a drive's own passes; None without any."""
-    ties, used = [], []
+    ties = []
+    used = []
     for part in parts:
         if (residuals := part.estimate.ties) is not None:
             own = part.area.contains(residuals.ties.place[:, 0])
@@ -178,7 +185,8 @@ def _ties(parts, correction):
 
 def _support(parts, home, corrected):
     """The Support of a drive."""
-    time, codes = corrected.gps_time, np.full(len(corrected), HELD)
+    time = corrected.gps_time
+    codes = np.full(len(corrected), HELD)
     for part, is_home in zip(parts, home, strict=True):
         for stretch in part.estimate.support.weak:
             inside = is_home & (time >= stretch.start) & (time <= stretch.end)

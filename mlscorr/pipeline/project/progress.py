@@ -87,7 +87,9 @@ class Progress:
         ----------
         outcome : Outcome
         """
-        counts, task, is_new = self.counts, outcome.task, outcome.seconds > 0
+        counts = self.counts
+        task = outcome.task
+        is_new = outcome.seconds > 0
         counts["done"] += 1
         counts["points"] += max(task.points, 1)
         counts["worked"] += max(task.points, 1) * is_new
@@ -104,10 +106,14 @@ class Progress:
 
     def _sentence(self, kind):
         """How far a stage has come, its rate, and the time that is left."""
-        counts, tasks = self.counts, self.stages[kind]
+        counts = self.counts
+        tasks = self.stages[kind]
         total = sum(max(task["points"], 1) for task in tasks)
         rate = counts["worked"] / (monotonic() - counts["start"])  # what was there took no time
-        left = f"{duration((total - counts['points']) / rate)} left of this stage, " if rate else ""
+        if rate:
+            left = f"{duration((total - counts['points']) / rate)} left of this stage, "
+        else:
+            left = ""
         drives = {task["drive"] for task in tasks} - {""}
         whole = str(len(tasks))
         if drives:
@@ -147,4 +153,6 @@ def duration(seconds: float) -> str:
     if seconds < 59.5:
         return f"{seconds:.0f} s"
     minutes = round(seconds / 60)
-    return f"{minutes // 60} h {minutes % 60} min" if minutes >= 60 else f"{minutes} min"
+    if minutes >= 60:
+        return f"{minutes // 60} h {minutes % 60} min"
+    return f"{minutes} min"

@@ -106,7 +106,8 @@ class Run:
         end at about the same time.
         """
         waiting = deque(sorted(tasks, key=lambda task: -task.points - task.near_points))
-        suspects, running = deque(), {}
+        suspects = deque()
+        running = {}
         losses: Counter[tuple[str, bool]] = Counter()
         while waiting or suspects or running:
             is_single = bool(suspects)  # what loses workers is tried by itself: it may be to blame

@@ -28,7 +28,8 @@ def tile_tasks(project: ProjectParts) -> list[Task]:
     """
     tiles: dict[Path, tuple[Path, list[file_tasks.TileOwner]]] = {}
     for drive in project.drives:
-        parts, whole = drive.parts, drive.trajectory
+        parts = drive.parts
+        whole = drive.trajectory
         ends = whole.select([0, -1])
         given = parts.system, parts.settings.crs, drive.ids, parts.noise_classes
         owner = file_tasks.TileOwner(drive.name, ends, *given)
@@ -40,7 +41,8 @@ def tile_tasks(project: ProjectParts) -> list[Task]:
             identity = FileIdentity.of(path)
         except OSError:  # its task says why
             identity = None
-        key, folder = digest(VERSION, identity, path, own), _folder(own)
+        key = digest(VERSION, identity, path, own)
+        folder = _folder(own)
         name = task_name(folder, path)
         tasks.append(Task("tiles", key, folder, name, 0, file_tasks.read_tile, (path, tuple(own))))
     return tasks
@@ -66,7 +68,9 @@ def refusals(project: ProjectParts, read: Sequence[tuple]) -> list[Task]:
 
 def _folder(drives):
     """Where the corrected copy of a file of some drives lies."""
-    return drives[0].name if len(drives) == 1 else SHARED_TILES
+    if len(drives) == 1:
+        return drives[0].name
+    return SHARED_TILES
 
 
 def task_name(drive: str, file: Path | CloudFile) -> str:
@@ -203,7 +207,8 @@ def finding_tasks(
     store.put("drives", kept, bare_survey(survey))
     tasks = []
     for file in survey.clouds:
-        own, identity = survey.of(file), drive.identities[file.path]
+        own = survey.of(file)
+        identity = drive.identities[file.path]
         box = drive.boxes[file.path]
         near = near_boxes(survey, survey.surveyed, [box])
         near = near[np.argsort(np.array(near.name, dtype=str), kind="stable")]
@@ -227,9 +232,12 @@ def _share_near(survey, points, box):
 
 
 def cloud_tasks(
-    store: TaskStore, drives: Sequence[PlannedDrive], motions: Mapping[str, str], out: Path,
+    store: TaskStore,
+    drives: Sequence[PlannedDrive],
+    motions: Mapping[str, str],
+    out: Path,
     with_sigma: bool,
-) -> list[tuple[Task, list[str]]]:  # fmt: skip
+) -> list[tuple[Task, list[str]]]:
     """Tasks that write corrected clouds, each with the names of the drives whose points it holds.
 
     Parameters
@@ -248,8 +256,10 @@ def cloud_tasks(
             owners.setdefault(path, []).append(drive)
     tasks = []
     for path, own in owners.items():
-        surveys, identity = [drive.survey for drive in own], own[0].identities[path]
-        folder, used = _folder(surveys), tuple(motions[survey.name] for survey in surveys)
+        surveys = [drive.survey for drive in own]
+        identity = own[0].identities[path]
+        folder = _folder(surveys)
+        used = tuple(motions[survey.name] for survey in surveys)
         files = [[file for file in survey.clouds if file.path == path] for survey in surveys]
         parts = [
             [
@@ -296,5 +306,6 @@ def report_task(inputs: file_tasks.ReportInput, drive: PlannedDrive) -> Task:
     drive : PlannedDrive
     """
     key = digest(VERSION, inputs.corrected, inputs.written, inputs.page, inputs.trajectories)
-    points, name = drive.survey.points if inputs.page else 0, drive.survey.name
+    points = drive.survey.points if inputs.page else 0
+    name = drive.survey.name
     return Task("reports", key, name, name, points, file_tasks.report, (inputs,))

@@ -95,6 +95,9 @@ def _stages(tasks):
         points = sum(task["points"] for task in own)
         row = {"stage": kind, "title": title, "done": len(done), "tasks": len(own)}
         row |= {"points_done": sum(task["points"] for task in done), "points": points}
-        share = row["points_done"] / points if points else len(done) / max(len(own), 1)
+        if points:
+            share = row["points_done"] / points
+        else:
+            share = len(done) / max(len(own), 1)
         rows += [{**row, "share": share}] if own else []
     return rows

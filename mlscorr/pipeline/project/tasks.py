@@ -80,7 +80,10 @@ def carry_out(task: Task, folder: Path) -> tuple[str, tuple[str, ...], float]:
     fault, warnings, seconds
         As of the Outcome. Its task stays with who gave it: no worker sends trajectories back.
     """
-    start, store, fault, texts = time.perf_counter(), TaskStore(folder), "", []
+    start = time.perf_counter()
+    store = TaskStore(folder)
+    fault = ""
+    texts = []
     recorded = warnings.catch_warnings(record=True, action="always")
     with recorded as caught, threadpool_limits(limits=1):
         try:

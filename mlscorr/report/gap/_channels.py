@@ -21,8 +21,11 @@ WORDS = {  # of channels: what they are, their figure, how it is called on an ax
     "edge_width": ("Edge width", "real less simulated, mrad", "mrad"),
 }
 SPLITS = {
-    "range": "range (m)", "incidence": "incidence (°)", "reflectance": "brightness", "all": "",
-}  # fmt: skip
+    "range": "range (m)",
+    "incidence": "incidence (°)",
+    "reflectance": "brightness",
+    "all": "",
+}
 FIGURES = {
     "energy_distance": "Energy distance",
     "mmd": "MMD, squared",
@@ -101,7 +104,8 @@ def channel_rows(document: dict) -> list[ChannelRow]:
             bins = zip(bin_names(table), table["differs"], *columns, strict=True)
             for name, differs, *values in bins:
                 texts = [plain(value) for value in values]
-                title, by = WORDS[each["channel"]][0], SPLITS[table["by"]]
+                title = WORDS[each["channel"]][0]
+                by = SPLITS[table["by"]]
                 rows.append(ChannelRow(title, by, name, texts, differs))
     return rows
 
@@ -117,12 +121,16 @@ def distance_rows(document: dict) -> list[DistanceRow]:
     return [
         DistanceRow(
             SAMPLES.get(each["channel"]) or f"{channel_style(each['channel']).words}: innovations",
-            FIGURES[each["figure"]], plain(each["before"]), plain(each["after"]),
-            f"{plain(each['floor'])} (95 % below {plain(each['floor_high'])})", each["unit"],
-            each["drawn"], known(each["before"]) and each["before"] > each["floor_high"],
+            FIGURES[each["figure"]],
+            plain(each["before"]),
+            plain(each["after"]),
+            f"{plain(each['floor'])} (95 % below {plain(each['floor_high'])})",
+            each["unit"],
+            each["drawn"],
+            known(each["before"]) and each["before"] > each["floor_high"],
         )
         for each in document.get("distances", ())
-    ]  # fmt: skip
+    ]
 
 
 @styled
@@ -153,16 +161,28 @@ def channels_figure(document: dict) -> Figure:
 def _draw(panel, each, table):
     has_edges = "edges" in table
     count = len(table["value"])
-    edges = numbers(table["edges"]) if has_edges else np.arange(count + 1.0) - 0.5
-    value, sigma = numbers(table["value"]), numbers(table["sigma"])
-    middle, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)
+    if has_edges:
+        edges = numbers(table["edges"])
+    else:
+        edges = np.arange(count + 1.0) - 0.5
+    value = numbers(table["value"])
+    sigma = numbers(table["sigma"])
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    half = 0.5 * np.diff(edges)
     panel.axhline(1.0 if each["figure"] == "ratio" else 0.0, color=GREY, linewidth=0.9, zorder=1)
     differs = np.array(table["differs"], bool)
     for which, color in ((~differs, BLUE), (differs, VERMILLION)):
         panel.errorbar(
-            middle[which], value[which], 1.96 * sigma[which], half[which], fmt="o", color=color,
-            markersize=3.5, linewidth=1.2, zorder=3,
-        )  # fmt: skip
+            middle[which],
+            value[which],
+            1.96 * sigma[which],
+            half[which],
+            fmt="o",
+            color=color,
+            markersize=3.5,
+            linewidth=1.2,
+            zorder=3,
+        )
     title, _, unit = WORDS[each["channel"]]
     panel.set_title(f"{title} by {SPLITS[table['by']]}", fontsize=8)
     panel.set_ylabel(unit)

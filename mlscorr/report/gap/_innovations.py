@@ -11,7 +11,8 @@ from mlscorr.report import style
 from mlscorr.report.gap._settings import SETTINGS
 from mlscorr.report.gap.numbers import numbers
 
-WINDOW, STRIPE = "#f3d9e6", "#efefef"
+WINDOW = "#f3d9e6"
+STRIPE = "#efefef"
 
 
 class ChannelStyle(NamedTuple):
@@ -60,7 +61,10 @@ def passes_of(gps_time: np.ndarray) -> np.ndarray:
     if len(time) == 0:
         return np.empty((0, 2))
     steps = np.diff(time)
-    usual = np.median(steps[steps > 0]) if (steps > 0).any() else 0.0
+    if (steps > 0).any():
+        usual = np.median(steps[steps > 0])
+    else:
+        usual = 0.0
     cut = np.flatnonzero(steps > max(SETTINGS.pause, SETTINGS.pause_steps * usual)) + 1
     return np.array([[part[0], part[-1]] for part in np.split(time, cut)])
 
@@ -74,8 +78,10 @@ def innovations_figure(document: dict) -> Figure:
     document : dict
         The content of gap.json.
     """
-    rows, windows = document["innovations"], document["windows"]
-    time, channel = numbers(rows["gps_time"]), np.array(rows["channel"], dtype=str)
+    rows = document["innovations"]
+    windows = document["windows"]
+    time = numbers(rows["gps_time"])
+    channel = np.array(rows["channel"], dtype=str)
     values = {key: numbers(rows[key]) for key in ("before", "after")}
     styles = {name: channel_style(name) for name in dict.fromkeys(rows["channel"])}
     passes = passes_of(time)
@@ -110,22 +116,31 @@ def _draw(panel, time, values, channel, styles, limit):
     for line in (-stripe, stripe):
         panel.axhline(line, color=style.GREY, linewidth=0.7, linestyle="--", zorder=1)
     for name, symbol in styles.items():
-        rows, is_target = channel == name, name == "target"
+        rows = channel == name
+        is_target = name == "target"
         panel.plot(
-            time[rows], np.clip(values[rows], -limit, limit), symbol.mark, color=symbol.color,
-            markersize=4.0 if is_target else 2.2, markeredgewidth=0, alpha=0.75, rasterized=True,
+            time[rows],
+            np.clip(values[rows], -limit, limit),
+            symbol.mark,
+            color=symbol.color,
+            markersize=4.0 if is_target else 2.2,
+            markeredgewidth=0,
+            alpha=0.75,
+            rasterized=True,
             zorder=4 if is_target else 3,
-        )  # fmt: skip
+        )
     panel.set_ylim(-1.05 * limit, 1.05 * limit)
     panel.margins(x=0.02)
 
 
 def _outside(values):
     """RMS of the innovations, and how many lie outside of the stripe, in words."""
-    values, stripe = values[np.isfinite(values)], SETTINGS.stripe_sigmas
+    values = values[np.isfinite(values)]
+    stripe = SETTINGS.stripe_sigmas
     if len(values) == 0:
         return "nothing to show"
-    share, usual = 100 * np.mean(np.abs(values) > stripe), 100 * erfc(stripe / sqrt(2))
+    share = 100 * np.mean(np.abs(values) > stripe)
+    usual = 100 * erfc(stripe / sqrt(2))
     rms = np.sqrt(np.mean(values**2))
     return f"RMS {rms:.2f} (expected 1), {share:.1f} % beyond ±{stripe:.0f} sigma ({usual:.1f} %)"
 

@@ -18,10 +18,14 @@ def sentences_of(
     where : function
         Of the class of an effect: where or when it acts, in words.
     """
-    kinds, sentences = effects_by_name(), []
+    kinds = effects_by_name()
+    sentences = []
     for name, estimates in parameters_of(label, parameters).items():
         kind = kinds.get(name)
-        sentence = kind.describe(estimates, where(kind)) if kind else meaning(name)
+        if kind:
+            sentence = kind.describe(estimates, where(kind))
+        else:
+            sentence = meaning(name)
         sentences.append(sentence or f"{title(name)}.")
     return sentences
 
@@ -38,9 +42,12 @@ def place_of(kind: type[Effect], target: str | None, windows: list[dict]) -> str
         Of gap.json, with start and end. Units: s.
     """
     if kind.is_on_target():
-        return f"target {target}" if target else "one target"
+        if target:
+            return f"target {target}"
+        return "one target"
     for window in windows:
-        start, end = window["start"], window["end"]
+        start = window["start"]
+        end = window["end"]
         if window["effect"] == kind.name and known(start) and known(end):
             if end - start < 1.0:  # times are written in whole seconds
                 return f" at gps_time {start:.1f} s"
@@ -62,7 +69,8 @@ def parameters_of(label: str, parameters: list[dict]) -> dict[str, dict[str, Siz
     parameters : list of dict
         Each with name, estimate, sigma and unit.
     """
-    kinds, owned = effects_by_name(), {name: {} for name in label.split("+")}
+    kinds = effects_by_name()
+    owned = {name: {} for name in label.split("+")}
     expected = {n: kinds[n].parameter_names() if n in kinds else ("magnitude",) for n in owned}
     for row in parameters:
         effect, _, name = row["name"].partition(" ")

@@ -25,17 +25,25 @@ def ladder_figure(document: dict) -> Figure:
     document : dict
         The content of gap.json.
     """
-    rungs, names = ladder(document), []
+    rungs = ladder(document)
+    names = []
     figure = new_figure(1.0 + 0.21 * len(rungs))
     panel = figure.add_subplot()
     for place, rung in enumerate(rungs):
         value = rung["log_evidence_ratio"] / np.log(10.0)
-        kind, is_held = family(rung["label"]), rung["label"] in document["verdict"]["set"]
+        kind = family(rung["label"])
+        is_held = rung["label"] in document["verdict"]["set"]
         color, hatch, _ = FAMILIES[kind]
         panel.barh(
-            place, value, height=0.72, color=color, hatch=hatch, zorder=2,
-            edgecolor="black" if is_held else "white", linewidth=1.4 if is_held else 0.4,
-        )  # fmt: skip
+            place,
+            value,
+            height=0.72,
+            color=color,
+            hatch=hatch,
+            zorder=2,
+            edgecolor="black" if is_held else "white",
+            linewidth=1.4 if is_held else 0.4,
+        )
         panel.plot(value, place, "|", color="black", markersize=8, zorder=3)
         name = label(title(rung["label"]), SETTINGS.ladder_letters)
         names.append("● " * is_held + name + " [noise]" * (kind == "noise"))
@@ -69,9 +77,14 @@ def _write_probability(panel, place, value, probability):
     if not known(probability) or probability < 0.005:  # 0 %
         return
     panel.annotate(
-        f"{100 * probability:.0f} %", (max(value, 0.0), place), xytext=(4, 0), fontsize=7.5,
-        textcoords="offset points", verticalalignment="center", zorder=4,
-    )  # fmt: skip
+        f"{100 * probability:.0f} %",
+        (max(value, 0.0), place),
+        xytext=(4, 0),
+        fontsize=7.5,
+        textcoords="offset points",
+        verticalalignment="center",
+        zorder=4,
+    )
 
 
 def _legend(rungs):

@@ -9,12 +9,18 @@ from mlscorr.report.gap._labels import place_of, sentences_of
 from mlscorr.report.gap.numbers import column, plain, signed
 
 COVARIATES = {
-    "time": "Time since the start", "location": "Way along the road",
-    "range": "Distance from the scanner", "incidence": "Angle of incidence",
-    "scan_angle": "Scan angle", "intensity": "Intensity, log10", "speed": "Speed",
-    "turn_rate": "Turn rate, to the right", "pass": "Pass", "axis": "Axis",
+    "time": "Time since the start",
+    "location": "Way along the road",
+    "range": "Distance from the scanner",
+    "incidence": "Angle of incidence",
+    "scan_angle": "Scan angle",
+    "intensity": "Intensity, log10",
+    "speed": "Speed",
+    "turn_rate": "Turn rate, to the right",
+    "pass": "Pass",
+    "axis": "Axis",
     "channel": "What was compared",
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True)
@@ -88,7 +94,8 @@ def round_rows(rounds: list[dict]) -> list[RoundRow]:
     """
     rows = []
     for each in rounds:
-        label, gap = each["label"], [signed(each[k], each["unit"]) for k in ("before", "after")]
+        label = each["label"]
+        gap = [signed(each[k], each["unit"]) for k in ("before", "after")]
         place = partial(place_of, target=each.get("target"), windows=each["windows"])
         sizes = " ".join(sentences_of(label, each["parameters"], place))
         gone = DASH if label == "none" else percent(each["shrink"])
@@ -120,7 +127,10 @@ def split_title(split: dict) -> str:
         Of where[] in gap.json.
     """
     logarithm = split["by"] == "intensity"  # which has no unit that would tell a reader more
-    unit = f" ({split['unit']})" if split["unit"] and not logarithm else ""
+    if split["unit"] and not logarithm:
+        unit = f" ({split['unit']})"
+    else:
+        unit = ""
     return COVARIATES.get(split["by"], split["name"] or split["by"]) + unit
 
 
@@ -195,8 +205,12 @@ def detectable_rows(detectable: dict[str, list[dict]]) -> list[DetectableRow]:
     rows = []
     for effect, parts in detectable.items():
         for part in parts:
-            small, usual = part["detectable"], part.get("typical")
-            ratio = small / usual if known(small) and known(usual) and usual > 0 else None
+            small = part["detectable"]
+            usual = part.get("typical")
+            if known(small) and known(usual) and usual > 0:
+                ratio = small / usual
+            else:
+                ratio = None
             values, unit = column([small, usual], part["unit"])
             name = part["name"].removeprefix(effect).strip() or "magnitude"
             texts = (title(effect), meaning(effect), name, unit, values[0], values[1])
@@ -211,8 +225,12 @@ def _visibility(small, ratio):
     ('yes', 'only if 2.5 times the usual')
     """
     if ratio is None:
-        return DASH if known(small) else "no"
-    return "yes" if ratio <= 1 else f"only if {ratio:.{int(ratio < 10)}f} times the usual"
+        if known(small):
+            return DASH
+        return "no"
+    if ratio <= 1:
+        return "yes"
+    return f"only if {ratio:.{int(ratio < 10)}f} times the usual"
 
 
 def worst_rows(rows: list[DetectableRow]) -> list[DetectableRow]:

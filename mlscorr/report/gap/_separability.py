@@ -22,9 +22,11 @@ def classes_in_order(separability: dict) -> tuple[list[int], list[tuple[int, int
     separability : dict
         classes and correlation of gap.json or plan.json.
     """
-    names, square = separability["correlation"]["names"], np.nan_to_num(_squares(separability))
+    names = separability["correlation"]["names"]
+    square = np.nan_to_num(_squares(separability))
     effect = np.array([name.partition(" ")[0] for name in names])
-    order, boxes = [], []
+    order = []
+    boxes = []
     for members in separability["classes"]:
         inside = np.isin(effect, members)
         pairs = (square > INFERENCE.same) & inside[:, None] & inside
@@ -80,10 +82,14 @@ def _write_cells(panel, square, letters):
     large = np.nan_to_num(square) >= SETTINGS.written_correlation
     for i, j in zip(*np.nonzero(large & ~np.eye(len(square), dtype=bool)), strict=True):
         panel.text(
-            j + 0.5, i + 0.5, f"{square[i, j]:.2f}".lstrip("0"), fontsize=letters,
-            horizontalalignment="center", verticalalignment="center",
+            j + 0.5,
+            i + 0.5,
+            f"{square[i, j]:.2f}".lstrip("0"),
+            fontsize=letters,
+            horizontalalignment="center",
+            verticalalignment="center",
             color="white" if square[i, j] > 0.6 else "black",
-        )  # fmt: skip
+        )
 
 
 @styled
@@ -99,7 +105,8 @@ def detectable_figure(rows: list[DetectableRow]) -> Figure:
     ratio = np.array([row.ratio for row in rows])
     figure = new_figure(1.0 + 0.2 * len(rows))
     panel = figure.add_subplot()
-    low, high = min(0.5, ratio.min() / 1.6), max(2.0, ratio.max() * 1.6)
+    low = min(0.5, ratio.min() / 1.6)
+    high = max(2.0, ratio.max() * 1.6)
     panel.axvspan(low, 1.0, color="#e6f1f8", zorder=0)
     marks = (("o", BLUE, "Shows at its usual size"), ("X", VERMILLION, "Must be larger to show"))
     for place, value in enumerate(ratio):

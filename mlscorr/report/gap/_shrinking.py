@@ -61,15 +61,18 @@ def shrinking(document: dict) -> Fact:
     document : dict
         The content of gap.json.
     """
-    closure, gap = document["closure"], document["gap"]
+    closure = document["closure"]
+    gap = document["gap"]
     if not is_closed(document):
-        before, more = signed(gap["before"], gap["unit"]), f"When nothing is wrong: {span(gap)}."
+        before = signed(gap["before"], gap["unit"])
+        more = f"When nothing is wrong: {span(gap)}."
         return Fact("The gap between survey and simulation", before, more)
     pair = " → ".join(signed(closure[when], closure["unit"]) for when in ("before", "after"))
     if document["verdict"]["label"] == "unknown":
         nearest = f"With the nearest known effect, {lowered(title(closure['effect']))},"
         return Fact(f"{nearest} in the simulator", pair, shrunk(closure))
-    more, left = "", (closure["after"], closure["null_band"], closure.get("kind"))
+    more = ""
+    left = (closure["after"], closure["null_band"], closure.get("kind"))
     if not known(closure["shrink"]):
         more = ""
     elif is_within(*left, is_left=True):
@@ -77,7 +80,10 @@ def shrinking(document: dict) -> Fact:
         more = "" if not_closed(closure) else chance
     elif is_within(*left):
         more = " Less is left than chance leaves: too much was put in."
-    data = "held-out data" if closure["is_held_out"] else "the data in which it was found"
+    if closure["is_held_out"]:
+        data = "held-out data"
+    else:
+        data = "the data in which it was found"
     part = f"{GAPS.get(closure.get('kind'), 'Gap')} on {data}"
     return Fact(f"{part}, before → after the simulator has it", pair, shrunk(closure) + more)
 

@@ -48,18 +48,28 @@ def _draw(panel, site, rows, state):
     """Draw one state; returns what the colours are of, if there are any."""
     track = np.array([numbers(place[:2]) for place in site["trajectory"]]).reshape(-1, 2)
     panel.plot(*_parted(track).T, **TRACK, zorder=1, label="Trajectory")
-    colours, limit = None, SETTINGS.map_sigmas
+    colours = None
+    limit = SETTINGS.map_sigmas
     for channel in dict.fromkeys(row["channel"] for row in rows):
         part = [row for row in rows if row["channel"] == channel]
-        place, values = np.array([row["position"][:2] for row in part]), [r[state] for r in part]
-        values, is_target = numbers(values), channel == "target"
+        place = np.array([row["position"][:2] for row in part])
+        values = [r[state] for r in part]
+        values = numbers(values)
+        is_target = channel == "target"
         front = np.argsort(np.abs(np.nan_to_num(values)), kind="stable")
         colours = panel.scatter(
-            *place[front].T, 26 if is_target else 9, values[front], vmin=-limit, vmax=limit,
-            marker=channel_style(channel).mark, cmap="RdYlBu_r", rasterized=True, zorder=3,
+            *place[front].T,
+            26 if is_target else 9,
+            values[front],
+            vmin=-limit,
+            vmax=limit,
+            marker=channel_style(channel).mark,
+            cmap="RdYlBu_r",
+            rasterized=True,
+            zorder=3,
             edgecolors="#444444" if is_target else "#999999",
             linewidths=0.5 if is_target else 0.15,
-        )  # fmt: skip
+        )
     _draw_targets(panel, site["targets"])
     mark_places(panel, [place[:2] for place in site.get("next_control") or []])
     if state is not None:
@@ -70,7 +80,10 @@ def _draw(panel, site, rows, state):
 def _parted(track):
     """The track with NaN where it leaps, so that no line crosses from pass to pass."""
     step = np.hypot(*np.diff(track, axis=0).T)
-    usual = np.median(step[step > 0]) if (step > 0).any() else np.inf
+    if (step > 0).any():
+        usual = np.median(step[step > 0])
+    else:
+        usual = np.inf
     leaps = np.flatnonzero(step > SETTINGS.pause_steps * usual)
     return np.insert(track, leaps + 1, np.nan, axis=0)
 

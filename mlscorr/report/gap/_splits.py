@@ -24,7 +24,8 @@ def where_figure(document: dict) -> Figure:
     document : dict
         The content of gap.json.
     """
-    splits, columns = document["where"], 3
+    splits = document["where"]
+    columns = 3
     rows = -(-len(splits) // columns)
     figure = new_figure(0.6 + 1.75 * rows)
     panels = figure.subplots(rows, columns, sharey=True, squeeze=False)
@@ -50,7 +51,8 @@ def _limits(splits):
     """Lower and upper end of what all panels show, with room for a number above."""
     values = [numbers(split[key]) for split in splits for key in ("before", "after")]
     values = np.concatenate([[0.0], *values, *(_band(split).ravel() for split in splits)])
-    low, high = np.nanmin(values), np.nanmax(values)
+    low = np.nanmin(values)
+    high = np.nanmax(values)
     extent = max(high - low, 1.0)
     return low - 0.06 * extent, high + 0.16 * extent
 
@@ -66,8 +68,12 @@ def _legend(*before_after):
 
 
 def _split(panel, split, is_explained):
-    n, has_edges = len(split["count"]), split.get("edges") is not None
-    edges = numbers(split["edges"]) if has_edges else np.arange(n + 1.0) - 0.5
+    n = len(split["count"])
+    has_edges = split.get("edges") is not None
+    if has_edges:
+        edges = numbers(split["edges"])
+    else:
+        edges = np.arange(n + 1.0) - 0.5
     low, high = _band(split)
     panel.stairs(high, edges, baseline=low, fill=True, color=BAND, zorder=1)
     panel.axhline(0.0, color=GREY, linewidth=0.7, zorder=2)
@@ -91,7 +97,8 @@ def _draw_extent(panel, split, edges):
     if extent and extent["share"] > INFERENCE.plain * extent["rows"]:
         turns = (0.0, 360.0) if split["by"] == "scan_angle" else (0.0,)
         for turn in turns:  # an angle may be told as one of the next turn
-            low, high = max(extent["low"] - turn, edges[0]), min(extent["high"] - turn, edges[-1])
+            low = max(extent["low"] - turn, edges[0])
+            high = min(extent["high"] - turn, edges[-1])
             if low < high:
                 panel.axvspan(low, high, color=WINDOW, zorder=0.5)
 
@@ -110,10 +117,14 @@ def _write_share(panel, split, edges, high, is_explained):
     middle = edges[i : i + 2].mean()
     place = (middle - edges[0]) / (edges[-1] - edges[0])
     panel.annotate(
-        f"{100 * min(share[i], 1.0):.0f} %", (middle, np.nanmax([before[i], high[i], 0.0])),
-        xytext=(0, 3), textcoords="offset points", fontsize=7.5, zorder=5,
+        f"{100 * min(share[i], 1.0):.0f} %",
+        (middle, np.nanmax([before[i], high[i], 0.0])),
+        xytext=(0, 3),
+        textcoords="offset points",
+        fontsize=7.5,
+        zorder=5,
         horizontalalignment="left" if place < 0.1 else "right" if place > 0.9 else "center",
-    )  # fmt: skip
+    )
 
 
 @styled
@@ -150,9 +161,14 @@ def _whole(panel, closure):
     for place, value in enumerate(values):
         if np.isfinite(value):
             panel.annotate(
-                f"{value:.1f}", (place, max(value, 0.0)), xytext=(-14, 3), fontsize=8,
-                textcoords="offset points", horizontalalignment="center", zorder=4,
-            )  # fmt: skip
+                f"{value:.1f}",
+                (place, max(value, 0.0)),
+                xytext=(-14, 3),
+                fontsize=8,
+                textcoords="offset points",
+                horizontalalignment="center",
+                zorder=4,
+            )
     panel.axhline(0.0, color=GREY, linewidth=0.7, zorder=1)
     panel.set_xticks([0, 1], ["Before", "After"])
     panel.margins(y=0.15)

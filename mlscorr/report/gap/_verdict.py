@@ -55,7 +55,8 @@ def verdict(document: dict) -> VerdictBox:
     document : dict
         The content of gap.json.
     """
-    answer, kind = document["verdict"], family(document["verdict"]["label"])
+    answer = document["verdict"]
+    kind = family(document["verdict"]["label"])
     if not is_judged(document):
         short = "Too little of this survey could be compared with the simulator."
         return VerdictBox("open", "It can't be told yet", [answer["sentence"] or short])
@@ -91,7 +92,8 @@ def is_named(document: dict) -> bool:
 def _nothing(document):
     excess = document["verdict"]["excess"]
     small = "An error smaller than the sizes that would show here may be there all the same."
-    kicker, tone = no_cause(document["verdict"]["set"], excess), "open" if excess else "good"
+    kicker = no_cause(document["verdict"]["set"], excess)
+    tone = "open" if excess else "good"
     return VerdictBox(tone, kicker, [f"{DIFFERENCE[excess]} {small}"])
 
 
@@ -102,15 +104,21 @@ def _unknown(document):
             "open", "Nothing shows, but not everything was seen", [answer["sentence"]]
         )
     lead = answer["lead"].rstrip(".")
-    text = f"It looks like: {lead}." if lead else "It can't be said what it looks like."
+    if lead:
+        text = f"It looks like: {lead}."
+    else:
+        text = "It can't be said what it looks like."
     more = "This is a lead to follow, not a cause: whatever behaves like that may have made it."
     return VerdictBox("open", "Something is wrong that no known effect explains", [text, more])
 
 
 def _cause(document):
-    answer, label = document["verdict"], document["verdict"]["label"]
-    sentences, others = _sentences(document, label), _same(document)
-    parts, large = label.count("+") + 1, len(sentences)
+    answer = document["verdict"]
+    label = document["verdict"]["label"]
+    sentences = _sentences(document, label)
+    others = _same(document)
+    parts = label.count("+") + 1
+    large = len(sentences)
     if others:
         either, *more = [lowered(" ".join(_sentences(document, name))) for name in (label, *others)]
         sentences = [f"Either {either}", *(f"Or {text}" for text in more)]
@@ -120,15 +128,22 @@ def _cause(document):
         kicker = f"{_number_word(parts).capitalize()} things are wrong"
     elif family(label) == "noise":
         is_assumed = label == "position_noise" and has_assumed_sigma(document["assumed"])
-        kicker = "Noisier than assumed" if is_assumed else "Noisier than stated"
+        if is_assumed:
+            kicker = "Noisier than assumed"
+        else:
+            kicker = "Noisier than stated"
         sentences = [*sentences, SCATTER]
+    elif answer["probability"] >= 0.5:
+        kicker = "One thing is wrong"
     else:
-        kicker = "One thing is wrong" if answer["probability"] >= 0.5 else "Possibly wrong"
+        kicker = "Possibly wrong"
     return VerdictBox("bad", kicker, sentences, large)
 
 
 def _number_word(number):
-    return NUMBER_WORDS[number] if number < len(NUMBER_WORDS) else str(number)
+    if number < len(NUMBER_WORDS):
+        return NUMBER_WORDS[number]
+    return str(number)
 
 
 def _same(document):
@@ -142,7 +157,8 @@ def _sentences(document, label):
     cause = next((cause for cause in document["causes"] if cause["effect"] == label), None)
     if cause is None:
         return [meaning(label)]
-    target, windows = cause.get("target"), document["windows"]
+    target = cause.get("target")
+    windows = document["windows"]
     return sentences_of(label, cause["parameters"], lambda kind: place_of(kind, target, windows))
 
 
@@ -154,7 +170,8 @@ def not_ruled_out(document: dict) -> str:
     document : dict
         The content of gap.json.
     """
-    answer, share = document["verdict"], _probabilities(document)
+    answer = document["verdict"]
+    share = _probabilities(document)
     names = [name for name in answer["set"] if name not in {answer["label"], *answer["same"]}]
     return joined([f"{lowered(title(n))} ({in_hundred(share.get(n))})" for n in names], "or")
 
@@ -175,23 +192,33 @@ def facts(document: dict) -> list[Fact]:
     """
     if not is_judged(document):
         return []
-    gap, headline = document["gap"], document["headline"]
+    gap = document["gap"]
+    headline = document["headline"]
     if not is_named(document) and not is_closed(document):
         whole = Fact("The gap between survey and simulation", headline, NEGATIVE)
         return [_certainty(document), whole]
     is_pattern = is_within(gap["before"], gap["null_band"])
-    more = "What gives it away is its pattern, not its size." if is_pattern else ""
+    if is_pattern:
+        more = "What gives it away is its pattern, not its size."
+    else:
+        more = ""
     where = Fact("Where it shows most", headline, more)
     return [_certainty(document), where, shrinking(document)]
 
 
 def _certainty(document):
-    answer, share = document["verdict"], _probabilities(document)
+    answer = document["verdict"]
+    share = _probabilities(document)
     share = answer["probability"] + sum(share.get(name) or 0.0 for name in _same(document))
     share = min(1.0, share)
     words = next(words for least, words in CERTAINTY if share >= least)
-    if max((p or 0.0 for name, p in _probabilities(document).items() if name != answer["label"]),
-           default=0.0) > share:  # fmt: skip
+    if (
+        max(
+            (p or 0.0 for name, p in _probabilities(document).items() if name != answer["label"]),
+            default=0.0,
+        )
+        > share
+    ):
         words = "another is likelier, but would cost more if it were wrong"
     more = [chance(answer["p_value"]), "± is one sigma." if is_named(document) else ""]
     return Fact("How sure", f"{in_hundred(share)}: {words}", " ".join(filter(None, more)))
@@ -211,7 +238,9 @@ def in_hundred(share: float | None) -> str:
         return DASH
     if share >= 0.995:
         return "more than 99 in 100"
-    return f"{100 * share:.0f} in 100" if share >= 0.005 else "less than 1 in 100"
+    if share >= 0.005:
+        return f"{100 * share:.0f} in 100"
+    return "less than 1 in 100"
 
 
 def chance(p_value: float | None) -> str:
@@ -228,8 +257,14 @@ def chance(p_value: float | None) -> str:
     if not known(p_value):
         return ""
     number = next((n for n in (100, 1000) if round(n * p_value) > 0), 10_000)
-    count = f"{number * p_value:.0f}" if p_value >= 1e-4 else "not one"
-    words = f"{number:,}".replace(",", " ") if number > 1000 else number
+    if p_value >= 1e-4:
+        count = f"{number * p_value:.0f}"
+    else:
+        count = "not one"
+    if number > 1000:
+        words = f"{number:,}".replace(",", " ")
+    else:
+        words = number
     return (
         f"Of {words} surveys with a POS as bad as fits this one, and nothing else wrong, {count} "
         "would look as odd."

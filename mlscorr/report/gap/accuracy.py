@@ -36,7 +36,8 @@ def accuracy_figure(document: dict) -> Figure:
         The content of plan.json.
     """
     accuracy = document["accuracy"]
-    time, sigma = numbers(accuracy["gps_time"]), 100 * numbers(accuracy["sigma"])
+    time = numbers(accuracy["gps_time"])
+    sigma = 100 * numbers(accuracy["sigma"])
     control = numbers(accuracy["control_times"])
     places = numbers(place["gps_time"] for place in document["next_control"])
     passes = passes_of(time)

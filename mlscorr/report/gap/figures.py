@@ -43,7 +43,8 @@ def plan_figures(document: dict) -> Figures:
     document : dict
         The content of plan.json.
     """
-    figures, worst = {}, worst_rows(detectable_rows(document["detectable"]))
+    figures = {}
+    worst = worst_rows(detectable_rows(document["detectable"]))
     if any(known(row.ratio) for row in worst):
         figures["detectable"] = partial(detectable_figure, worst)
     if document.get("accuracy"):
@@ -55,4 +56,6 @@ def plan_figures(document: dict) -> Figures:
 
 def _separability(document):
     is_matrix = len(document["correlation"]["names"]) > 1
-    return {"separability": partial(heat_figure, document)} if is_matrix else {}
+    if is_matrix:
+        return {"separability": partial(heat_figure, document)}
+    return {}

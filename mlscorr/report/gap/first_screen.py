@@ -58,21 +58,28 @@ def accuracy(document: dict) -> Iterator[Statement]:
         The content of gap.json.
     """
     parts = document["agreement"]
-    less = ", less what the simulator has in it," if document["simulator"]["effects"] else ""
+    if document["simulator"]["effects"]:
+        less = ", less what the simulator has in it,"
+    else:
+        less = ""
     if not parts:
         return
     if has_assumed_sigma(document["assumed"]):
         yield _unstated_accuracy(document, less)
         return
     is_worse = [part["rms_mm"] > SETTINGS.quantile * part["stated_mm"] for part in parts]
-    answer = "less accurate than" if any(is_worse) else "as accurate as"
+    if any(is_worse):
+        answer = "less accurate than"
+    else:
+        answer = "as accurate as"
     sizes = []
     for part in parts:
         lengths = part["rms_mm"], part["stated_mm"], SETTINGS.quantile * part["stated_mm"]
         residual, stated, limit = (length_in_words(length / 1e3) for length in lengths)
         states = f"{stated} by what POS, survey and extraction state (worse from {limit} on)"
         sizes.append((THINGS[part["channel"]], f"off by {residual} (RMS per axis), {states}"))
-    rating, items = "amber" if any(is_worse) else "green", (*sizes, *_moved(document))
+    rating = "amber" if any(is_worse) else "green"
+    items = (*sizes, *_moved(document))
     yield Statement("Accuracy", rating, f"The recorded cloud{less} is {answer} stated.", items)
 
 

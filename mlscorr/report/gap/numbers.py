@@ -34,7 +34,8 @@ def column(values: Sequence[float | None], unit: str) -> tuple[list[str], str]:
     large = max((abs(value) for value in values if known(value)), default=1.0)
     factor, word = scale(large, None, unit) if large < 1e4 else (1.0, unit)
     if word == "cm":
-        factor, word = 1e3, "mm"
+        factor = 1e3
+        word = "mm"
     return [plain(value, factor) for value in values], word
 
 
@@ -53,7 +54,9 @@ def plain(value: float | None, factor: float = 1.0) -> str:
     if not known(value):
         return DASH
     value = factor * value
-    return f"{value:.3f}" if abs(value) >= 1e4 else figures(value, 3)
+    if abs(value) >= 1e4:
+        return f"{value:.3f}"
+    return figures(value, 3)
 
 
 def signed(value: float | None, unit: str = "mm") -> str:

@@ -57,8 +57,10 @@ def diagnosis_page(document: dict, name: str) -> Page:
     name : str
         Of the survey.
     """
-    separability, closure = document["separability"], document["closure"]
-    answer, detectable = document["verdict"], separability["detectable"]
+    separability = document["separability"]
+    closure = document["closure"]
+    answer = document["verdict"]
+    detectable = separability["detectable"]
     is_clean = is_judged(document) and family(answer["label"]) == "none"
     probable, unlikely = _by_probability(rows.cause_rows(document))
     figures = drawn(diagnosis_figures(document))
@@ -147,7 +149,8 @@ def _page(document, name, headline, summary, sections, separability, content):
 
 def _channels(document):
     """What is shown of channels beside geometry, and of distances."""
-    contrasts, gap = document.get("contrasts", ()), document["gap"]
+    contrasts = document.get("contrasts", ())
+    gap = document["gap"]
     sides = (signed(gap[when], gap["unit"]) for when in ("before", "after"))
     silent = [(WORDS[c["channel"]][0], c["silent"]) for c in contrasts if c["silent"]]
     return {
@@ -163,7 +166,9 @@ def _open_causes(answer):
     """The causes in words that a verdict leaves open, as one class; none where it is one cause."""
     labels = dict.fromkeys([*answer["set"], *answer["same"]])
     causes = [lowered(title(label)) for label in labels if label not in ("none", "unknown")]
-    return [joined(causes)] if len(causes) > 1 else []
+    if len(causes) > 1:
+        return [joined(causes)]
+    return []
 
 
 def _by_probability(rows):
@@ -178,7 +183,10 @@ def _plan_verdict(worst, document):
     """The verdict on a plan: what it can see, what not, and what it can't tell apart."""
     visible = [row.title for row in worst if row.visible == "yes"]
     hidden = [row.title for row in worst if row.visible not in ("yes", DASH)]
-    errors = "kind of error" if len(visible) == 1 else "kinds of error"
+    if len(visible) == 1:
+        errors = "kind of error"
+    else:
+        errors = "kinds of error"
     sentences = [f"{len(visible)} {errors} would show at the usual size, {len(hidden)} would not."]
     if hidden:
         sentences.append(f"Must be larger to show: {joined(map(lowered, hidden))}.")

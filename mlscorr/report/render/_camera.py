@@ -38,9 +38,14 @@ class Camera:
 
     @classmethod
     def towards(
-        cls, focus: np.ndarray, azimuth: float, elevation: float, scale: float,
-        size: tuple[int, int], view_angle: float = 0.0,
-    ) -> Camera:  # fmt: skip
+        cls,
+        focus: np.ndarray,
+        azimuth: float,
+        elevation: float,
+        scale: float,
+        size: tuple[int, int],
+        view_angle: float = 0.0,
+    ) -> Camera:
         """A camera that looks towards an azimuth from an elevation above the horizon.
 
         Parameters

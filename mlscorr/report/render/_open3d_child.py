@@ -48,12 +48,14 @@ def _set_camera(rendering, camera, job, low, high):
     (width, height), scale, distance = job["size"], float(job["scale"]), float(job["distance"])
     eye = distance if np.isfinite(distance) else high + 1.0
     camera.look_at([0.0, 0.0, 0.0], [0.0, 0.0, eye], [0.0, 1.0, 0.0])
-    near, far = max(eye - high, 0.1), eye - low
+    near = max(eye - high, 0.1)
+    far = eye - low
     if np.isfinite(distance):
         angle = np.degrees(2 * np.arctan(width / scale / 2 / distance))
         camera.set_projection(angle, width / height, near, far, rendering.Camera.FovType.Horizontal)
     else:
-        x, y = width / scale / 2, height / scale / 2
+        x = width / scale / 2
+        y = height / scale / 2
         camera.set_projection(rendering.Camera.Projection.Ortho, -x, x, -y, y, near, far)
 
 

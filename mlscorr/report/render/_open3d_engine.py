@@ -14,9 +14,12 @@ CHILD = Path(__file__).with_name("open3d_child.py")
 
 
 def draw_pair(
-    canvases: tuple[Canvas, Canvas], colours: list[np.ndarray], point_size: float,
-    reference: str | Path | None = None, timeout: float = SETTINGS.open3d_timeout,
-) -> tuple[np.ndarray, ...]:  # fmt: skip
+    canvases: tuple[Canvas, Canvas],
+    colours: list[np.ndarray],
+    point_size: float,
+    reference: str | Path | None = None,
+    timeout: float = SETTINGS.open3d_timeout,
+) -> tuple[np.ndarray, ...]:
     """Draw what two canvases show: two RGB arrays (h, w, 3) uint8.
 
     Only points that are nearest to the eye are sent, one for each pixel at most, so that time
@@ -42,10 +45,15 @@ def draw_pair(
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         np.savez(
-            folder / "job.npz", before_xyz=canvases[0].points, after_xyz=canvases[1].points,
-            before_rgb=colours[0][canvases[0].drawn], after_rgb=colours[1][canvases[1].drawn],
-            point_size=point_size, reference=str(reference or ""), **vars(canvases[0].camera),
-        )  # fmt: skip
+            folder / "job.npz",
+            before_xyz=canvases[0].points,
+            after_xyz=canvases[1].points,
+            before_rgb=colours[0][canvases[0].drawn],
+            after_rgb=colours[1][canvases[1].drawn],
+            point_size=point_size,
+            reference=str(reference or ""),
+            **vars(canvases[0].camera),
+        )
         _run(folder, timeout)
         return tuple(np.load(folder / f"{side}.npy")[..., :3] for side in ("before", "after"))
 

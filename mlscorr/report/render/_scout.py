@@ -43,11 +43,13 @@ def scout(
         For a cloud without points.
     """
     near = [[np.empty((0, 4))] for _ in targets]
-    sample, radii = EvenSample(SETTINGS.sample_points), 0.4 * sizes
+    sample = EvenSample(SETTINGS.sample_points)
+    radii = 0.4 * sizes
     centres = np.array([row.observed for row in targets]).reshape(-1, 3)
     for cloud in chunks:
         sample.add(cloud)
-        low, high = cloud.xyz.min(axis=0, initial=np.inf), cloud.xyz.max(axis=0, initial=-np.inf)
+        low = cloud.xyz.min(axis=0, initial=np.inf)
+        high = cloud.xyz.max(axis=0, initial=-np.inf)
         apart = np.maximum(low - centres, centres - high).max(axis=1)
         for k in np.flatnonzero(apart <= radii):  # not every target in every chunk
             near[k].append(_around(cloud, centres[k], radii[k]))

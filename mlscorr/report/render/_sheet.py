@@ -32,7 +32,8 @@ class Sheet:
         clouds = [pair.before.xyz, pair.after.xyz]
         if self.view.is_cut:
             rows = self.canvases[1].holds(clouds[1])
-            clouds, values = [xyz[rows] for xyz in clouds], [v[rows] for v in values]
+            clouds = [xyz[rows] for xyz in clouds]
+            values = [v[rows] for v in values]
         for canvas, xyz, value in zip(self.canvases, clouds, values, strict=True):
             canvas.draw(xyz, value)
 
@@ -50,7 +51,8 @@ class Sheet:
         RuntimeError
             Where Open3D fails.
         """
-        view, radius = self.view, max(canvas.radius for canvas in self.canvases)
+        view = self.view
+        radius = max(canvas.radius for canvas in self.canvases)
         if view.is_cut:  # a few points in a row are all there is to see
             radius = max(radius, 0.004 * view.camera.size[0])
         pair = [canvas.grown(radius) for canvas in self.canvases]

@@ -10,9 +10,12 @@ from mlscorr.survey import ControlPoints, Trajectory
 
 
 def target_view(
-    rows: list[TargetRow], normal: np.ndarray, points: ControlPoints, trajectory: Trajectory,
+    rows: list[TargetRow],
+    normal: np.ndarray,
+    points: ControlPoints,
+    trajectory: Trajectory,
     options: PictureOptions,
-) -> View:  # fmt: skip
+) -> View:
     """A target close up, turned so that its misclosure is seen at full length.
 
     Parameters
@@ -28,11 +31,15 @@ def target_view(
     """
     row = max(rows, key=lambda row: np.linalg.norm(row.before))  # the pass that is worst off
     k = points.name.index(row.name)
-    kind, size = points.kind[k], points.size[k]
+    kind = points.kind[k]
+    size = points.size[k]
     facing = _facing(normal, trajectory.at(row.gps_time).position[0] - row.observed)
     eye = _direction(facing, row.before)
     elevation = np.degrees(np.arcsin(eye[2]))
-    azimuth = 0.0 if elevation > 89.0 else np.degrees(np.arctan2(-eye[0], -eye[1]))
+    if elevation > 89.0:
+        azimuth = 0.0
+    else:
+        azimuth = np.degrees(np.arctan2(-eye[0], -eye[1]))
     half = np.linalg.norm(row.before) / 2 + 1.1 * size
     outline = Mark("surveyed", row.surveyed + _outline(kind, size, facing))
     before, after = (
@@ -61,9 +68,13 @@ def _target_title(rows):
     group = rows[0].group
     role = "not used" if group == "unused" else f"{group} point"
     often = f" in {len(rows)} passes" if len(rows) > 1 else ""
-    made = " (the correction was made with it)" if group == "control" else ""
+    if group == "control":
+        made = " (the correction was made with it)"
+    else:
+        made = ""
     at_most = " at most" if len(rows) > 1 else ""
-    were, are = tables.length_in_words(before), tables.length_in_words(after)
+    were = tables.length_in_words(before)
+    are = tables.length_in_words(after)
     return f"{rows[0].name}, {role}{often}:{at_most} {were} off before, {are} after{made}"
 
 
@@ -71,7 +82,9 @@ def _facing(normal, to_vehicle):
     """The side of a target that was scanned: its unit normal towards the vehicle."""
     if not np.isfinite(normal).all():
         return to_vehicle / np.linalg.norm(to_vehicle)
-    return normal if normal @ to_vehicle >= 0 else -normal
+    if normal @ to_vehicle >= 0:
+        return normal
+    return -normal
 
 
 def _direction(facing, misclosure):
@@ -82,7 +95,10 @@ def _direction(facing, misclosure):
     along = misclosure / length
     across = facing - (facing @ along) * along
     if np.linalg.norm(across) < 1e-3:  # the target moves straight to the eye
-        across = np.array([0.0, -1.0, 0.0]) if abs(facing[2]) > 0.7 else np.array([0.0, 0.0, 1.0])
+        if abs(facing[2]) > 0.7:
+            across = np.array([0.0, -1.0, 0.0])
+        else:
+            across = np.array([0.0, 0.0, 1.0])
         across = across - (across @ facing) * facing
     across /= np.linalg.norm(across)
     angle = min(np.arccos(np.clip(facing @ across, -1, 1)), np.radians(SETTINGS.sideways_angle))
@@ -96,7 +112,10 @@ def _direction(facing, misclosure):
 
 def _outline(kind, size, normal):
     """A disc's or an upright square's outline about the origin: (n, 3) in m."""
-    up = np.array([0.0, 1.0, 0.0]) if abs(normal[2]) > 0.9 else np.array([0.0, 0.0, 1.0])
+    if abs(normal[2]) > 0.9:
+        up = np.array([0.0, 1.0, 0.0])
+    else:
+        up = np.array([0.0, 0.0, 1.0])
     right = np.cross(up, normal)
     right /= np.linalg.norm(right)
     up = np.cross(normal, right)

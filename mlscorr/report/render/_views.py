@@ -39,7 +39,10 @@ def overview(scouted: Scouted, rows: list[TargetRow], options: PictureOptions) -
     focus = focus + ends.mean(axis=0) @ unit.axes[:2]
     across, up = np.ptp(ends, axis=0)
     is_long = across > 1.8 * up  # so that both pictures fit one above the other
-    size = options.wide if options.wide and is_long else options.size
+    if options.wide and is_long:
+        size = options.wide
+    else:
+        size = options.size
     scale = float(min(size[0] / across, size[1] / up) / 1.12)
     longest = max((np.linalg.norm(v) for row in rows for v in (row.before, row.after)), default=0)
     room = 0.16 * np.sqrt(size[0] * size[1]) / scale
@@ -63,7 +66,10 @@ def _along(plan):
 
 def _overview_title(rows):
     """How far off the independent targets were and are; of a fit there is nothing to boast."""
-    role = "check" if any(row.role == "check" for row in rows) else "control"
+    if any(row.role == "check" for row in rows):
+        role = "check"
+    else:
+        role = "control"
     rows = [row for row in rows if row.role == role]
     if not rows:
         return "The whole survey; no target was seen"
@@ -75,7 +81,10 @@ def _overview_title(rows):
         for name in ("before", state)
     )
     points = len({row.name for row in rows})
-    often = "" if points == len(rows) else f", seen {len(rows)} times"
+    if points == len(rows):
+        often = ""
+    else:
+        often = f", seen {len(rows)} times"
     start = f"{counted(points, f'{role} point')}{often}: {were} off before"
     if role == "control" and not left_out:
         return f"{start} (3D RMSE); the correction was made with {'it' if points == 1 else 'them'}"
@@ -112,7 +121,10 @@ def section(
     scale = options.size[0] / 2 / half
     high = options.size[1] / scale  # m
     focus = place.focus - place.shift / 2
-    base = place.ground if place.foot - place.ground < high / 2 else place.foot
+    if place.foot - place.ground < high / 2:
+        base = place.ground
+    else:
+        base = place.foot
     focus[2] = base - place.shift[2] / 2 + 0.35 * high
     if place.splits:
         number = len(place.splits) + 1

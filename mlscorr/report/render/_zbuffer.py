@@ -51,9 +51,14 @@ class Canvas:
         camera = self.camera
         _draw(
             np.ascontiguousarray(xyz, dtype=float),
-            np.ascontiguousarray(value, dtype=np.float32).view(np.uint32), camera.focus,
-            camera.axes, camera.scale, camera.distance, self.half_depth, self.pixels,
-        )  # fmt: skip
+            np.ascontiguousarray(value, dtype=np.float32).view(np.uint32),
+            camera.focus,
+            camera.axes,
+            camera.scale,
+            camera.distance,
+            self.half_depth,
+            self.pixels,
+        )
 
     @property
     def radius(self) -> float:
@@ -103,7 +108,8 @@ class Canvas:
         depth = (self.pixels[row, column] >> np.uint64(32)) * DEPTH_STEP - DEEPEST
         height, width = self.pixels.shape
         metres = 1 / self.camera.scale * (1 + depth / self.camera.distance)
-        right, up = (column + 0.5 - width / 2) * metres, (height / 2 - row - 0.5) * metres
+        right = (column + 0.5 - width / 2) * metres
+        up = (height / 2 - row - 0.5) * metres
         return np.column_stack([right, up, -depth]).astype(np.float32)
 
     @property
@@ -136,7 +142,8 @@ def _draw(xyz, value, focus, axes, scale, distance, half_depth, pixels):
             continue
         step = np.uint64((depth + DEEPEST) / DEPTH_STEP)
         key = (step << np.uint64(32)) | np.uint64(value[p])
-        i, j = int(row), int(column)
+        i = int(row)
+        j = int(column)
         pixels[i, j] = min(pixels[i, j], key)
 
 
@@ -149,7 +156,8 @@ def _grow(pixels, disc, grown):
             if key == EMPTY:
                 continue
             for k in range(disc.shape[0]):
-                row, column = i + disc[k, 0], j + disc[k, 1]
+                row = i + disc[k, 0]
+                column = j + disc[k, 1]
                 if 0 <= row < height and 0 <= column < width and key < grown[row, column]:
                     grown[row, column] = key
 
@@ -166,7 +174,8 @@ def _light(pixels, pixels_per_step):
             here = np.int64(pixels[i, j] >> np.uint64(32))
             edge = 0.0
             for a, b in ((2, 0), (0, 2), (1, 1), (1, -1)):
-                left, right = pixels[i + a, j + b], pixels[i - a, j - b]
+                left = pixels[i + a, j + b]
+                right = pixels[i - a, j - b]
                 if EMPTY in (left, right):
                     continue
                 # the mean of opposite pixels: a slope by itself is no edge

@@ -25,11 +25,16 @@ ENGINES = ("zbuffer", "open3d")
 
 
 def draw(
-    survey: Survey, correction: Correction, targets: list[TargetRow], options: PictureOptions,
-    views: Sequence[str] = VIEWS, engine: str = "zbuffer",
-    chunks: Callable[[], Iterable[PointCloud]] | None = None, progress: Callable | None = None,
+    survey: Survey,
+    correction: Correction,
+    targets: list[TargetRow],
+    options: PictureOptions,
+    views: Sequence[str] = VIEWS,
+    engine: str = "zbuffer",
+    chunks: Callable[[], Iterable[PointCloud]] | None = None,
+    progress: Callable | None = None,
     ties: TieResiduals | None = None,
-) -> Iterator[Picture]:  # fmt: skip
+) -> Iterator[Picture]:
     """Draw a recorded survey before and after a correction, by the same cameras and colours.
 
     The cloud is streamed in flat memory: once to see where to look, and once to draw.
@@ -143,7 +148,8 @@ def _views(survey, correction, rows, views, options, stream, ties):
     if "targets" in views:
         for name in dict.fromkeys(row.name for row in rows):
             of_name = [k for k, row in enumerate(rows) if row.name == name]
-            normal, passes = scouted.normals[of_name[0]], [rows[k] for k in of_name]
+            normal = scouted.normals[of_name[0]]
+            passes = [rows[k] for k in of_name]
             to_draw.append(target_view(passes, normal, points, survey.trajectory, options))
     if "section" in views:
         cut = section(scouted, options, ties)

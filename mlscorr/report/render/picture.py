@@ -54,7 +54,8 @@ class Picture:
                 _panel(figure, self.view, k, pair[k], (0, 0), corner)
                 pair[k] = _drawn(figure)
         both = _few_colours(np.concatenate(pair))  # the same colours in both
-        width, half = both.width, both.height // 2
+        width = both.width
+        half = both.height // 2
         return tuple(_png(both.crop((0, k * half, width, (k + 1) * half))) for k in (0, 1))
 
     def page(self, size: tuple[int, int]) -> bytes:
@@ -65,7 +66,8 @@ class Picture:
         size : (int, int)
             Width and height. Units: pixels.
         """
-        figure, corner = _blank(*size), symbols.free_corner(self.before, self.after)
+        figure = _blank(*size)
+        corner = symbols.free_corner(self.before, self.after)
         corners = _panel_corners(self.view.camera.size, size)
         for k, words in enumerate(("Before the correction", "After the correction")):
             axes = _panel(figure, self.view, k, (self.before, self.after)[k], corners[k], corner)
@@ -124,7 +126,8 @@ def _drawn(figure):
 def _panel(figure, view, k, pixels, corner, free):
     """The points of one side, pixel by pixel, under its marks, with scale and compass; its axes."""
     height, width = pixels.shape[:2]
-    wide, high = figure.bbox.width, figure.bbox.height
+    wide = figure.bbox.width
+    high = figure.bbox.height
     bottom = high - corner[1] - height
     figure.figimage(pixels, corner[0], bottom, origin="upper", zorder=-1)
     axes = figure.add_axes((corner[0] / wide, bottom / high, width / wide, height / high))
@@ -142,7 +145,10 @@ def _mark(axes, mark, camera):
     pixel = camera.project(mark.points)[0]
     if mark.kind == "surveyed":
         axes.plot(*pixel.T, color=symbols.MARK, linewidth=2.2, path_effects=symbols.HALO)
-        middle = pixel.mean(axis=0) if len(pixel) > 5 else pixel[:4].mean(axis=0)
+        if len(pixel) > 5:
+            middle = pixel.mean(axis=0)
+        else:
+            middle = pixel[:4].mean(axis=0)
         axes.plot(*middle, marker="+", markersize=15, markeredgewidth=2, color=symbols.MARK)
     elif mark.kind == "offset":
         _arrow(axes, pixel, 2.4)
@@ -163,7 +169,8 @@ def _arrow(axes, pixel, width):
 
 def _names(axes, marks, camera):
     """Names beside their symbols, left out where one would cover another."""
-    size, taken = symbols.letter(axes, 0.62), []
+    size = symbols.letter(axes, 0.62)
+    taken = []
     for mark in marks:
         if mark.kind not in symbols.SYMBOLS:
             continue

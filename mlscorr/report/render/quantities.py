@@ -67,7 +67,8 @@ class CloudPair:
 
     def _sigma(self, side):
         """One sigma in 3D, NaN where it isn't known."""
-        cloud, sigma = (self.before, self.after)[side], self.sigmas[side]
+        cloud = (self.before, self.after)[side]
+        sigma = self.sigmas[side]
         if sigma is None:
             return np.full(len(cloud), np.nan)
         return np.linalg.norm(sigma.at(cloud.xyz, cloud.gps_time), axis=1)

@@ -96,8 +96,10 @@ def _places(scouted, cells):
 
 def _tied(scouted, residuals):
     """Rows of the sample about each of the worst facades, of every pass."""
-    plan, time = scouted.before.xyz[:, :2], scouted.before.gps_time
-    facades, half = worst_facades(residuals), SETTINGS.plan_cell / 2
+    plan = scouted.before.xyz[:, :2]
+    time = scouted.before.gps_time
+    facades = worst_facades(residuals)
+    half = SETTINGS.plan_cell / 2
     for places, times in zip(facades.place, facades.gps_time, strict=True):
         at_first = (np.abs(plan - places[0, :2]) < half).all(axis=1)
         at_first &= np.abs(time - times[0]) < TIES.pause / 2
@@ -159,8 +161,12 @@ def _visits(time):
 
 def _passes(place, ties):
     """Pass of each visit by the nearest tie of its time; () where two visits are of one pass."""
-    time, number = ties.gps_time.ravel(), ties.pass_number.ravel()
+    time = ties.gps_time.ravel()
+    number = ties.pass_number.ravel()
     away = np.linalg.norm(ties.place.reshape(-1, 3) - place.focus, axis=1)
-    visit, visits = np.searchsorted(place.splits, time), range(len(place.splits) + 1)
+    visit = np.searchsorted(place.splits, time)
+    visits = range(len(place.splits) + 1)
     passes = [int(number[np.where(visit == k, away, np.inf).argmin()]) for k in visits]
-    return tuple(passes) if len(set(passes)) == len(passes) else ()
+    if len(set(passes)) == len(passes):
+        return tuple(passes)
+    return ()

@@ -42,7 +42,8 @@ def scale_bar(axes: Axes, camera: Camera) -> None:
     width, height = camera.size
     unit = _unit(camera.size)
     length = nice(0.25 * min(width, 1.5 * height) / camera.scale)
-    left, foot = 0.6 * unit, height - 0.5 * unit
+    left = 0.6 * unit
+    foot = height - 0.5 * unit
     right = left + length * camera.scale
     _paper(axes, 0.3 * unit, height - 1.45 * unit, right + 0.3 * unit, height - 0.2 * unit)
     axes.plot([left, right], [foot, foot], color="black", linewidth=4, solid_capstyle="butt")
@@ -63,8 +64,14 @@ def free_corner(*pictures: np.ndarray) -> tuple[int, int]:
     side = round(4 * _unit((width, height)))
 
     def drawn(corner):
-        columns = slice(width - side, width) if corner[0] else slice(0, side)
-        rows = slice(height - side, height) if corner[1] else slice(0, side)
+        if corner[0]:
+            columns = slice(width - side, width)
+        else:
+            columns = slice(0, side)
+        if corner[1]:
+            rows = slice(height - side, height)
+        else:
+            rows = slice(0, side)
         return sum(int((p[rows, columns] != 255).any(axis=2).sum()) for p in pictures)
 
     return min(((1, 1), (1, 0), (0, 0)), key=drawn)
@@ -86,11 +93,16 @@ def compass(axes: Axes, camera: Camera, corner: tuple[int, int]) -> None:
     for name, direction in arrows.items():
         color = "#777777" if name in ("E", "up") else "black"
         axes.annotate(
-            name, xy=middle, xytext=middle + 1.35 * arm * direction * [1, -1], ha="center",
-            va="center", color=color, fontsize=letter(axes, 0.8),
+            name,
+            xy=middle,
+            xytext=middle + 1.35 * arm * direction * [1, -1],
+            ha="center",
+            va="center",
+            color=color,
+            fontsize=letter(axes, 0.8),
             fontweight="normal" if name in ("E", "up") else "bold",
             arrowprops={**line, "color": color},
-        )  # fmt: skip
+        )
 
 
 def legend(
@@ -114,11 +126,15 @@ def legend(
     handles = list(_handles(view))
     if handles:
         figure.legend(
-            handles=handles, loc="center left" if has_scale else "lower left",
+            handles=handles,
+            loc="center left" if has_scale else "lower left",
             bbox_to_anchor=(0.5, foot / 2 + 0.012) if has_scale else (gap, 0.01),
-            ncols=len(handles), frameon=False, fontsize=letter(figure, 0.85), handletextpad=0.5,
+            ncols=len(handles),
+            frameon=False,
+            fontsize=letter(figure, 0.85),
+            handletextpad=0.5,
             columnspacing=1.4,
-        )  # fmt: skip
+        )
 
 
 def _colour_bar(figure, colour, limits, place):

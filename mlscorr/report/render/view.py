@@ -80,11 +80,16 @@ class PictureOptions:
     view_angle: float = 0.0
 
     def camera(
-        self, focus: np.ndarray, azimuth: float, elevation: float, scale: float,
+        self,
+        focus: np.ndarray,
+        azimuth: float,
+        elevation: float,
+        scale: float,
         size: tuple[int, int] | None = None,
-    ) -> Camera:  # fmt: skip
+    ) -> Camera:
         """The camera of a view that would look this way by itself."""
         size = self.size if size is None else size
         azimuth = azimuth if self.azimuth is None else self.azimuth
-        elevation = elevation if self.elevation is None else self.elevation
+        if self.elevation is not None:
+            elevation = self.elevation
         return Camera.towards(focus, azimuth, elevation, scale, size, self.view_angle)

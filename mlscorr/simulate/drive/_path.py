@@ -29,9 +29,15 @@ class Path:
 
 
 def draw(
-    line: CentreLine, ground: Callable, length: float, leg: PassScenario, speed: float,
-    vehicle: Vehicle, phase: float, u_turn: bool = False,
-) -> Path:  # fmt: skip
+    line: CentreLine,
+    ground: Callable,
+    length: float,
+    leg: PassScenario,
+    speed: float,
+    vehicle: Vehicle,
+    phase: float,
+    u_turn: bool = False,
+) -> Path:
     """Path of a PassScenario along a centre line.
 
     Parameters

@@ -89,11 +89,13 @@ def _check(drive):
 
 def _paces(drive, rng):
     """Pace of every pass, and the phase (rad) of its weaving."""
-    paces, phases = [], []
+    paces = []
+    phases = []
     for i, (leg, own) in enumerate(zip(drive.passes, rng.spawn(len(drive.passes)), strict=True)):
         cruise = leg.speed or drive.speed
         duration = drive.duration * drive.speed / cruise
-        phase, slow_at = own.uniform(0.0, 2 * np.pi), own.uniform(0.3, 0.7) * duration
+        phase = own.uniform(0.0, 2 * np.pi)
+        slow_at = own.uniform(0.3, 0.7) * duration
         paces.append(Pace(cruise, phase, slow_at, drive.stops if i == 0 else ()))
         phases.append(own.uniform(0.0, 2 * np.pi))
     return paces, phases
@@ -195,7 +197,8 @@ def _trajectory(scenario, path, gps_time, distance, rng):
 
 def _follow(scenario, rng):
     """The drive of a given file: its path, its timing, its attitude where it has leg."""
-    kind, origin = scenario.scene.kind, np.array(scenario.origin)
+    kind = scenario.scene.kind
+    origin = np.array(scenario.origin)
     vehicle = VEHICLES[kind]
     pieces = read_path(scenario)
     offset = pieces[0][1][0]

@@ -154,7 +154,8 @@ def _reflections(gps_time, walls, rng):
     """
     shape = 2, RECEIVER.satellites
     logarithm = np.log(RECEIVER.reflection_periods)
-    period, phase = np.exp(rng.uniform(*logarithm, shape)), rng.uniform(0, 2 * np.pi, shape)
+    period = np.exp(rng.uniform(*logarithm, shape))
+    phase = rng.uniform(0, 2 * np.pi, shape)
     elapsed = (gps_time - gps_time[0])[:, None]
     ground, wall = (np.sin(2 * np.pi * elapsed / p + q) for p, q in zip(period, phase, strict=True))
     hidden = np.sin(walls).mean(axis=1, keepdims=True)

@@ -72,21 +72,33 @@ class Imu:
 # biases wander by a tenth (SPAN-CPT's data sheet: 1 of 3 to 20 deg/h); misalignment 0.1 mrad,
 # left after calibration
 TACTICAL = Imu(
-    gyro_noise=np.radians(0.1) / np.sqrt(hour), accelerometer_noise=0.0198 / np.sqrt(hour),
-    gyro_bias=np.radians(0.75) / hour, accelerometer_bias=1e-3 * GRAVITY,
-    gyro_wander=np.radians(0.075) / hour, accelerometer_wander=1e-4 * GRAVITY, bias_time=hour,
-    gyro_scale=300e-6, accelerometer_scale=300e-6, misalignment=1e-4,
-)  # fmt: skip
+    gyro_noise=np.radians(0.1) / np.sqrt(hour),
+    accelerometer_noise=0.0198 / np.sqrt(hour),
+    gyro_bias=np.radians(0.75) / hour,
+    accelerometer_bias=1e-3 * GRAVITY,
+    gyro_wander=np.radians(0.075) / hour,
+    accelerometer_wander=1e-4 * GRAVITY,
+    bias_time=hour,
+    gyro_scale=300e-6,
+    accelerometer_scale=300e-6,
+    misalignment=1e-4,
+)
 # ADIS16465: angular random walk of its data sheet; velocity random walk on a vehicle, biases and
 # their time of i2Nav-WHU/OB_GINS dataset/ob_gins.yaml; scale factors as i2Nav-WHU/KF-GINS allows
 # for; misalignment of the data sheet is 0.05 deg at most, and 0.02 deg gives the roll and pitch
 # errors of OB_GINS_TXT.err, 0.015 deg
 MEMS = Imu(
-    gyro_noise=np.radians(0.15) / np.sqrt(hour), accelerometer_noise=0.1 / np.sqrt(hour),
-    gyro_bias=np.radians(25.0) / hour, accelerometer_bias=200e-5,
-    gyro_wander=np.radians(25.0) / hour, accelerometer_wander=200e-5, bias_time=hour,
-    gyro_scale=1000e-6, accelerometer_scale=1000e-6, misalignment=np.radians(0.02),
-)  # fmt: skip
+    gyro_noise=np.radians(0.15) / np.sqrt(hour),
+    accelerometer_noise=0.1 / np.sqrt(hour),
+    gyro_bias=np.radians(25.0) / hour,
+    accelerometer_bias=200e-5,
+    gyro_wander=np.radians(25.0) / hour,
+    accelerometer_wander=200e-5,
+    bias_time=hour,
+    gyro_scale=1000e-6,
+    accelerometer_scale=1000e-6,
+    misalignment=np.radians(0.02),
+)
 GRADES = {"tactical": TACTICAL, "mems": MEMS}
 
 

@@ -44,21 +44,26 @@ def kalman_filter(
     epochs = len(transition) + 1
     filtered = StateEstimate(np.zeros((epochs, STATES)), np.empty((epochs, STATES, STATES)))
     predicted = StateEstimate(np.zeros((epochs, STATES)), np.empty((epochs, STATES, STATES)))
-    state, covariance, process = np.zeros(STATES), np.diag(start), np.diag(noise)
+    state = np.zeros(STATES)
+    covariance = np.diag(start)
+    process = np.diag(noise)
     for k in range(epochs):
         if k:
             state = transition[k - 1] @ state
             covariance = transition[k - 1] @ covariance @ transition[k - 1].T + process
-        predicted.state[k], predicted.covariance[k] = state, covariance
+        predicted.state[k] = state
+        predicted.covariance[k] = covariance
         for measurement in measurements.get(k, ()):
             state, covariance = _update(state, covariance, measurement)
-        filtered.state[k], filtered.covariance[k] = state, covariance
+        filtered.state[k] = state
+        filtered.covariance[k] = covariance
     return filtered, predicted
 
 
 def _update(state, covariance, measurement):
     """State and covariance after a Measurement; Joseph's form keeps it symmetric, positive."""
-    design, noise = measurement.design, measurement.covariance
+    design = measurement.design
+    noise = measurement.covariance
     cross = design @ covariance
     gain = np.linalg.solve(cross @ design.T + noise, cross).T
     keep = np.eye(STATES) - gain @ design
@@ -79,7 +84,8 @@ def smooth(
     """
     forward = transition @ filtered.covariance[:-1]
     gain = np.linalg.solve(predicted.covariance[1:], forward).transpose(0, 2, 1)
-    state, covariance = filtered.state.copy(), filtered.covariance.copy()
+    state = filtered.state.copy()
+    covariance = filtered.covariance.copy()
     for k in range(len(transition) - 1, -1, -1):
         state[k] += gain[k] @ (state[k + 1] - predicted.state[k + 1])
         covariance[k] += gain[k] @ (covariance[k + 1] - predicted.covariance[k + 1]) @ gain[k].T

@@ -19,9 +19,12 @@ from mlscorr.survey import Trajectory
 
 
 def pos_error(
-    trajectory: Trajectory, scenario: PosScenario, rng: Generator, sky: np.ndarray | None = None,
+    trajectory: Trajectory,
+    scenario: PosScenario,
+    rng: Generator,
+    sky: np.ndarray | None = None,
     start: float | None = None,
-) -> PosError:  # fmt: skip
+) -> PosError:
     """PosError at the epochs of one pass.
 
     Parameters

@@ -96,9 +96,13 @@ class Navigation:
 
 
 def navigate(
-    trajectory: Trajectory, scenario: PosScenario, imu: Imu, rng: Generator,
-    sky: np.ndarray | None = None, start: float | None = None,
-) -> Navigation:  # fmt: skip
+    trajectory: Trajectory,
+    scenario: PosScenario,
+    imu: Imu,
+    rng: Generator,
+    sky: np.ndarray | None = None,
+    start: float | None = None,
+) -> Navigation:
     """Navigation of a pass with an Imu; for the parameters see pos_error.
 
     Parameters

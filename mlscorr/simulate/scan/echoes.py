@@ -92,7 +92,8 @@ class Surfaces:
         room : Workspace
             In which the Hits stay until the next ones.
         """
-        n, limits = len(rays), (SETTINGS.grazing, SETTINGS.fading)
+        n = len(rays)
+        limits = (SETTINGS.grazing, SETTINGS.fading)
         hit = room.array("hit", n, dtype=np.int32)
         first = room.array("met", n, 3), hit, room.array("point", n, 3)
         if divergence == 0:
@@ -119,7 +120,9 @@ def _meet(rays, p, x, y, z, planes, t, grazing, fading, max_range):
 
     Strength falls with the cosine (Lambert) and with the square of the range, beyond a near field.
     """
-    a, b, c = planes[t, 0], planes[t, 1], planes[t, 2]
+    a = planes[t, 0]
+    b = planes[t, 1]
+    c = planes[t, 2]
     slope = a * x + b * y + c * z
     if abs(slope) < grazing:
         return 0.0, 0.0, 0.0
@@ -133,14 +136,20 @@ def _meet(rays, p, x, y, z, planes, t, grazing, fading, max_range):
 @njit(cache=True, nogil=True)
 def _thin(rays, triangle, met, hit, point, origin, planes, grazing, fading, max_range):
     for p in range(len(rays)):
-        x, y, z = rays[p, 3], rays[p, 4], rays[p, 5]
-        away, slant, strength = 0.0, 0.0, 0.0
+        x = rays[p, 3]
+        y = rays[p, 4]
+        z = rays[p, 5]
+        away = 0.0
+        slant = 0.0
+        strength = 0.0
         if triangle[p] != NO_TRIANGLE:
             away, slant, strength = _meet(
                 rays, p, x, y, z, planes, triangle[p], grazing, fading, max_range
             )
         hit[p] = triangle[p] if away > 0.0 else -1
-        met[p, 0], met[p, 1], met[p, 2] = away, slant, strength
+        met[p, 0] = away
+        met[p, 1] = slant
+        met[p, 2] = strength
         point[p, 0] = origin[0] + (rays[p, 0] + away * x)
         point[p, 1] = origin[1] + (rays[p, 1] + away * y)
         point[p, 2] = origin[2] + (rays[p, 2] + away * z)
@@ -149,8 +158,12 @@ def _thin(rays, triangle, met, hit, point, origin, planes, grazing, fading, max_
 @njit(cache=True, nogil=True, inline="always")
 def _sub_ray(rays, p, u, v):
     """Unit direction (3,) of a sub-ray, u along the sweep and v across it. Units: rad."""
-    dx, dy, dz = rays[p, 3], rays[p, 4], rays[p, 5]
-    ex, ey, ez = rays[p, 6], rays[p, 7], rays[p, 8]
+    dx = rays[p, 3]
+    dy = rays[p, 4]
+    dz = rays[p, 5]
+    ex = rays[p, 6]
+    ey = rays[p, 7]
+    ez = rays[p, 8]
     x = dx + u * ex + v * (dy * ez - dz * ey)
     y = dy + u * ey + v * (dz * ex - dx * ez)
     z = dz + u * ez + v * (dx * ey - dy * ex)
@@ -165,32 +178,59 @@ def _fan(rays, fan, offsets):
             for axis in range(3):
                 fan[p, k, axis] = rays[p, axis]
             x, y, z = _sub_ray(rays, p, offsets[k, 0], offsets[k, 1])
-            fan[p, k, 3], fan[p, k, 4], fan[p, k, 5] = x, y, z
+            fan[p, k, 3] = x
+            fan[p, k, 4] = y
+            fan[p, k, 5] = z
 
 
 @njit(cache=True, nogil=True)
-def _wide(rays, triangle, met, hit, point, origin, offsets, power, planes, grazing, fading,
-          max_range, pulse_length):  # fmt: skip
+def _wide(
+    rays,
+    triangle,
+    met,
+    hit,
+    point,
+    origin,
+    offsets,
+    power,
+    planes,
+    grazing,
+    fading,
+    max_range,
+    pulse_length,
+):
     """Fill the rows of the first echoes; returns pulse, met and hit of the later ones."""
     parts = np.empty((len(offsets), 4))
-    pulse, later, later_hit = np.empty(64, np.int64), np.empty((64, 3)), np.empty(64, np.int32)
+    pulse = np.empty(64, np.int64)
+    later = np.empty((64, 3))
+    later_hit = np.empty(64, np.int32)
     count = 0
     for p in range(len(rays)):
         filled = _parts(
             rays, p, triangle, offsets, power, planes, grazing, fading, max_range, parts
         )
-        met[p, 0], met[p, 1], met[p, 2], hit[p], start = 0.0, 0.0, 0.0, -1, 0
+        met[p, 0] = 0.0
+        met[p, 1] = 0.0
+        met[p, 2] = 0.0
+        hit[p] = -1
+        start = 0
         while start < filled:
             end, away, slant, strength, main = _echo(parts, start, filled, pulse_length)
             if start == 0:
-                met[p, 0], met[p, 1], met[p, 2], hit[p] = away, slant, strength, main
+                met[p, 0] = away
+                met[p, 1] = slant
+                met[p, 2] = strength
+                hit[p] = main
             else:
                 if count == len(pulse):
                     pulse = np.concatenate((pulse, pulse))
                     later = np.concatenate((later, later))
                     later_hit = np.concatenate((later_hit, later_hit))
-                later[count, 0], later[count, 1], later[count, 2] = away, slant, strength
-                pulse[count], later_hit[count] = p, main
+                later[count, 0] = away
+                later[count, 1] = slant
+                later[count, 2] = strength
+                pulse[count] = p
+                later_hit[count] = main
                 count += 1
             start = end
         for axis in range(3):
@@ -217,8 +257,10 @@ def _parts(rays, p, triangle, offsets, power, planes, grazing, fading, max_range
             for column in range(4):
                 parts[at, column] = parts[at - 1, column]
             at -= 1
-        parts[at, 0], parts[at, 1] = distance, incidence
-        parts[at, 2], parts[at, 3] = strength * power[k], t
+        parts[at, 0] = distance
+        parts[at, 1] = incidence
+        parts[at, 2] = strength * power[k]
+        parts[at, 3] = t
         filled += 1
     return filled
 
@@ -230,8 +272,13 @@ def _echo(parts, start, filled, pulse_length):
     Parts within a pulse length of the echo so far merge into it, at their mean by strength; so
     that echoes lie at least that far apart.
     """
-    first, end = parts[start, 0], start
-    total, mixed, slant, strongest, main = 0.0, 0.0, 0.0, -1.0, -1
+    first = parts[start, 0]
+    end = start
+    total = 0.0
+    mixed = 0.0
+    slant = 0.0
+    strongest = -1.0
+    main = -1
     while end < filled:
         away = parts[end, 0] - first
         if total > 0.0 and away - mixed / total >= pulse_length:
@@ -241,6 +288,7 @@ def _echo(parts, start, filled, pulse_length):
         mixed += strength * away
         slant += strength * parts[end, 1]
         if strength > strongest:
-            strongest, main = strength, int(parts[end, 3])
+            strongest = strength
+            main = int(parts[end, 3])
         end += 1
     return end, first + mixed / total, slant / total, total, main

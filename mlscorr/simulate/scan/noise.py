@@ -76,7 +76,9 @@ class ScannerNoise:
         angle : (n,) array
             True. Units: rad.
         """
-        return angle + self._of("angle") if "angle" in self._first else angle
+        if "angle" in self._first:
+            return angle + self._of("angle")
+        return angle
 
     def range(self, hits: Hits) -> np.ndarray:
         """Ranges (n + m,) as measured. Units: m.

@@ -38,8 +38,10 @@ class Turn(Columns):
     @cached_property
     def beams(self) -> np.ndarray:
         """Unit directions, and the directions in which they sweep (m, 2, 3), in its frame."""
-        flat, zero = np.cos(self.elevation), np.zeros(len(self))
-        x, y = np.cos(self.angle), np.sin(self.angle)
+        flat = np.cos(self.elevation)
+        zero = np.zeros(len(self))
+        x = np.cos(self.angle)
+        y = np.sin(self.angle)
         beam = np.column_stack([flat * x, flat * y, np.sin(self.elevation)])
         return np.stack([beam, np.column_stack([-y, x, zero])], axis=1)
 
@@ -163,9 +165,13 @@ class Platform:
         return self.place(gps_time, *np.zeros((3, len(gps_time))), np.zeros(3))
 
     def place(
-        self, gps_time: np.ndarray, angle: np.ndarray, elevation: np.ndarray, distance: np.ndarray,
+        self,
+        gps_time: np.ndarray,
+        angle: np.ndarray,
+        elevation: np.ndarray,
+        distance: np.ndarray,
         origin: np.ndarray,
-    ) -> np.ndarray:  # fmt: skip
+    ) -> np.ndarray:
         """Map coordinates (n, 3) of measurements, Eq. 1; all times must lie within the epochs.
 
         Parameters
@@ -213,10 +219,18 @@ def _sine(angle):
 @njit(cache=True, nogil=True, inline="always")
 def _turn(table, i, s, c, x, y, z):
     """R Exp(angle axis) times a vector, with s, c the angle's sine and 1 - cosine (Rodrigues)."""
-    kx, ky, kz = table[i, 12], table[i, 13], table[i, 14]
-    ax, ay, az = ky * z - kz * y, kz * x - kx * z, kx * y - ky * x
-    bx, by, bz = ky * az - kz * ay, kz * ax - kx * az, kx * ay - ky * ax
-    x, y, z = x + s * ax + c * bx, y + s * ay + c * by, z + s * az + c * bz
+    kx = table[i, 12]
+    ky = table[i, 13]
+    kz = table[i, 14]
+    ax = ky * z - kz * y
+    ay = kz * x - kx * z
+    az = kx * y - ky * x
+    bx = ky * az - kz * ay
+    by = kz * ax - kx * az
+    bz = kx * ay - ky * ax
+    x = x + s * ax + c * bx
+    y = y + s * ay + c * by
+    z = z + s * az + c * bz
     return (
         table[i, 3] * x + table[i, 4] * y + table[i, 5] * z,
         table[i, 6] * x + table[i, 7] * y + table[i, 8] * z,
@@ -241,8 +255,24 @@ def _walk(epochs, time, i):
 
 
 @njit(cache=True, nogil=True)
-def _aim(number, gps_time, angle, elevation, rays, single, turned, angles, elevations, rate, start,
-         beams, epochs, table, lever, wide):  # fmt: skip
+def _aim(
+    number,
+    gps_time,
+    angle,
+    elevation,
+    rays,
+    single,
+    turned,
+    angles,
+    elevations,
+    rate,
+    start,
+    beams,
+    epochs,
+    table,
+    lever,
+    wide,
+):
     if number.size == 0:
         return
     turn, slot = divmod(number[0], turned.size)
@@ -250,7 +280,9 @@ def _aim(number, gps_time, angle, elevation, rays, single, turned, angles, eleva
     i = min(max(i, 0), epochs.size - 2)
     for p in range(number.size):
         time = start + (turn + turned[slot]) / rate
-        gps_time[p], angle[p], elevation[p] = time, angles[slot], elevations[slot]
+        gps_time[p] = time
+        angle[p] = angles[slot]
+        elevation[p] = elevations[slot]
         i = _walk(epochs, time, i)
         weight = (time - epochs[i]) / (epochs[i + 1] - epochs[i])
         s, c = _sine(weight * table[i, 15])
@@ -259,15 +291,20 @@ def _aim(number, gps_time, angle, elevation, rays, single, turned, angles, eleva
         rays[p, 1] = _position(table, i, weight, 1) + y
         rays[p, 2] = _position(table, i, weight, 2) + z
         x, y, z = _turn(table, i, s, c, beams[slot, 0, 0], beams[slot, 0, 1], beams[slot, 0, 2])
-        rays[p, 3], rays[p, 4], rays[p, 5] = x, y, z
+        rays[p, 3] = x
+        rays[p, 4] = y
+        rays[p, 5] = z
         if wide:
             x, y, z = _turn(table, i, s, c, beams[slot, 1, 0], beams[slot, 1, 1], beams[slot, 1, 2])
-            rays[p, 6], rays[p, 7], rays[p, 8] = x, y, z
+            rays[p, 6] = x
+            rays[p, 7] = y
+            rays[p, 8] = z
         for column in range(6):
             single[p, column] = rays[p, column]
         slot += 1
         if slot == turned.size:
-            turn, slot = turn + 1, 0
+            turn = turn + 1
+            slot = 0
 
 
 @njit(cache=True, nogil=True)

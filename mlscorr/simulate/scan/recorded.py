@@ -84,7 +84,9 @@ def recorded_pulses(
     normal : (n, 3) array, or (3,) of all
         Unit normals of the surfaces they lie on.
     """
-    time, level, quarter = cloud.gps_time, np.zeros(len(cloud)), np.full(len(cloud), np.pi / 2)
+    time = cloud.gps_time
+    level = np.zeros(len(cloud))
+    quarter = np.full(len(cloud), np.pi / 2)
     start, x = aim(platform, time, level, level)
     ends = _towards(platform, time, quarter, level), _towards(platform, time, level, quarter)
     axes = x, *(end - start for end in ends)
@@ -93,6 +95,10 @@ def recorded_pulses(
     away = np.sqrt(x**2 + y**2 + z**2)
     slant = np.einsum("ni,ni->n", sight, np.broadcast_to(normal, sight.shape)) / away
     return RecordedPulses(
-        gps_time=time, angle=np.arctan2(y, x), elevation=np.arcsin(np.clip(z / away, -1.0, 1.0)),
-        range=away, intensity=cloud.intensity.astype(float), incidence=np.abs(slant),
-    )  # fmt: skip
+        gps_time=time,
+        angle=np.arctan2(y, x),
+        elevation=np.arcsin(np.clip(z / away, -1.0, 1.0)),
+        range=away,
+        intensity=cloud.intensity.astype(float),
+        incidence=np.abs(slant),
+    )

@@ -125,7 +125,8 @@ class Replay:
     @cached_property
     def _time(self):
         """True times (n,), held within the pass."""
-        trajectory, recorded = self.survey.trajectory, self.pulses.gps_time
+        trajectory = self.survey.trajectory
+        recorded = self.pulses.gps_time
         starts, ends = trajectory.passes.T
         number = trajectory.segment(recorded)
         return np.clip(self._undone("clock", "gps_time"), starts[number], ends[number])
@@ -177,7 +178,8 @@ def without(
     take_off : function
         Of recorded, true, changed: what recorded is without the way from true to changed.
     """
-    effects, true = [effect for effect in effects if effect.stage == stage], recorded
+    effects = [effect for effect in effects if effect.stage == stage]
+    true = recorded
     nothing: Any = {effect.name: None for effect in effects}
     for _ in range(2 if effects else 0):
         true = take_off(recorded, true, apply_effects(effects, stage, true, reference, nothing))

@@ -84,7 +84,8 @@ class Shots:
         if len(self.pulse):
             pulse = np.append(np.arange(self.fired), self.pulse)[rows]
             order = np.argsort(pulse, kind="stable")
-            rows, pulse = rows[order], pulse[order]
+            rows = rows[order]
+            pulse = pulse[order]
             number = (np.arange(len(rows)) - np.searchsorted(pulse, pulse) + 1).astype(np.uint8)
             count = np.bincount(pulse, minlength=self.fired)[pulse].astype(np.uint8)
         names = [field.name for field in fields(MeasuredPulses) if hasattr(self, field.name)]
@@ -139,10 +140,15 @@ def pulses_of_a_pass(trajectory: Trajectory, scanner: ScannerScenario) -> int:
 
 
 def shoot(
-    surfaces: Surfaces, origin: np.ndarray, trajectory: Trajectory, mounting: Mounting,
-    scanner: ScannerScenario, streams: tuple, divergence: float | None = None,
+    surfaces: Surfaces,
+    origin: np.ndarray,
+    trajectory: Trajectory,
+    mounting: Mounting,
+    scanner: ScannerScenario,
+    streams: tuple,
+    divergence: float | None = None,
     block: int | None = None,
-) -> Iterator[Shots]:  # fmt: skip
+) -> Iterator[Shots]:
     """Blocks of Shots of one pass, in time order, with the scanner's noise.
 
     Parameters
@@ -172,19 +178,27 @@ def shoot(
     if divergence is None:
         divergence = 1e-3 * scanner.beam_divergence
     streams = deepcopy(streams)
-    platform, turn = Platform.of(trajectory, mounting, origin), turn_of(scanner)
+    platform = Platform.of(trajectory, mounting, origin)
+    turn = turn_of(scanner)
     total = turns_of_a_pass(trajectory, scanner) * len(turn)
     start = trajectory.gps_time[0] + SETTINGS.lead
     step = block if divergence == 0 else max(1, block // len(POWER))
     sizes = [min(step, total - first) for first in range(0, total, step)]
-    room, ahead = Workspace(), ScannerNoise(scanner, streams, sizes[0]) if sizes else None
+    room = Workspace()
+    if sizes:
+        ahead = ScannerNoise(scanner, streams, sizes[0])
+    else:
+        ahead = None
     for i, size in enumerate(sizes):
         rays = platform.aim(np.arange(i * step, i * step + size), turn, start, room, divergence > 0)
         hits = surfaces.hits(rays, origin, divergence, scanner.max_range, room)
         # the next block's noise is drawn while this one is used
         noise = ahead
         noise.wait()
-        ahead = ScannerNoise(scanner, streams, sizes[i + 1]) if i + 1 < len(sizes) else None
+        if i + 1 < len(sizes):
+            ahead = ScannerNoise(scanner, streams, sizes[i + 1])
+        else:
+            ahead = None
         yield _measure(rays, hits, noise)
 
 
@@ -192,11 +206,19 @@ def _measure(rays, hits, noise):
     """Shots: what was hit, with noise. All echoes of a pulse share its measured angle."""
 
     def all_rows(values):
-        return np.append(values, values[hits.pulse]) if len(hits.pulse) else values
+        if len(hits.pulse):
+            return np.append(values, values[hits.pulse])
+        return values
 
     return Shots(
-        gps_time=all_rows(rays.gps_time), angle=all_rows(noise.angle(rays.angle)),
-        elevation=all_rows(rays.elevation), range=noise.range(hits),
-        intensity=noise.intensity(hits), incidence=hits.incidence, point=hits.point,
-        triangle=hits.triangle, kept=noise.kept(hits), pulse=hits.pulse,
-    )  # fmt: skip
+        gps_time=all_rows(rays.gps_time),
+        angle=all_rows(noise.angle(rays.angle)),
+        elevation=all_rows(rays.elevation),
+        range=noise.range(hits),
+        intensity=noise.intensity(hits),
+        incidence=hits.incidence,
+        point=hits.point,
+        triangle=hits.triangle,
+        kept=noise.kept(hits),
+        pulse=hits.pulse,
+    )

@@ -52,7 +52,9 @@ def in_slices(n: int, kernel: Callable, rows: tuple, constants: tuple) -> list:
     def work(part):
         return part.start, kernel(*(row[part] for row in rows), *constants)
 
-    return list(pool().map(work, slices)) if len(slices) > 1 else [work(slices[0])]
+    if len(slices) > 1:
+        return list(pool().map(work, slices))
+    return [work(slices[0])]
 
 
 @cache

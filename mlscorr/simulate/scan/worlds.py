@@ -168,7 +168,8 @@ class Boards(Columns):
         direction : (n, 3) array
             Unit vectors.
         """
-        normal, centre = self.axes[number, 2], self.centre[number]
+        normal = self.axes[number, 2]
+        centre = self.centre[number]
         offset = np.einsum("ni,ni->n", normal, centre)
         distance, slant = crossing(start, direction, normal, offset)
         away = start + distance[:, None] * direction - centre
@@ -185,9 +186,12 @@ class Boards(Columns):
             Along their edges from the centre. Units: m.
         """
         x, y = place.T
-        form, half = self.form[number], self.size[number] / 2
-        bright, dark = self.bright[number], self.dark[number]
-        radius, edge = np.hypot(x, y), np.maximum(np.abs(x), np.abs(y))
+        form = self.form[number]
+        half = self.size[number] / 2
+        bright = self.bright[number]
+        dark = self.dark[number]
+        radius = np.hypot(x, y)
+        edge = np.maximum(np.abs(x), np.abs(y))
         disc = (radius <= half) & (radius >= self.inner[number] * half)
         plate = np.where(edge <= half, bright, np.nan)
         choices = [
@@ -261,7 +265,10 @@ def paints(kind: str, intensity: np.ndarray) -> tuple[float, float, float]:
     if kind == "checkerboard" and len(intensity):
         dark, bright = np.percentile(intensity, [15, 85])
         return float(bright), float(dark), 0.0
-    spread = 0.74 * np.subtract(*np.percentile(intensity, [75, 25])) if len(intensity) else 0.0
+    if len(intensity):
+        spread = 0.74 * np.subtract(*np.percentile(intensity, [75, 25]))
+    else:
+        spread = 0.0
     return (
         bright,
         bright * SETTINGS.black / SETTINGS.white,

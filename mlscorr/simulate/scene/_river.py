@@ -35,7 +35,9 @@ class River:
     bushes = 6.0  # on a slope, per 100 m
 
     def __init__(self, scenario: Scenario, line: CentreLine, length, rng):
-        self.scenario, self.line, self.length = scenario.scene, line, length
+        self.scenario = scenario.scene
+        self.line = line
+        self.length = length
         self._shore_rng, self._house_rng, self._furniture_rng = rng.spawn(3)
 
     @cached_property
@@ -71,7 +73,9 @@ class River:
     @cached_property
     def stretches(self) -> list:
         """Quay walls and slopes in turn, with steps between some of them."""
-        stretches, s, i = [], -SETTINGS.margin, int(self._phase > np.pi)
+        stretches = []
+        s = -SETTINGS.margin
+        i = int(self._phase > np.pi)
         while s < self.length + SETTINGS.margin:
             for kind in (("quay", "slope")[i % 2], "steps"):
                 shortest, longest = (8.0, 14.0) if kind == "steps" else (40.0, 70.0)
@@ -88,11 +92,14 @@ class River:
     @cached_property
     def houses(self) -> np.ndarray:
         """Starts and ends (m along the line), setback (m) and height (m) of houses: (n, 4)."""
-        rng, rows, s = self._house_rng, [], -SETTINGS.margin
+        rng = self._house_rng
+        rows = []
+        s = -SETTINGS.margin
         heights = self.scenario.house_height
         while s < self.length + SETTINGS.margin - 20.0:
             width = rng.uniform(12.0, 20.0)
-            setback, height = rng.uniform(0, self.bank.setback), rng.uniform(*heights)
+            setback = rng.uniform(0, self.bank.setback)
+            height = rng.uniform(*heights)
             rows.append((s, s + width, setback, height))
             s += width + rng.uniform(3.0, 10.0) + 25.0 * (rng.random() < self.scenario.gaps)
         return np.array(rows).reshape(-1, 4)
@@ -119,7 +126,8 @@ class River:
         s = np.linspace(stretch.start, stretch.end, 2 + int((stretch.end - stretch.start) / 2.0))
         strips = []
         for (x, z, reflectance), (next_x, next_z, _) in pairwise(self.bank.profile(stretch.kind)):
-            near, far = self.place(s, x, z), self.place(s, next_x, next_z)
+            near = self.place(s, x, z)
+            far = self.place(s, next_x, next_z)
             strips.append(four_corners(near[:-1], near[1:], far[1:], far[:-1], reflectance))
         return Mesh.concatenate(strips)
 
@@ -190,7 +198,8 @@ class River:
     def _on_quay(self, s, half, rng):
         """On the quay wall, 2 cm before it."""
         u = -self._facing(s)
-        low, high = half + 0.4, max(half + 0.5, self.bank.top - half - 0.3)
+        low = half + 0.4
+        high = max(half + 0.5, self.bank.top - half - 0.3)
         centre = self.place(s, 0.0, rng.uniform(low, high)) + 0.02 * np.cross(u, UP)
         return TargetSpot("wall", s, float(self.shore(s)), centre, u, UP, -0.5)
 
@@ -237,12 +246,16 @@ class River:
 
             def is_free(s, _, inland=inland, extent=extent):
                 kind = self._kind_at(s, extent + 0.3)
-                right_place = kind == "slope" if inland == 4.0 else kind is not None
+                if inland == 4.0:
+                    right_place = kind == "slope"
+                else:
+                    right_place = kind is not None
                 on_steps = kind == "steps" and inland < 8.0
                 hides = placed.in_the_way(s, float(self.shore(s)) + inland, extent)
                 return right_place and not on_steps and not hides
 
-            start, end = -SETTINGS.margin + 3.0, self.length + SETTINGS.margin - 3.0
+            start = -SETTINGS.margin + 3.0
+            end = self.length + SETTINGS.margin - 3.0
             for s, _ in scatter(density, start, end, is_free, rng):
                 pieces.append(make(s, inland, rng))
         return Mesh.concatenate(pieces)
@@ -251,11 +264,13 @@ class River:
         return self.place(s, inland, self.bank.height(self._kind_at(s, 0.0) or "quay", inland))
 
     def _lamp(self, s, inland, rng):
-        inland = inland if self._kind_at(s, 0.0) == "quay" else self.bank.slope + inland
+        if self._kind_at(s, 0.0) != "quay":
+            inland = self.bank.slope + inland
         return lamp(self._foot(s, inland), np.cross(self._facing(s), UP))
 
     def _tree(self, s, inland, rng):
-        inland = inland if self._kind_at(s, 0.0) == "quay" else self.bank.slope + 1.0
+        if self._kind_at(s, 0.0) != "quay":
+            inland = self.bank.slope + 1.0
         return tree(self._foot(s, inland), self._facing(s), np.array([2.4, 2.4, 2.2]), rng)
 
     def _car(self, s, inland, rng):

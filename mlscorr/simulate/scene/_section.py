@@ -111,5 +111,8 @@ def section(scenario: DriveScenario, length: float, lane_edge: float = 2.4) -> S
     """
     lateral = max(abs(lane.lateral) for lane in scenario.passes)
     ends = {"forward": length + 6.0, "back": -6.0}
-    turns = {ends[lane.direction] for lane in scenario.passes} if scenario.u_turn else ()
+    if scenario.u_turn:
+        turns = {ends[lane.direction] for lane in scenario.passes}
+    else:
+        turns = ()
     return StreetSection(max(StreetSection.road, lateral + lane_edge), tuple(sorted(turns)))

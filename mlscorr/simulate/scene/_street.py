@@ -31,14 +31,17 @@ class Street:
     """What stands along a street; `spot` finds places for targets, `furniture` the rest."""
 
     def __init__(self, scenario: Scenario, line: CentreLine, length, rng):
-        self.scenario, self.line, self.length = scenario.scene, line, length
+        self.scenario = scenario.scene
+        self.line = line
+        self.length = length
         self.section = section(scenario.drive, length)
         self._front_rng, self._house_rng, self._furniture_rng = rng.spawn(3)
 
     @cached_property
     def houses(self) -> list:
         """Straight house fronts along both sides, with gaps after some of them."""
-        rng, houses = self._front_rng, []
+        rng = self._front_rng
+        houses = []
         for side in (-1, 1):
             s = -SETTINGS.margin
             while s < self.length + SETTINGS.margin - 14.0:
@@ -74,11 +77,13 @@ class Street:
     @cached_property
     def mesh(self) -> Mesh:
         """Ground and houses."""
-        rng, low_high = self._house_rng, self.scenario.house_height
+        rng = self._house_rng
+        low_high = self.scenario.house_height
         pieces = [self._ground(), *(self._markings() if self.scenario.markings else ())]
         for front in self.houses:
             inward = unit(front.side * np.cross(front.far - front.near, UP))
-            height, reflectance = rng.uniform(*low_high), rng.uniform(0.2, 0.5)
+            height = rng.uniform(*low_high)
+            reflectance = rng.uniform(0.2, 0.5)
             pieces.append(house(front.near, front.far, inward, height, reflectance))
         return Mesh.concatenate(pieces)
 
@@ -88,7 +93,8 @@ class Street:
         edge = self.section.half_width(s)
         fence = edge + self.section.pavement
         garden = fence + self.section.garden
-        kerb, flat = np.full_like(s, self.section.kerb), np.zeros_like(s)
+        kerb = np.full_like(s, self.section.kerb)
+        flat = np.zeros_like(s)
         rows = [
             (-garden, kerb, "garden"),
             (-fence, kerb, "pavement"),
@@ -103,7 +109,8 @@ class Street:
         reflectance = {"asphalt": 0.18, "kerb": 0.35, "pavement": 0.25, "garden": 0.3}
         strips = []
         for (x, z, surface), (next_x, next_z, _) in pairwise(rows):
-            left, right = self.line.place(s, x, z), self.line.place(s, next_x, next_z)
+            left = self.line.place(s, x, z)
+            right = self.line.place(s, next_x, next_z)
             owned = self._owns(s[:-1], (left[:-1] + right[1:]) / 2, (x + next_x)[:-1] / 2)
             quad = (left[:-1], right[:-1], right[1:], left[1:])
             strips.append(four_corners(*(c[owned] for c in quad), reflectance[surface]))
@@ -113,7 +120,8 @@ class Street:
         """Paint on the carriageway: a dashed middle line, and a line along each kerb."""
         s = np.arange(-SETTINGS.margin, self.length + SETTINGS.margin)
         edge = self.section.half_width(s) - self.section.line_from_kerb
-        half, up = self.section.line / 2, self.section.paint
+        half = self.section.line / 2
+        up = self.section.paint
         dash, between = self.section.dash
         for middle, gap in ((np.zeros_like(s), between), (-edge, 0.0), (edge, 0.0)):
             left, right = (
@@ -163,7 +171,9 @@ class Street:
         if self.line.distance(spot.centre) < abs(spot.lateral) - self.section.clearance:
             return None  # in another part of the way
         other = self.line.distance_to_other_parts(spot.centre[None], np.array([s]))[0]
-        return spot if other > self.section.road + half and self._is_seen(spot) else None
+        if other > self.section.road + half and self._is_seen(spot):
+            return spot
+        return None
 
     def _is_seen(self, spot):
         """Whether no house of another part of the way stands between the drive and a target."""
@@ -199,8 +209,10 @@ class Street:
 
     def _on_road(self, s, side, half, rng):
         """1 cm above the carriageway, turned in its plane."""
-        edge, margin = float(self.section.half_width(s)), np.sqrt(2) * half + 0.05
-        low, high = max(0.5 * edge, margin), min(0.73 * edge, edge - margin)
+        edge = float(self.section.half_width(s))
+        margin = np.sqrt(2) * half + 0.05
+        low = max(0.5 * edge, margin)
+        high = min(0.73 * edge, edge - margin)
         lateral = side * rng.uniform(min(low, high), max(low, high))
         steps = np.array([-0.2, 0.2])
         along = self.line.place(s + steps, lateral, self.section.height(s + steps, lateral))
@@ -236,7 +248,8 @@ class Street:
                 lateral = side * (float(self.section.half_width(s)) + from_kerb)
                 return not crowded and self._has_room(s, lateral, extent, placed)
 
-            start, end = -SETTINGS.margin + 4.0, self.length + SETTINGS.margin - 4.0
+            start = -SETTINGS.margin + 4.0
+            end = self.length + SETTINGS.margin - 4.0
             for s, side in scatter(density, start, end, is_free, rng):
                 taken.append((s, side, extent))
                 lateral = side * (float(self.section.half_width(s)) + from_kerb)

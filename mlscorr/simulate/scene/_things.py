@@ -41,9 +41,13 @@ def target(kind: str, centre: np.ndarray, u: np.ndarray, v: np.ndarray, size: fl
 
 
 def facade(
-    corner: np.ndarray, along: np.ndarray, height: float, inward: np.ndarray, reflectance: float,
+    corner: np.ndarray,
+    along: np.ndarray,
+    height: float,
+    inward: np.ndarray,
+    reflectance: float,
     ground: float,
-) -> Mesh:  # fmt: skip
+) -> Mesh:
     """Mesh of a house front with a plain ground floor and rows of recessed windows above.
 
     Parameters
@@ -59,7 +63,9 @@ def facade(
     ground : float
         Height of the ground floor. Units: m.
     """
-    storey, bay = 3.0, 2.6  # m: height and width of what holds a window
+    # m: height and width of what holds a window
+    storey = 3.0
+    bay = 2.6
     rows = max(0, int((height - ground) // storey))
     if rows == 0:
         return quads(corner, along, height * UP, reflectance)
@@ -72,7 +78,8 @@ def facade(
         reflectance,
     )
     column, row = np.meshgrid(np.arange(columns), np.arange(rows))
-    u, v = along / columns, storey * UP
+    u = along / columns
+    v = storey * UP
     cell = corner + ground * UP + column.reshape(-1, 1) * u + row.reshape(-1, 1) * v
     return Mesh.concatenate([plain, _windows(cell, u, v, 0.18 * inward, reflectance)])
 
@@ -82,7 +89,9 @@ def _windows(cell, u, v, depth, reflectance, glass=0.1):
 
     glass: reflectance of a pane off its mirror direction. Units: m.
     """
-    window, wu, wv = cell + 0.25 * u + 0.25 * v, 0.5 * u, 0.5 * v
+    window = cell + 0.25 * u + 0.25 * v
+    wu = 0.5 * u
+    wv = 0.5 * v
     frame_and_reveal = [
         quads(cell, u, 0.25 * v, reflectance),
         quads(cell + 0.75 * v, u, 0.25 * v, reflectance),
@@ -115,7 +124,9 @@ def house(
         Of the eaves above the lower corner. Units: m.
     reflectance : float
     """
-    depth, ridge = 8.0, 2.5  # m: from front to back, and of the roof above the eaves
+    # m: from front to back, and of the roof above the eaves
+    depth = 8.0
+    ridge = 2.5
     base = np.array([near[0], near[1], min(near[2], far[2]) - 0.5])
     along = (far - near) * [1.0, 1.0, 0.0]
     height = height + 0.5
@@ -223,7 +234,8 @@ def car(place: np.ndarray, forward: np.ndarray, right: np.ndarray, reflectance: 
     above = np.array([0.25, 0.25, 0.65, 0.85, 1.4, 1.42, 0.95, 0.85])[:, None]  # m, of the ground
     outline = place + ahead * forward + above * UP
     middle = place + 0.7 * UP
-    near, far = outline - width / 2 * right, outline + width / 2 * right
+    near = outline - width / 2 * right
+    far = outline + width / 2 * right
     skin = four_corners(near, np.roll(near, -1, 0), np.roll(far, -1, 0), far, reflectance)
     sides = [
         np.stack([np.broadcast_to(m, s.shape), s, np.roll(s, -1, 0)], axis=1)

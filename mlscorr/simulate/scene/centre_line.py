@@ -138,7 +138,10 @@ def winding_line(
     wave = 0.85 * np.sin(s / bend + phase[0]) + 0.15 * np.sin(2.2 * s / bend + phase[1])
     heading = phase[3] + swing * wave
     hill = max(40.0, 5.0 * speed)
-    height = np.zeros_like(s) if kind == "river" else 1.2 * np.sin(s / hill + phase[2]) + slope * s
+    if kind == "river":
+        height = np.zeros_like(s)
+    else:
+        height = 1.2 * np.sin(s / hill + phase[2]) + slope * s
     plan = cumulative_trapezoid(np.column_stack([np.sin(heading), np.cos(heading)]), s, axis=0)
     curve = CubicSpline(s, np.column_stack([np.vstack([np.zeros(2), plan]), height]))
     return CentreLine(CubicSpline(s, curve(s) - curve(0.0)))

@@ -69,7 +69,8 @@ def _read_ply(path):
 
     with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
         mesh = o3d.io.read_triangle_mesh(str(path))
-    vertices, triangles = np.asarray(mesh.vertices, float), np.asarray(mesh.triangles, np.int64)
+    vertices = np.asarray(mesh.vertices, float)
+    triangles = np.asarray(mesh.triangles, np.int64)
     if 0 < len(triangles) < (faces := announced_faces(path)):
         raise ValueError(
             f"{path} is cut off: {len(triangles)} of the {faces} faces that its header announces "
@@ -80,7 +81,8 @@ def _read_ply(path):
 
 def _read_obj(path):
     """The same of an OBJ. Open3D's reader is float32, half a metre off at map coordinates."""
-    vertices, corners = [], []
+    vertices = []
+    corners = []
     with path.open(encoding="utf-8", errors="replace") as file:
         for number, text in enumerate(file, start=1):
             words = text.split()
@@ -121,7 +123,8 @@ class Ground:
         start = np.column_stack([points[:, :2], np.full(len(points), self._floor)])
         rays = np.hstack([start, np.broadcast_to(UP, start.shape)]).astype(np.float32)
         hits = self._mesh.caster.list_intersections(rays)
-        splits, height = hits["ray_splits"].numpy(), hits["t_hit"].numpy() + self._floor
+        splits = hits["ray_splits"].numpy()
+        height = hits["t_hit"].numpy() + self._floor
         return [height[a:b] for a, b in pairwise(splits)]
 
     def nearest(self, points: np.ndarray) -> np.ndarray:
@@ -137,7 +140,9 @@ class Ground:
 
 
 def _nearest(heights, height):
-    return heights[np.argmin(np.abs(heights - height))] if len(heights) else np.nan
+    if len(heights):
+        return heights[np.argmin(np.abs(heights - height))]
+    return np.nan
 
 
 def line_on_mesh(scenario: Scenario, line: CentreLine, length: float) -> CentreLine:
@@ -199,7 +204,8 @@ class MeshSite:
     beside = (2.5, 6.0)  # m from the drive to a target's post
 
     def __init__(self, scenario: Scenario, line: CentreLine, length, rng):
-        self.line, self.length = line, length
+        self.line = line
+        self.length = length
         self.mesh = read_mesh(scenario.scene, scenario.origin)
         self._ground = Ground(self.mesh)
 

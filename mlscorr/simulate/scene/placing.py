@@ -110,11 +110,13 @@ def place_targets(
     order = np.concatenate([rng.permutation(len(scenario.supports)) for _ in range(count)])
     steps = np.array([0, 0.03, -0.03, 0.08, -0.08, 0.15, -0.15, 0.25, -0.25, 0.4, -0.4])
     spots: list[TargetSpot] = []
-    kinds, unplaced = [], []
+    kinds = []
+    unplaced = []
     for i in range(count):
         kind = scenario.kinds[i % len(scenario.kinds)]
         half = _half(kind, scenario.size)
-        side, support = start_side * (-1) ** i, scenario.supports[order[i]]
+        side = start_side * (-1) ** i
+        support = scenario.supports[order[i]]
         near = np.clip(s[i] + length / count * steps, 0.0, length)
         spot = _find_spot(site, near, side, support, half, spots, rng)
         if spot is None:
@@ -161,7 +163,8 @@ def _along(scenario, count, length, rng):
             f"Give a size up to {SETTINGS.largest_target} m."
         )
     lead = min(SETTINGS.run_in, length / 4)
-    nearest, jitter = 2 - 2 * SETTINGS.jitter, SETTINGS.jitter
+    nearest = 2 - 2 * SETTINGS.jitter
+    jitter = SETTINGS.jitter
     spacing = (length - 2 * lead) / count
     half = max(_half(kind, scenario.size) for kind in scenario.kinds)
     across = 2 * np.sqrt(2) * half + SETTINGS.target_clearance
@@ -206,7 +209,8 @@ def _tell_unplaced(places, count):
 def _faced(spot, yaw, rng):
     """A post's TargetSpot turned about the vertical towards the oblique beams of a scan plane."""
     turn = rng.uniform(0.0, 1.0) * np.clip(yaw, -np.radians(35.0), np.radians(35.0))
-    cos, sin = np.cos(turn), np.sin(turn)
+    cos = np.cos(turn)
+    sin = np.sin(turn)
     u = np.array([cos * spot.u[0] - sin * spot.u[1], sin * spot.u[0] + cos * spot.u[1], 0.0])
     return replace(spot, u=u)
 

@@ -70,7 +70,9 @@ def quads(corner: np.ndarray, u: np.ndarray, v: np.ndarray, reflectance: float) 
     >>> len(quads(np.zeros((5, 3)), [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], 0.5))
     10
     """
-    corner, u, v = np.asarray(corner), np.asarray(u), np.asarray(v)
+    corner = np.asarray(corner)
+    u = np.asarray(u)
+    v = np.asarray(v)
     return four_corners(corner, corner + u, corner + u + v, corner + v, reflectance)
 
 
@@ -106,7 +108,8 @@ def post(foot: np.ndarray, height: float, width: float, reflectance: float) -> M
         Of its square. Units: m.
     reflectance : float
     """
-    u, v = np.array([width, 0.0, 0.0]), np.array([0.0, width, 0.0])
+    u = np.array([width, 0.0, 0.0])
+    v = np.array([0.0, width, 0.0])
     return box(foot - (u + v) / 2, u, v, height * UP, reflectance)
 
 

@@ -11,7 +11,8 @@ from mlscorr.gap.residuals import background
 @pytest.mark.long
 def test_the_effect_that_acts_leaves_least(late):
     "Of five effects the clock, which acts, takes the systematic gap away; others leave a third"
-    rows, rng = late.rows, np.random.default_rng(1)
+    rows = late.rows
+    rng = np.random.default_rng(1)
     inference = infer_causes(rows, background(rows, late.survey), late.survey, late.signs, rng, 20)
     alone = lone_effects(rows, late.signs, inference, rng)
     assert alone[0].effect == "time_offset"

@@ -12,7 +12,8 @@ from mlscorr.gap.evidence._error_models import STATED
 def case():
     "300 innovations of 5 folds and two columns of sizes 0.2 and -0.1 m"
     rng = np.random.default_rng(5)
-    columns, fold = 30 * rng.standard_normal((300, 2)), np.arange(300) % 5
+    columns = 30 * rng.standard_normal((300, 2))
+    fold = np.arange(300) % 5
     return CrossFit(columns, fold, 5), columns @ [0.2, -0.1] + rng.standard_normal(300)
 
 
@@ -42,7 +43,8 @@ def test_without_folds_all_tell(case):
 
 def test_drift_is_allowed_for(late):
     "Found among the drift of the POS, the clock's 6 ms come out to a quarter in each fold"
-    observed, rows = late.observations, late.rows
+    observed = late.observations
+    rows = late.rows
     column = next(sign for sign in late.signs if sign.name == "time_offset").jacobian
     residual = observed.columns(rows.residual[:, None])[:, 0]
     fold = (rows.gps_time[observed.row] // 5.0).astype(int) % 5

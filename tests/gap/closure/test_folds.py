@@ -21,8 +21,9 @@ def test_blocks_are_short_enough_for_an_event(late):
     event = next(sign for sign in late.signs if "width" in sign.fixed)
     narrow = replace(cause, parts=((event, np.zeros(3)),))
     for tested, length in (
-        (cause, SETTINGS.block_length), (narrow, SETTINGS.event_share * event.fixed["width"])
-    ):  # fmt: skip
+        (cause, SETTINGS.block_length),
+        (narrow, SETTINGS.event_share * event.fixed["width"]),
+    ):
         block = late.folds(replace(tested, effect="none")).block
         spans = [np.ptp(late.rows.gps_time[block == b]) for b in np.unique(block)]
         assert max(spans) <= length
@@ -53,7 +54,8 @@ def test_rows_are_compared_with_what_their_fold_predicts():
 
 def test_a_cause_of_one_moment_holds_nothing_out(late):
     "A jump in the last second shifts rows of one block alone: one prediction judges all"
-    rows, bench = late.rows, Bench(late.rows, late.survey)
+    rows = late.rows
+    bench = Bench(late.rows, late.survey)
     time = float(rows.gps_time[rows.metric & late.used].max() - rows.reference.start - 1.0)
     jump = signature(bench, PositionStep, {"time": time}, np.random.default_rng(0))
     cause = replace(late.cause("time_offset"), parts=((jump, np.full(3, 0.05)),))
@@ -87,12 +89,15 @@ def inference(late, label, probability, is_hidden=False):
     return Inference(verdict, causes, (), None, None, probability, late.evidence, None)
 
 
-@pytest.mark.parametrize("label, is_hidden, expected", [
-    ("time_offset", False, "time_offset"),
-    ("none", False, "none"),
-    ("unknown", False, "lever_arm"),
-    ("unknown", True, "none"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "label, is_hidden, expected",
+    [
+        ("time_offset", False, "time_offset"),
+        ("none", False, "none"),
+        ("unknown", False, "lever_arm"),
+        ("unknown", True, "none"),
+    ],
+)
 def test_the_simulator_takes_a_known_cause(late, label, is_hidden, expected):
     "The verdict's; for unknown the best known one, or nothing where only missing targets tell"
     share = {"unknown": 0.5, "none": 0.2, "lever_arm": 0.2, "time_offset": 0.1}

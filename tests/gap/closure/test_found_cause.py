@@ -11,7 +11,8 @@ from mlscorr.gap.signatures import Bench, signature
 
 def test_check_points_at_the_moment_of_a_jump_dont_judge(late):
     "Seen within a second of it, where no used row tells before from after; all others do"
-    rows, time = late.rows, 20.0
+    rows = late.rows
+    time = 20.0
     near = np.abs(rows.gps_time - rows.reference.start - time) < 1.0
     near_2 = rows.two_times & (np.abs(rows.gps_time_2 - rows.reference.start - time) < 1.0)
     jump = signature(

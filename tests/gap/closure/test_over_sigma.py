@@ -22,7 +22,8 @@ def test_errors_that_are_simulated_are_about_one_sigma(late):
 
 def test_a_height_of_eight_sigma_is_not_closed(late):
     "Heights that are eight times their simulated sigma are said so, easting and northing are not"
-    folds, rows = late.folds(late.cause("time_offset")), late.rows
+    folds = late.folds(late.cause("time_offset"))
+    rows = late.rows
     up = rows.covariates["axis"] == 2
     moved = np.where(up & rows.metric, rows.residual + 0.2, rows.residual)
     late_and_high = replace(rows, residual=moved)
@@ -48,10 +49,12 @@ def test_planes_of_two_passes_tell_nothing_of_sigma(case):
     nothing = [Predicted.nothing(r) for r in (rows, kept)]
     errors = [
         errors_over_sigma(
-            r, o, Folds(*np.zeros((2, len(r)), int), (p,), "", p, np.zeros((len(r), 0))),
+            r,
+            o,
+            Folds(*np.zeros((2, len(r)), int), (p,), "", p, np.zeros((len(r), 0))),
             np.random.default_rng(1),
         )
         for r, o, p in zip((rows, kept), (both, single), nothing, strict=True)
-    ]  # fmt: skip
+    ]
     assert rows.two_times.sum() > 50
     assert errors[0].before == pytest.approx(errors[1].before, rel=0.05)

@@ -33,11 +33,10 @@ def wall(rng, kind="circle", centre=CENTRE, noise=0.003):
     along, up = (grid.ravel() for grid in np.meshgrid(axis, axis, indexing="ij"))
     xyz = CENTRE + np.column_stack([rng.normal(0.0, noise, len(along)), along, up])
     apart = xyz[:, 1:] - centre[1:]
-    inside = (
-        np.hypot(*apart.T) <= SIZE / 2
-        if kind == "circle"
-        else np.abs(apart).max(axis=1) <= SIZE / 2
-    )
+    if kind == "circle":
+        inside = np.hypot(*apart.T) <= SIZE / 2
+    else:
+        inside = np.abs(apart).max(axis=1) <= SIZE / 2
     intensity = np.where(inside, 20_000.0, 3_000.0) * rng.normal(1.0, 0.05, len(along))
     return PointCloud(xyz, START + 2.0 + along / 5.0, intensity)
 
@@ -93,7 +92,8 @@ def simulated_points(case):
 def refitted(case, simulated):
     "Residuals (m,), NaN where nothing was filled in"
     survey, _, rows, beams = case
-    residual, views = np.full(len(rows), np.nan), _views_of(rows, beams)
+    residual = np.full(len(rows), np.nan)
+    views = _views_of(rows, beams)
     refit_targets(residual, rows, survey, beams, views, simulated, np.random.default_rng(1))
     return residual
 
@@ -107,7 +107,8 @@ def test_residuals_are_found_less_surveyed(case, simulated):
     "All points 3 cm to the east raise the residuals by 3 cm along the east, to 1 mm"
     rows, (xyz, *others) = case[2], simulated
     shift = np.array([0.03, 0.0, 0.0])
-    before, after = refitted(case, simulated), refitted(case, (xyz + shift, *others))
+    before = refitted(case, simulated)
+    after = refitted(case, (xyz + shift, *others))
     on = rows.channel == "target"
     known = np.isfinite(before) & np.isfinite(after)
     assert known[on].mean() > 0.9 and not known[~on].any()
@@ -136,8 +137,9 @@ def test_what_is_known_much_worse_than_observed_is_not_compared(case, simulated)
     thin = kept & (rng.random(len(kept)) < 0.08)
     sure = replace(rows, noise=np.full(len(rows), 1e-8))
     strict = refitted((survey, read, sure, beams), (xyz, thin, *others))
-    vague = refitted((survey, read, replace(rows, noise=np.ones(len(rows))), beams),
-                     (xyz, thin, *others))  # fmt: skip
+    vague = refitted(
+        (survey, read, replace(rows, noise=np.ones(len(rows))), beams), (xyz, thin, *others)
+    )
     assert np.isfinite(strict).sum() < np.isfinite(vague).sum()
     both = np.isfinite(strict)
     np.testing.assert_array_equal(strict[both], vague[both])

@@ -131,7 +131,8 @@ def test_large_effects_are_not_linear(case, without):
     lost = np.isnan(step) & (rows.channel == "surface")
     assert lost.sum() > 20
     turn = make_effect("boresight", magnitude=[2.0, 0.0, 0.0])
-    changed, linear = run(case, turn) - without, Bench(rows, survey).change(turn).shift
+    changed = run(case, turn) - without
+    linear = Bench(rows, survey).change(turn).shift
     shared = rows.channel == "shared"
     assert np.nanmax(np.abs(changed - linear)[shared]) > 5e-3
 

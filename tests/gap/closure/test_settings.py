@@ -6,7 +6,8 @@ import pytest
 from mlscorr.gap.closure._settings import SETTINGS
 from mlscorr.simulate import SETTINGS as SIMULATION
 
-board_edge, hole_board = SIMULATION.board_edge, SIMULATION.hole_board
+board_edge = SIMULATION.board_edge
+hole_board = SIMULATION.hole_board
 
 
 @pytest.mark.parametrize("size", [0.3, 0.6, 1.0])

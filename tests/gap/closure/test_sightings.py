@@ -67,13 +67,16 @@ def test_the_board_of_a_disc_stands_upright():
     np.testing.assert_allclose(np.abs(level[2]), [0.0, 0.0, 1.0], atol=1e-12)
 
 
-@pytest.mark.parametrize("kind, bright, dark, missing", [
-    ("circle", [(0.0, 0.0), (0.29, 0.0)], [(0.0, 0.32)], [(0.0, 1.0)]),
-    ("square", [(0.29, 0.29), (0.0, 0.0)], [], [(0.31, 0.0)]),
-    ("hole", [(0.0, 0.35)], [], [(0.0, 0.0), (0.2, 0.2), (0.0, 1.0)]),
-    ("checkerboard", [(0.1, 0.1), (-0.2, -0.1)], [(0.1, -0.1), (-0.2, 0.1)], [(0.31, 0.0)]),
-    ("board", [(0.29, -0.29)], [], [(0.0, 0.31)]),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "kind, bright, dark, missing",
+    [
+        ("circle", [(0.0, 0.0), (0.29, 0.0)], [(0.0, 0.32)], [(0.0, 1.0)]),
+        ("square", [(0.29, 0.29), (0.0, 0.0)], [], [(0.31, 0.0)]),
+        ("hole", [(0.0, 0.35)], [], [(0.0, 0.0), (0.2, 0.2), (0.0, 1.0)]),
+        ("checkerboard", [(0.1, 0.1), (-0.2, -0.1)], [(0.1, -0.1), (-0.2, 0.1)], [(0.31, 0.0)]),
+        ("board", [(0.29, -0.29)], [], [(0.0, 0.31)]),
+    ],
+)
 def test_paint_is_where_the_target_has_it(kind, bright, dark, missing):
     "White, black and nothing at places of a target of 0.6 m"
     board = board_of(fitted(kind), PLACE, 900.0, 100.0)
@@ -95,7 +98,8 @@ def look(kind, beside=3.0, count=41, hidden=False):
     intensity = np.where(on, np.nan_to_num(paint), 40.0)
     if hidden:  # a post before the left side
         post = place[:, 0] < -0.2
-        off, intensity = np.where(post, -2.0, off), np.where(post, 77.0, intensity)
+        off = np.where(post, -2.0, off)
+        intensity = np.where(post, 77.0, intensity)
     time = START + 1e-4 * np.arange(len(place))
     zero = np.zeros(len(place))
     pulses = RecordedPulses(time, zero, zero, distance + off, intensity, zero + 1.0)

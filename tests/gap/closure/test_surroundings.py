@@ -45,7 +45,8 @@ def test_what_is_let_go_is_about_no_target(case):
 def test_pulses_do_not_depend_on_where_chunks_end(case, size):
     "In pieces of any size, as many pulses are about targets before the sky, lost ones among them"
     survey, read, rows, _ = case
-    whole, cut = all_near(survey, sky=9.0), all_near(survey, size, sky=9.0)
+    whole = all_near(survey, sky=9.0)
+    cut = all_near(survey, size, sky=9.0)
     whole, cut = (pulses_about(near, survey, rows, read.finding) for near in (whole, cut))
     np.testing.assert_allclose(cut, whole)
 

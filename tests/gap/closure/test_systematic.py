@@ -11,10 +11,18 @@ from mlscorr.gap.evidence.columns import ColumnBlock
 from mlscorr.gap.residuals import background
 
 
-@pytest.mark.parametrize(("before", "after", "share"), [
-    (100.0, 1.0, 0.99), (100.0, 0.0, 1.0), (100.0, -47.0, 1.0), (-5.0, 10.0, -1.0),
-    (50.0, 100.0, -0.5), (0.0, 0.0, 0.0), (-3.0, -8.0, 0.0),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("before", "after", "share"),
+    [
+        (100.0, 1.0, 0.99),
+        (100.0, 0.0, 1.0),
+        (100.0, -47.0, 1.0),
+        (-5.0, 10.0, -1.0),
+        (50.0, 100.0, -0.5),
+        (0.0, 0.0, 0.0),
+        (-3.0, -8.0, 0.0),
+    ],
+)
 def test_no_share_is_more_than_all(before, after, share):
     "Signed squares of any size give a share within [-1, 1]"
     assert share_gone(before, after) == pytest.approx(share)
@@ -26,13 +34,18 @@ def gap(size, other=0.0, found=None, seed=1):
     columns = rng.standard_normal((600, 2))
     blocks = [ColumnBlock(name, i, np.array([i]), 1.0, 1.0) for i, name in enumerate("ab")]
     residual = columns @ [size, other] + rng.standard_normal(600)
-    own, fold = columns[:, :1], np.arange(600) // 10 % 5
+    own = columns[:, :1]
+    fold = np.arange(600) // 10 % 5
     cross = CrossFit(own, fold, 5)
-    sizes = cross.sizes(residual[:, None])[:-1, 0, 0] if found is None else np.full(5, found)
+    if found is None:
+        sizes = cross.sizes(residual[:, None])[:-1, 0, 0]
+    else:
+        sizes = np.full(5, found)
     explanations = Explanations.of(ColumnTable(columns, tuple(blocks)), columns)
     every = np.ones(600, bool)
-    return SystematicGap(residual, own[:, 0] * sizes[fold], own, explanations, cross, every, fold,
-                         1e-6), columns[:, 0] * size  # fmt: skip
+    return SystematicGap(
+        residual, own[:, 0] * sizes[fold], own, explanations, cross, every, fold, 1e-6
+    ), columns[:, 0] * size
 
 
 @pytest.mark.parametrize("seed", range(4))

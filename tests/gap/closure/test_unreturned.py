@@ -10,10 +10,13 @@ START = 413_200.0  # s
 
 def test_pulses_that_met_the_sky_are_known_from_those_beside_them():
     "Removed from regular lines they come back at their times and angles; from irregular ones not"
-    n, step, rate = 4000, 1e-5, 0.004
+    n = 4000
+    step = 1e-5
+    rate = 0.004
     time = START + step * np.arange(n)
     angle = np.mod(rate * np.arange(n) + np.pi, 2 * np.pi) - np.pi
-    zero, noise = np.zeros(n), 2e-4 * np.random.default_rng(1).standard_normal(n)
+    zero = np.zeros(n)
+    noise = 2e-4 * np.random.default_rng(1).standard_normal(n)
     pulses = RecordedPulses(time, angle + noise, zero, zero + 5.0, zero, zero)
     span = START - step / 2, START + (n - 0.5) * step
     about = np.abs(angle - 0.5) < 0.25

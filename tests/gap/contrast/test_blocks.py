@@ -25,7 +25,9 @@ def figures(values, block, rng):
 
 def test_the_sigma_is_that_of_blocks_and_not_of_things():
     "50 blocks of 40 things that go together: the mean scatters by 1 / root 50, over 200 worlds"
-    block, drawn, stated = np.repeat(np.arange(50), 40), [], []
+    block = np.repeat(np.arange(50), 40)
+    drawn = []
+    stated = []
     for seed in range(200):
         rng = np.random.default_rng(seed)
         values = rng.standard_normal(50)[block] + 0.1 * rng.standard_normal(len(block))

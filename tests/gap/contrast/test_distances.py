@@ -18,7 +18,8 @@ EAST = np.array([1.0, 0.0, 0.0])
 def test_the_energy_distance_is_that_of_scipy_but_for_its_bias():
     "In one dimension, of 2000 values: the square of scipy's, to its bias of 1 / n"
     rng = np.random.default_rng(0)
-    x, y = rng.standard_normal(2000), 1.0 + rng.standard_normal(2000)
+    x = rng.standard_normal(2000)
+    y = 1.0 + rng.standard_normal(2000)
     biased = scipy_distance(x, y) ** 2
     assert energy_distance(x[:, None], y[:, None]) == pytest.approx(biased, abs=3e-3)
 

@@ -65,7 +65,8 @@ def test_a_missing_pulse_is_no_edge():
 
 def test_edges_do_not_depend_on_where_chunks_end(pair):
     "A cloud in pieces of 499 points has the edges of the whole one, those at their ends among them"
-    survey, edges = pair[0], []
+    survey = pair[0]
+    edges = []
     cloud = next(read_chunks(survey.clouds[0], 200_000))
     for size in (len(cloud), 499):
         collector = EdgeCollector(survey)

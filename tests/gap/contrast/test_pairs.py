@@ -8,7 +8,8 @@ from mlscorr.gap.contrast._pairs import paired_cells
 def test_neither_cloud_is_chosen_by(pair):
     "Exchanged, the clouds give the same cells with the columns exchanged"
     survey, real, simulated = pair
-    there, back = paired_cells(survey, real, simulated), paired_cells(survey, simulated, real)
+    there = paired_cells(survey, real, simulated)
+    back = paired_cells(survey, simulated, real)
     assert np.array_equal(there.points, back.points[:, ::-1])
     assert np.array_equal(there.brightness, back.brightness[:, ::-1], equal_nan=True)
     assert np.allclose(there.range, back.range)

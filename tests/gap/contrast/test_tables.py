@@ -7,9 +7,15 @@ from mlscorr.gap.contrast.tables import Binning, ContrastTable
 
 RATIO = np.log([1.0, 0.5, 0.99])
 TABLE = ContrastTable(
-    "range", (0, 10, 20, 30), ("0 to 10", "10 to 20", "20 to 30"), np.full(3, 8.0),
-    np.full(3, 9.0), RATIO, np.array([0.01, 0.02, 1e-4]), np.full(3, 50.0),
-)  # fmt: skip
+    "range",
+    (0, 10, 20, 30),
+    ("0 to 10", "10 to 20", "20 to 30"),
+    np.full(3, 8.0),
+    np.full(3, 9.0),
+    RATIO,
+    np.array([0.01, 0.02, 1e-4]),
+    np.full(3, 50.0),
+)
 
 
 def test_a_difference_must_be_beyond_chance():

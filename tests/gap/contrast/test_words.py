@@ -14,20 +14,35 @@ EDGES = (0, 10, 20, 40, 80)
 
 def said(channel, factors):
     "What is said of a channel whose four bins of range differ by factors, in 30 blocks"
-    rng, n = np.random.default_rng(0), 120
-    away, block = np.repeat([5.0, 15.0, 30.0, 60.0], 30), np.tile(np.arange(30), 4)
+    rng = np.random.default_rng(0)
+    n = 120
+    away = np.repeat([5.0, 15.0, 30.0, 60.0], 30)
+    block = np.tile(np.arange(30), 4)
     real = np.repeat(factors, 30) * (1 + 0.01 * rng.standard_normal(n))
     split = Binning("range", away, EDGES)
     if channel == "intensity":
-        columns, figure = [np.log(real), np.ones(n)], lambda s: s[..., 0] / s[..., 1]
+        columns = [np.log(real), np.ones(n)]
     else:
-        columns, figure = [real, np.ones(n)], lambda s: s[..., 0] / s[..., 1] - 1.0
-    if channel == "density":
-        figure = lambda s: np.log(s[..., 0] / s[..., 1])  # noqa: E731
+        columns = [real, np.ones(n)]
+
+    def figure(sums):
+        ratio = sums[..., 0] / sums[..., 1]
+        if channel == "intensity":
+            return ratio
+        if channel == "density":
+            return np.log(ratio)
+        return ratio - 1.0
+
     measure = Measure(
-        channel, block, columns, figure, lambda s: (s[:, 0] / s[:, 1], np.ones(s.shape[0])),
-        weights_of(30, rng), None, (split,),
-    )  # fmt: skip
+        channel,
+        block,
+        columns,
+        figure,
+        lambda s: (s[:, 0] / s[:, 1], np.ones(s.shape[0])),
+        weights_of(30, rng),
+        None,
+        (split,),
+    )
     table, sums = measure.table(split)
     return sentence(measure, table.judged(4), sums)
 

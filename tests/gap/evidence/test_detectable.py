@@ -35,7 +35,8 @@ def test_lost_returns_are_found_beyond_what_all_patches_may_be_off_by(with_surfa
 def test_noise_that_makes_all_patches_alike_rough_hides_in_what_they_may_be_off_by(with_surface):
     "The same growth everywhere is found later than Fisher information without offset would say"
     g, signs = with_surface
-    kind, rough = kind_of(signs, "range_noise"), g.rows.channel == "roughness"
+    kind = kind_of(signs, "range_noise")
+    rough = g.rows.channel == "roughness"
     alike = replace(kind, growth=np.where(rough, np.median(kind.growth[rough]), 0.0))
     sigma = 1 / np.sqrt((alike.growth[rough] ** 2 / g.rows.noise[rough]).sum())
     plain = np.sqrt(SETTINGS.detectable * sigma)
@@ -64,8 +65,10 @@ def test_evidence_of_such_noise_is_that_of_a_bias_of_as_many_sigmas(with_surface
 def test_a_noisy_pos_is_found_where_no_drift_explains_its_noise(with_surface):
     "Residuals drawn with 2 MDB of noise of fixes: log evidence of 8.3 sigmas within a half"
     g, signs = with_surface
-    kind, observed = kind_of(signs, "position_noise"), Observations.of(g.rows, g.background)
-    size, models = size_of(g, kind, 2.0), error_models()
+    kind = kind_of(signs, "position_noise")
+    observed = Observations.of(g.rows, g.background)
+    size = size_of(g, kind, 2.0)
+    models = error_models()
     stated = observed.columns(g.rows.residual[:, None])
     best = max(models, key=lambda model: model_likelihood(observed, model, stated)[0])
     noisy = replace(best, fixes=size)
@@ -87,7 +90,8 @@ def test_one_patch_can_not_say_that_all_returns_are_lost(with_surface):
     "A single return rate, which may be odd: no share of lost returns shows as 20 MDB"
     g, signs = with_surface
     lone = np.append(np.flatnonzero(g.rows.metric), np.argmax(g.rows.channel == "return_rate"))
-    rows, whole = g.rows.select(lone), kind_of(signs, "dropout")
+    rows = g.rows.select(lone)
+    whole = kind_of(signs, "dropout")
     columns = {name: getattr(whole, name)[lone] for name in ("jacobian", "variance", "growth")}
     observed = Observations.of(rows, background(rows, g.survey))
     assert np.isnan(detectable_size(rows, observed, replace(whole, **columns), 20.0))

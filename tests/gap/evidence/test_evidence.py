@@ -22,8 +22,10 @@ from tests.beds.gap_inference import surveyed
 
 def test_evidence_is_the_likelihood_with_the_amplitudes_integrated():
     "Closed form against the normal density of covariance I + s^2 A A^T, averaged over s"
-    rng, sizes = np.random.default_rng(3), SETTINGS.amplitudes
-    a, r = 30 * rng.standard_normal((50, 3)), rng.standard_normal(50) * 3
+    rng = np.random.default_rng(3)
+    sizes = SETTINGS.amplitudes
+    a = 30 * rng.standard_normal((50, 3))
+    r = rng.standard_normal(50) * 3
     gain = block_gain((a.T @ a)[None], (a.T @ r)[None, :, None], sizes)[0, 0]
     each = []
     for s in sizes:
@@ -35,7 +37,8 @@ def test_evidence_is_the_likelihood_with_the_amplitudes_integrated():
 def test_without_the_drift_in_the_covariance_a_clean_survey_alarms(with_surface):
     "White residuals and nothing else: some effect explains the drift of any survey"
     g, signs = with_surface
-    rows, observed = surveyed(g, 20), Observations.of(g.rows, g.background)
+    rows = surveyed(g, 20)
+    observed = Observations.of(g.rows, g.background)
     columns = column_table(rows, signs, (), observed.sigma)
     residual = observed.columns(rows.residual[:, None])
     white = weigh_blocks(observed, [ErrorModel(scale=1e-3)], residual, columns)
@@ -63,7 +66,8 @@ def test_the_order_of_rows_and_the_zero_of_time_do_not_matter(with_surface):
 def test_an_unknown_error_that_a_known_effect_makes_is_not_unknown(with_surface):
     "A range error in proportion to the range is range_scale, as long as that is in the library"
     g, signs = with_surface
-    unknown, observed = unknown_blocks(g.rows, g.survey), Observations.of(g.rows, g.background)
+    unknown = unknown_blocks(g.rows, g.survey)
+    observed = Observations.of(g.rows, g.background)
     leads = []
     for library in (signs, tuple(s for s in signs if s.name != "range_scale")):
         kept = without_known(observed, column_table(g.rows, library, unknown, observed.sigma))

@@ -48,7 +48,8 @@ def test_scatter_that_is_predicted_is_no_gap(with_surface):
     "Roughness of 1 + growth times the believed variance leaves nothing once it is predicted"
     rows = with_surface[0].rows
     growth = np.where(rows.channel == "roughness", 0.7, 0.0)
-    residual, nothing = np.log1p(growth)[:, None], Predicted.nothing(rows)
+    residual = np.log1p(growth)[:, None]
+    nothing = Predicted.nothing(rows)
     predicted = Predicted(nothing.shift, growth, nothing.extra)
     before, after = (scatter_terms(rows, each, residual) for each in (nothing, predicted))
     rough = growth > 0

@@ -13,10 +13,8 @@ from tests.beds.gap_inference import named, surveyed
 def test_noise_is_named_alone_and_found_again_beside_a_cause(with_surface):
     "range_noise shows in the roughness, with and without a range bias"
     g, signs = with_surface
-    noise, bias = (
-        make_effect("range_noise", magnitude=0.006),
-        make_effect("range_bias", magnitude=0.02),
-    )
+    noise = make_effect("range_noise", magnitude=0.006)
+    bias = make_effect("range_bias", magnitude=0.02)
     assert named(surveyed(g, 35, noise), g, signs).label == "range_noise"
     both = named(surveyed(g, 35, noise, bias), g, signs).label
     assert set(both.split("+")) == {"range_noise", "range_bias"}

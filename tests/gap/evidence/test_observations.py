@@ -28,8 +28,9 @@ def test_whitens_as_the_covariance_written_out_does(bed, request):
         v = dense(g, model)
         plain = columns[g.rows.metric].T @ np.linalg.solve(v, columns[g.rows.metric])
         scale = np.sqrt(np.diag(plain))
-        assert np.allclose(white.product(white) / np.outer(scale, scale),
-                           plain / np.outer(scale, scale), atol=2e-3)  # fmt: skip
+        assert np.allclose(
+            white.product(white) / np.outer(scale, scale), plain / np.outer(scale, scale), atol=2e-3
+        )
         determinants.append([factor.log_determinant, np.linalg.slogdet(v)[1]])
     fast, plain = np.diff(determinants, axis=0)[0]
     assert fast == pytest.approx(plain, abs=0.2)

@@ -39,7 +39,8 @@ def test_two_models_that_disagree_widen_the_covariance(with_surface):
     observed = Observations.of(g.rows, g.background)
     jacobian = next(s for s in signs if s.name == "range_bias").jacobian
     residual = np.random.default_rng(2).normal(scale=0.05, size=len(g.rows))
-    column, r = observed.columns(jacobian), observed.columns(residual[:, None])[:, 0]
+    column = observed.columns(jacobian)
+    r = observed.columns(residual[:, None])[:, 0]
     models = [STATED, STATED.__class__(scale=0.4, time=0.1)]
     first, second = (fit_amplitudes(observed, [m], np.zeros(1), r, column) for m in models)
     both = fit_amplitudes(observed, models, np.zeros(2), r, column)

@@ -15,7 +15,12 @@ def test_quantile_and_band_are_those_of_the_confidence():
 
 def test_priors_are_shares():
     "Of kinds of labels, of shapes, of noise and of roughness they sum to one each"
-    shares = (dict(SETTINGS.prior).values(), dict(SETTINGS.noise_scales).values(),
-              dict(SETTINGS.roughness).values(), dict(SETTINGS.roughness_common).values(),
-              dict(SETTINGS.raised).values(), [shape[2] for shape in SETTINGS.shapes])  # fmt: skip
+    shares = (
+        dict(SETTINGS.prior).values(),
+        dict(SETTINGS.noise_scales).values(),
+        dict(SETTINGS.roughness).values(),
+        dict(SETTINGS.roughness_common).values(),
+        dict(SETTINGS.raised).values(),
+        [shape[2] for shape in SETTINGS.shapes],
+    )
     assert [sum(share) for share in shares] == pytest.approx([1.0] * len(shares))

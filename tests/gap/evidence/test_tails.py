@@ -31,7 +31,8 @@ def test_the_likelihood_with_odd_values_is_that_of_the_mixture():
 def test_an_offset_that_all_share_is_integrated_over():
     "Laplace's approximation against the normal density with the offset in its covariance"
     rng = np.random.default_rng(7)
-    values, variance = 0.3 + 0.1 * rng.standard_normal((60, 1)), np.full(60, 0.01)
+    values = 0.3 + 0.1 * rng.standard_normal((60, 1))
+    variance = np.full(60, 0.01)
     told = fit_mixture(values, np.zeros(60), variance, 1e-9)
     v = np.diag(variance) + 0.2**2
     plain = -0.5 * (

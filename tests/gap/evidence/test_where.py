@@ -46,7 +46,8 @@ def test_a_bump_is_shown_when_it_is_not_when_it_surprises(with_surface, middle):
 def test_an_error_in_a_band_of_ranges_is_shown_there(with_surface):
     "3 cm of range between 10 and 13 m, which no effect is: the stretch of ranges to 0.7 m"
     g, signs = with_surface
-    rows, away = g.rows, g.rows.covariates["range"]
+    rows = g.rows
+    away = g.rows.covariates["range"]
     views = displacements(rows, g.survey)
     beam = {item: views.directions["beam"][k] for k, item in enumerate(views.item)}
     inside = np.flatnonzero(rows.metric & (away >= 10.0) & (away <= 13.0))

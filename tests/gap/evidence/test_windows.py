@@ -34,7 +34,8 @@ def survey():
 
 def drifting(g, residual, bursts, rate=0.02):
     "Residuals with an error of the position that grows by so many m/s until each window's end"
-    rows, rng = g.rows, np.random.default_rng(7)
+    rows = g.rows
+    rng = np.random.default_rng(7)
     for start, length in bursts:
         way = rng.standard_normal(3)
         since = rows.gps_time - start
@@ -79,12 +80,16 @@ def test_windows_hang_on_times_not_on_their_zero(survey):
     "Another zero of time moves the windows with it"
     g, clean = survey
     residual = drifting(g, clean, WINDOWS[:1])
-    rows, back, shift = g.rows, g.background, 86_400.0
+    rows = g.rows
+    back = g.background
+    shift = 86_400.0
     moved = replace(
-        g, rows=replace(rows, gps_time=rows.gps_time + shift),
+        g,
+        rows=replace(rows, gps_time=rows.gps_time + shift),
         background=replace(back, gps_time=back.gps_time + shift),
-    )  # fmt: skip
-    before, after = weighed(g, residual), weighed(moved, residual)
+    )
+    before = weighed(g, residual)
+    after = weighed(moved, residual)
     assert after.windows[0].start - before.windows[0].start == pytest.approx(shift, abs=1e-3)
     assert after.gain[0] == pytest.approx(before.gain[0], abs=1e-6)
 
@@ -94,7 +99,8 @@ def test_a_window_adds_its_covariance(survey):
     g, _ = survey
     observed = Observations.of(g.rows, g.background)
     model = replace(STATED, windows=((*WINDOWS[0], 12.0, "rise"),))
-    errors, n = observed.errors, len(observed)
+    errors = observed.errors
+    n = len(observed)
     apart = errors.gps_time[:, None] - errors.gps_time
     growth = window_growth(model.windows, errors.gps_time) * errors.position
     added = (growth @ growth.T) * Covariance("matern32", SETTINGS.window_time)(apart)

@@ -21,7 +21,8 @@ def world():
 
 def test_names_are_drawn_when_they_are_asked_for():
     "The given ones first, then ATTEMPTS of the pool; what nobody asks for uses up no chance"
-    rng, same = np.random.default_rng(1), np.random.default_rng(1)
+    rng = np.random.default_rng(1)
+    same = np.random.default_rng(1)
     names = names_to_try(("a", "b"), rng, ["first"])
     assert [next(names), next(names)] == ["first", str(same.choice(("a", "b")))]
     assert rng.random() == same.random()
@@ -51,7 +52,8 @@ def test_what_can_never_be_two_effects_is_none(world):
 def test_a_mechanism_moves_points_by_its_size(world):
     "Called, it makes the shift that it was sized by; no effect explains nine tenths of that"
     ruler, known = world
-    rng, mechanisms = np.random.default_rng(3), known_mechanisms()
+    rng = np.random.default_rng(3)
+    mechanisms = known_mechanisms()
     names = names_to_try(list(mechanisms), rng)
     moved, shift, like = draw_mechanism(ruler, known, names, mechanisms, 5.0, rng)
     assert shift_by(ruler, moved) == pytest.approx(shift, rel=1e-9, abs=1e-12)

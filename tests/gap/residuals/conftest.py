@@ -39,7 +39,8 @@ def survey(simulated, tmp_path_factory):
 @pytest.fixture(scope="session")
 def targets(survey):
     found = find_targets(survey)
-    matches, candidates = found.matches, found.candidates
+    matches = found.matches
+    candidates = found.candidates
     return matches.matched, candidates
 
 

@@ -32,12 +32,19 @@ def survey_of(names):
 def matches_of(survey, missing, refusals=()):
     "Matches of all targets but some"
     rows = np.array([name not in missing for name in survey.control.name])
-    points, n = survey.control[rows], int(rows.sum())
+    points = survey.control[rows]
+    n = int(rows.sum())
     observed = TargetObservations(
-        points.name, np.ones(n, int), points.position[:, 0] / 10, points.position,
-        np.tile(1e-6 * np.eye(3), (n, 1, 1)), points.normal, points.kind, points.size,
+        points.name,
+        np.ones(n, int),
+        points.position[:, 0] / 10,
+        points.position,
+        np.tile(1e-6 * np.eye(3), (n, 1, 1)),
+        points.normal,
+        points.kind,
+        points.size,
         np.full(n, 300),
-    )  # fmt: skip
+    )
     return Matches(observed, observed[:0], tuple(refusals), np.ones(n), ())
 
 

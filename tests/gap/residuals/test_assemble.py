@@ -34,7 +34,8 @@ def pulses_at(survey, looks):
 
 def rows_at(survey, looks, **more):
     item, time, place, direction, number = looks
-    zero, pulses = np.zeros(COUNT), pulses_at(survey, looks)
+    zero = np.zeros(COUNT)
+    pulses = pulses_at(survey, looks)
     points = np.full(COUNT, 30)
     channel = more.pop("channel", "surface")
     return assemble(
@@ -116,7 +117,8 @@ def test_channels_of_rows_can_differ(survey, looks):
 def test_no_rows_are_no_fault(survey, looks):
     "Of nothing there are rows of nothing, with six partials"
     none = tuple(values[:0] for values in looks)
-    zero, pulses = np.zeros(0), pulses_at(survey, looks)[:0]
+    zero = np.zeros(0)
+    pulses = pulses_at(survey, looks)[:0]
     rows = assemble(survey, "target", *none[:4], zero, zero, zero.astype(int), pulses, none[4])
     assert len(rows) == 0 and rows.partials.shape == (0, 6)
 

@@ -87,7 +87,8 @@ def test_lost_returns_are_told_from_a_thinned_cloud(survey, pairing):
 
 def test_lost_returns_have_the_variance_of_what_all_patches_lose():
     "Patches of 80 pulses that lose 3 %, a twentieth of them half: binomial, within a tenth"
-    rng, fired = np.random.default_rng(7), np.full(1000, 80)
+    rng = np.random.default_rng(7)
+    fired = np.full(1000, 80)
     share = 1.0 - rng.binomial(fired, np.where(np.arange(1000) < 50, 0.5, 0.03)) / fired
     variance = loss_variance(share, fired, np.ones(1000, dtype=bool))
     assert variance == pytest.approx(0.03 * 0.97 / 80, rel=0.12)

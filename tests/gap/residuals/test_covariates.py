@@ -8,7 +8,8 @@ from mlscorr.gap.residuals._covariates import to_scanner_or_nan
 
 def test_covariates_are_those_of_the_drive(survey, pairing):
     "Speeds to 0.3 m/s, the two headings 180 deg apart, ranges of a street, passes one and two"
-    covariates, trajectory = pairing.rows.covariates, survey.trajectory
+    covariates = pairing.rows.covariates
+    trajectory = survey.trajectory
     speed = np.gradient(trajectory.position, trajectory.gps_time, axis=0)
     speed = np.interp(pairing.rows.gps_time, trajectory.gps_time, np.linalg.norm(speed, axis=1))
     assert np.median(np.abs(covariates["speed"] - speed)) < 0.3

@@ -14,7 +14,8 @@ ARRAYS = ("channel", "item", "gps_time", "position", "direction", "residual", "n
 
 def pos_error(simulated, gps_time):
     "Recorded minus true pose at times (m,): position (m) and rotation about map axes (rad)"
-    recorded, true = simulated.trajectory.at(gps_time), simulated.true_trajectory.at(gps_time)
+    recorded = simulated.trajectory.at(gps_time)
+    true = simulated.true_trajectory.at(gps_time)
     turn = (recorded.attitude * true.attitude.inv()).as_rotvec()
     return np.hstack([recorded.position - true.position, turn])
 

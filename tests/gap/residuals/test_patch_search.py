@@ -51,7 +51,8 @@ def test_patches_do_not_depend_on_where_a_cloud_is_cut_into_chunks(survey, size,
 @pytest.mark.long
 def test_beams_that_come_late_are_not_cut_off(survey):
     "Points up to 0.4 s late, and a drive told backwards, are cut nowhere either"
-    file, rng = survey.clouds[0], np.random.default_rng(2)
+    file = survey.clouds[0]
+    rng = np.random.default_rng(2)
     (cloud,) = read_chunks(file)
     late = np.argsort(cloud.gps_time + rng.uniform(0.0, 0.4, len(cloud)))
     for order in (late, np.arange(len(cloud))[::-1]):

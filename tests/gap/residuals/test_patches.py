@@ -18,7 +18,8 @@ def test_patches_are_small_and_short(patches):
 def test_the_variance_is_that_about_the_plane(patches):
     "Of all patches whose points are kept the scatter about centre and normal is theirs, to 5 %"
     whole = np.flatnonzero(patches.points <= SETTINGS.patch_pulses)[:100]
-    ratio, counts = [], []
+    ratio = []
+    counts = []
     for i in whole:
         away = (patches.cloud[i].xyz - patches.centre[i]) @ patches.normal[i]
         counts.append(len(away) / patches.points[i])
@@ -63,7 +64,8 @@ def test_neighbours_are_kept_or_left_together(patches):
 
 def test_a_choice_of_patches_is_one_of_all_columns(patches):
     "Chosen by number, joined again: the same clouds, points and normals"
-    odd, even = patches[1::2], patches[::2]
+    odd = patches[1::2]
+    even = patches[::2]
     again = Patches.concatenate([even, odd])
     order = np.argsort(
         np.concatenate([np.arange(0, len(patches), 2), np.arange(1, len(patches), 2)])

@@ -22,7 +22,8 @@ def wall(survey, rng, bent=0.0, beyond=0.5):
     pose = survey.trajectory.at([start + 0.5])
     centre = np.floor(pose.position[0] + [6.0, 6.0, 1.0])
     centre += [beyond, 0.2, 0.2]
-    u, v = np.tile(np.linspace(-0.4, 0.4, 60), 50), np.repeat(np.linspace(-0.4, 0.4, 50), 60)
+    u = np.tile(np.linspace(-0.4, 0.4, 60), 50)
+    v = np.repeat(np.linspace(-0.4, 0.4, 50), 60)
     away = rng.normal(0.0, NOISE, 3000) + bent * u**2
     xyz = centre + np.column_stack([away, u, v])
     time = start + np.sort(rng.uniform(0.0, 0.999, 3000))

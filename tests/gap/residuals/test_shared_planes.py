@@ -36,7 +36,8 @@ def every_pair(survey, patches, correction=None):
 
 def test_a_pass_metres_off_finds_its_planes_by_a_correction(survey, patches):
     "2 m off, a pass shares the planes that it shared before, each off along its normal, to 1 mm"
-    before, shift = every_pair(survey, patches), np.array([1.4, -1.4, 0.3])
+    before = every_pair(survey, patches)
+    shift = np.array([1.4, -1.4, 0.3])
     off, correction = displaced(survey, patches, shift)
     rows = every_pair(survey, off, correction)
     np.testing.assert_array_equal(rows.gps_time, before.gps_time)

@@ -31,7 +31,8 @@ def patches():
 
 def test_pulses_of_the_same_times_are_paired_in_any_order(patches):
     "Simulated points 2 cm higher, shuffled and in chunks: each is 2 cm from its own, to 1 nm"
-    beams, rng = SimulatedBeams(patches), np.random.default_rng(3)
+    beams = SimulatedBeams(patches)
+    rng = np.random.default_rng(3)
     every = PointCloud.concatenate(patches.cloud)
     every = every[rng.permutation(60)]
     higher = cloud(every.xyz + np.array([0.0, 0.0, 0.02]), every.gps_time + 1e-9)
@@ -65,7 +66,8 @@ def test_other_times_and_places_are_no_pair(patches):
 @pytest.mark.parametrize("has_error", [False, True])
 def test_beams_metres_off_are_paired_with_a_simulator_that_has_the_error_or_not(patches, has_error):
     "2 m off by a correction, simulated points are 2 m, or nothing, from the recorded ones, to 1 nm"
-    every, shift = PointCloud.concatenate(patches.cloud), np.array([2.0, 0.0, 0.0])
+    every = PointCloud.concatenate(patches.cloud)
+    shift = np.array([2.0, 0.0, 0.0])
     trajectory = drive()
     trajectory = replace(trajectory, gps_time=trajectory.gps_time + START - 5.0 - DRIVE_START)
     survey = SimpleNamespace(trajectory=trajectory)

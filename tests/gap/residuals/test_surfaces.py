@@ -27,7 +27,8 @@ def test_a_reference_in_other_coordinates_is_refused(
 
 def test_a_pass_metres_off_meets_its_surfaces_by_a_correction(survey, patches):
     "2 m off, patches meet what they met before, each off along its normal, to 1 mm"
-    before, shift = on_reference(survey, patches), np.array([1.4, -1.4, 0.3])
+    before = on_reference(survey, patches)
+    shift = np.array([1.4, -1.4, 0.3])
     off, correction = displaced(survey, patches, shift)
     after = on_reference(survey, off, correction)
     same, at, of = np.intersect1d(before.patch, after.patch, return_indices=True)

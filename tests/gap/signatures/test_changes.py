@@ -31,11 +31,13 @@ def test_beams_that_nobody_knows_are_refused(clean):
 def test_a_jump_moves_what_was_measured_after_it_alone(clean):
     "A row two epochs before a jump of 2 m stays, later ones move by all of it, to a nanometre"
     survey, rows, _, _ = clean
-    trajectory, times = survey.trajectory, np.unique(clean[1].gps_time)
+    trajectory = survey.trajectory
+    times = np.unique(clean[1].gps_time)
     number = trajectory.segment(times)
     earlier = np.flatnonzero(number[1:] == number[:-1])[0]
     start = times[earlier] + 2 * np.median(np.diff(trajectory.gps_time))
-    size, time = (0.0, 0.0, 2.0), float(start - rows.reference.start)
+    size = (0.0, 0.0, 2.0)
+    time = float(start - rows.reference.start)
     jump = make_effect("position_step", magnitude=size, time=time)
     after = (rows.gps_time >= start) & (trajectory.segment(rows.gps_time) == number[earlier])
     shift = Bench(rows, survey).change(jump).shift

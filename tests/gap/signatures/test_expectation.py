@@ -29,7 +29,8 @@ def recorded_less_true(survey, rows, true):
 def test_a_turn_of_degrees_is_told_beyond_the_first_order(clean):
     "2 deg of boresight are off by 4 mm to the first order, with their curvature by 1 um"
     survey, rows, _, _ = clean
-    bench, size = Bench(rows, survey), np.array([0.0, 0.0, 2.0])
+    bench = Bench(rows, survey)
+    size = np.array([0.0, 0.0, 2.0])
     turn = signature(bench, effect_class("boresight"), {}, np.random.default_rng(0))
     back = make_effect("boresight", magnitude=tuple(-size))
     true = back.apply(survey.mounting, rows.reference)

@@ -33,7 +33,9 @@ def test_effects_do_to_targets_what_the_full_simulator_does(clean, name):
 def test_an_event_of_which_no_row_sees_half_has_no_signature(clean):
     "Seen 1.1 of its widths from its middle it has one, in those rows alone; 1.3 of them away none"
     survey, rows, _, _ = clean
-    kind, rng, bench = effect_class("position_bump"), np.random.default_rng(0), Bench(rows, survey)
+    kind = effect_class("position_bump")
+    rng = np.random.default_rng(0)
+    bench = Bench(rows, survey)
     last = rows.gps_time.max() - rows.reference.start
     near, far = (signature(bench, kind, {"time": last + x, "width": 1.0}, rng) for x in (1.1, 1.3))
     assert near.jacobian.max() == pytest.approx(np.exp(-0.5 * 1.1**2), rel=0.05)

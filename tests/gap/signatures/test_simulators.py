@@ -38,9 +38,14 @@ def test_a_mounting_that_the_survey_lacks_is_refused(clean):
         as_believed(replace(survey, mounting=None), beliefs_of(survey))
 
 
-@pytest.mark.parametrize(("name", "more", "total"), [
-    ("dropout", 0.05, 0.0975), ("range_noise", 0.05, 0.05 * np.sqrt(2)), ("time_offset", 0.05, 0.1),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "more", "total"),
+    [
+        ("dropout", 0.05, 0.0975),
+        ("range_noise", 0.05, 0.05 * np.sqrt(2)),
+        ("time_offset", 0.05, 0.1),
+    ],
+)
 def test_the_same_effect_again_is_joined(name, more, total):
     "Losses of what is left, noise by squares, offsets by their sum: one effect, never two"
     effect = make_effect(name, magnitude=more)

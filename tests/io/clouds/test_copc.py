@@ -64,7 +64,8 @@ def xyz_of(points):
 
 def nodes_of(reader):
     "Nodes of a COPC with the coordinates (m) and times (s) of their points, decoded one by one"
-    header, nodes = reader.header, []
+    header = reader.header
+    nodes = []
     laszip = bytes(reader.laszip_vlr.record_data)
     for node in load_octree_for_query(reader.source, reader.copc_info, reader.root_page):
         reader.source.seek(node.offset)
@@ -159,7 +160,8 @@ def test_a_survey_in_copc_is_corrected_as_in_laz(street, tmp_path):
     toml = (folder / FILE_NAME).read_text().replace("pass-1.laz", "pass-1.copc.laz")
     (folder / FILE_NAME).write_text(toml)
     before = (folder / "pass-1.copc.laz").read_bytes()
-    reports, clouds = [], []
+    reports = []
+    clouds = []
     for source, name in ((street, "pass-1.laz"), (folder, "pass-1.copc.laz")):
         out = tmp_path / name
         run = CliRunner().invoke(app, ["correct", str(source), "-o", str(out), "--no-report"])
@@ -184,7 +186,8 @@ def test_a_corrected_copc_is_a_copc(pair, shift, tmp_path, monkeypatch):
     monkeypatch.setattr("mlscorr.io.clouds._copc_writer.SETTINGS", SMALL)
     laz = laspy.read(moved(pair[0], tmp_path / "out.laz", shift))
     with CopcReader.open(str(moved(pair[1], tmp_path / "out.copc.laz", shift))) as reader:
-        nodes, info = nodes_of(reader), reader.copc_info
+        nodes = nodes_of(reader)
+        info = reader.copc_info
         assert np.array_equal(rows_of(reader.query()), rows_of(laz.points))
     assert sum(node.point_count for node, *_ in nodes) == POINTS
     for node, xyz, times in nodes:
@@ -205,7 +208,8 @@ def test_levels_are_samples_of_the_cloud(pair, tmp_path, monkeypatch):
     monkeypatch.setattr("mlscorr.io.clouds._octree.SETTINGS", SMALL)
     monkeypatch.setattr("mlscorr.io.clouds._copc_writer.SETTINGS", SMALL)
     with CopcReader.open(str(moved(pair[1], tmp_path / "out.copc.laz"))) as reader:
-        nodes, info = nodes_of(reader), reader.copc_info
+        nodes = nodes_of(reader)
+        info = reader.copc_info
         corner = info.center - info.halfsize
         for level in range(2):
             points = xyz_of(reader.query(level=level))
@@ -233,7 +237,9 @@ def test_points_at_one_place_end_in_one_node(pair, tmp_path, monkeypatch):
     "No halving parts what has the same coordinates: the smallest node takes it all"
     monkeypatch.setattr("mlscorr.io.clouds._octree.SETTINGS", SMALL)
     las = laspy.read(pair[0])
-    las.X[: POINTS // 2], las.Y[: POINTS // 2], las.Z[: POINTS // 2] = 7, 8, 9
+    las.X[: POINTS // 2] = 7
+    las.Y[: POINTS // 2] = 8
+    las.Z[: POINTS // 2] = 9
     las.write(tmp_path / "in.laz")
     copc = write_copc(tmp_path / "in.laz", tmp_path / "in.copc.laz")
     with CopcReader.open(str(moved(copc, tmp_path / "out.copc.laz"))) as reader:

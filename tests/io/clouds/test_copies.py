@@ -8,7 +8,9 @@ from mlscorr.io.clouds import copies, find_copies
 from tests.beds.copc_files import write_copc
 from tests.beds.foreign_clouds import write_e57
 
-EAST, NORTH, START = 532_000.0, 3_374_000.0, 413_200.0
+EAST = 532_000.0
+NORTH = 3_374_000.0
+START = 413_200.0
 WEEK = 604_800.0 * 2300
 POINTS = 3_000
 
@@ -22,7 +24,8 @@ def write_las(path, gps_time=None, order=slice(None), is_standard=False, scale=0
     rng = np.random.default_rng(3)
     place = np.array([EAST, NORTH, 40.0]) + np.round(rng.uniform(-30.0, 30.0, (POINTS, 3)), 3)
     header = laspy.LasHeader(point_format=6, version="1.4")
-    header.scales, header.offsets = [scale] * 3, [EAST, NORTH, 0.0]
+    header.scales = [scale] * 3
+    header.offsets = [EAST, NORTH, 0.0]
     header.global_encoding.gps_time_type = laspy.header.GpsTimeType(int(is_standard))
     las = laspy.LasData(header)
     las.xyz = place[order] + away
@@ -73,7 +76,8 @@ def as_e57(path, first):
 )
 def test_points_written_anew_are_a_copy(name, write, tmp_path):
     "In another format, order, time system or step: no byte of them need be the same"
-    first, copy = write_las(tmp_path / "a.las"), tmp_path / name
+    first = write_las(tmp_path / "a.las")
+    copy = tmp_path / name
     write(copy, first)
     assert find_copies([first, copy]) == {copy: first}
     assert find_copies([copy, first]) == {first: copy}

@@ -155,7 +155,8 @@ def test_a_ply_is_read_in_all_its_forms(form, tmp_path):
 
 def test_scans_of_an_e57_are_placed_and_invalid_points_left_out(tmp_path):
     "Poses are applied; marked points and those without a time are counted; rows are named"
-    fields, bad = few(), np.arange(500) % 100 == 0
+    fields = few()
+    bad = np.arange(500) % 100 == 0
     more = {
         "cartesianInvalidState": 2 * bad,
         "rowIndex": np.arange(500),
@@ -219,7 +220,8 @@ def test_a_large_cloud_is_looked_at_by_its_first_points(tmp_path, monkeypatch):
 
 def test_what_was_converted_goes_with_the_program(tmp_path):
     "No file stays in the folder for temporary files"
-    path, place = write_ply(tmp_path / "a.ply", few()), tmp_path / "temporary"
+    path = write_ply(tmp_path / "a.ply", few())
+    place = tmp_path / "temporary"
     place.mkdir()
     program = (
         "import sys; from pathlib import Path; "
@@ -259,7 +261,8 @@ def without(path, name):
 
 REFUSED = {
     "a.ply without a time": (
-        no_time, "no time of its points.* It has x, y, z, intensity, stamp: export it with gps_time"
+        no_time,
+        "no time of its points.* It has x, y, z, intensity, stamp: export it with gps_time",
     ),
     "b.ply in single precision": (
         lambda path: write_ply(path, few(), dict.fromkeys("xyz", "f4")),
@@ -270,10 +273,12 @@ REFUSED = {
         r"times \(s\) in single precision: at 413210 they are rounded to steps of 0.031",
     ),
     "d.ply cut off": (
-        lambda path: cut(path, write_ply, few()), "cut off: it holds 475 of its header's 500 points"
+        lambda path: cut(path, write_ply, few()),
+        "cut off: it holds 475 of its header's 500 points",
     ),
     "e.ply of text cut off": (
-        lambda path: cut(path, write_ply, few(), None, "ascii"), "behind point 0|cut off"
+        lambda path: cut(path, write_ply, few(), None, "ascii"),
+        "behind point 0|cut off",
     ),
     "f.ply in nanoseconds": (
         lambda path: write_ply(path, few() | {"gps_time": np.full(500, 1.7e18)}),
@@ -293,19 +298,22 @@ REFUSED = {
         "no time of its points in scan 2 of 2, .* It has cartesianX, .*: export it with the field",
     ),
     "j.e57 without places": (
-        lambda path: without(path, "cartesianY"), "Scan 2 of 2 of .* has no coordinates"
+        lambda path: without(path, "cartesianY"),
+        "Scan 2 of 2 of .* has no coordinates",
     ),
     "k.e57 in single precision": (
         lambda path: write_e57(path, [scan_of(few(), single=CARTESIAN)]),
         "coordinates .* in single precision",
     ),
     "l.e57 cut off": (
-        lambda path: cut(path, write_e57, [scan_of(few())]), r"can't be read as E57 \(.*cut off"
+        lambda path: cut(path, write_e57, [scan_of(few())]),
+        r"can't be read as E57 \(.*cut off",
     ),
     "m.e57 that is none": (
-        lambda path: path.write_bytes(bytes(5000)) and path, r"can't be read as E57 \(checksum"
+        lambda path: path.write_bytes(bytes(5000)) and path,
+        r"can't be read as E57 \(checksum",
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize(("write", "message"), REFUSED.values(), ids=REFUSED)

@@ -53,9 +53,11 @@ def write_street(path, point_format=6, points=12_345, nan=0, evlrs=True):
     "A file with random values in every field, extra bytes, a WKT, an unknown VLR and EVLRs"
     rng = np.random.default_rng(point_format)
     header = laspy.LasHeader(point_format=point_format)
-    header.scales, header.offsets = [0.001, 0.001, 0.0005], CORNER
+    header.scales = [0.001, 0.001, 0.0005]
+    header.offsets = CORNER
     header.global_encoding.value |= 0x10 if point_format >= 6 else 0
-    header.system_identifier, header.file_source_id = "line scanner", 77
+    header.system_identifier = "line scanner"
+    header.file_source_id = 77
     header.add_extra_dim(laspy.ExtraBytesParams("amplitude", "f4", "dB"))
     header.add_extra_dim(laspy.ExtraBytesParams("ring", "u2"))
     header.vlrs.append(laspy.VLR("somebody", 4711, "no one knows", b"\1\2\3"))
@@ -84,7 +86,8 @@ def is_flagged(las):
 
 def assert_same_but_coordinates(before, after):
     "All that laspy can read of two files is equal, X, Y, Z and the bounds excepted"
-    old, new = laspy.read(before), laspy.read(after)
+    old = laspy.read(before)
+    new = laspy.read(after)
     for name in old.point_format.dimension_names:
         if name not in "XYZ":
             assert np.asarray(old[name]).tobytes() == np.asarray(new[name]).tobytes(), name
@@ -109,12 +112,14 @@ def assert_same_but_coordinates(before, after):
 @pytest.mark.parametrize("name", SAMPLES)
 def test_a_zero_correction_returns_real_files_unchanged(name, tmp_path):
     "A zero correction leaves every bit of every point of real files, and every record, as it was"
-    path, target = shared("data", "las_samples", name), tmp_path / name
+    path = shared("data", "las_samples", name)
+    target = tmp_path / name
     assert write_corrected(cloud_of(path), target, covering(path)) == 0
     assert laspy.read(target).points.array.tobytes() == laspy.read(path).points.array.tobytes()
     assert_same_but_coordinates(path, target)
     if target.suffix == ".las":
-        old, new = bytearray(path.read_bytes()), bytearray(target.read_bytes())
+        old = bytearray(path.read_bytes())
+        new = bytearray(target.read_bytes())
         old[BOUNDS] = new[BOUNDS]
         assert old == new
 
@@ -136,7 +141,8 @@ def test_compressing_and_expanding_gives_the_same_file(tmp_path):
     path = write_street(tmp_path / "a.las")
     write_corrected(cloud_of(path), tmp_path / "b.laz", covering(path))
     write_corrected(cloud_of(tmp_path / "b.laz"), tmp_path / "c.las", covering(path))
-    old, new = bytearray(path.read_bytes()), bytearray((tmp_path / "c.las").read_bytes())
+    old = bytearray(path.read_bytes())
+    new = bytearray((tmp_path / "c.las").read_bytes())
     old[BOUNDS] = new[BOUNDS]
     assert old == new
 
@@ -159,7 +165,8 @@ def test_waveforms_behind_the_points_are_kept(suffix, tmp_path):
     data = bytearray(write_street(tmp_path / "in.las", 4).read_bytes())
     data[6] |= 2
     struct.pack_into("<Q", data, 227, len(data))
-    path, target = tmp_path / "waves.las", tmp_path / f"out{suffix}"
+    path = tmp_path / "waves.las"
+    target = tmp_path / f"out{suffix}"
     path.write_bytes(bytes(data) + b"waveforms" * 1000)
     write_corrected(cloud_of(path), target, covering(path))
     out = target.read_bytes()
@@ -168,8 +175,10 @@ def test_waveforms_behind_the_points_are_kept(suffix, tmp_path):
 
 def test_a_known_shift_is_recovered(tmp_path):
     "A shift of decimetres is found again in each point to half the file's scale, and in bounds"
-    path, target = write_street(tmp_path / "in.laz"), tmp_path / "out.laz"
-    done, flagged = [], []
+    path = write_street(tmp_path / "in.laz")
+    target = tmp_path / "out.laz"
+    done = []
+    flagged = []
 
     def watch(times, is_noise):
         done.append(times)
@@ -177,7 +186,8 @@ def test_a_known_shift_is_recovered(tmp_path):
 
     assert write_corrected(cloud_of(path), target, covering(path, SHIFT), watch) == 0
     assert np.array_equal(np.concatenate(flagged), is_flagged(laspy.read(path)))
-    old, new = laspy.read(path), laspy.read(target)
+    old = laspy.read(path)
+    new = laspy.read(target)
     half_scale = 0.5 * old.header.scales + 1e-9  # m
     assert (np.abs(new.xyz - old.xyz - SHIFT) <= half_scale).all()
     assert np.array_equal(new.header.mins, new.xyz.min(axis=0))
@@ -234,12 +244,14 @@ def test_samples_are_spread_over_the_file(suffix, tmp_path):
 
 def test_points_outside_are_counted_and_left_alone(tmp_path):
     "Points before, behind and in a gap of the trajectory are counted and keep their coordinates"
-    path, target = write_street(tmp_path / "in.laz"), tmp_path / "out.laz"
+    path = write_street(tmp_path / "in.laz")
+    target = tmp_path / "out.laz"
     epochs = np.concatenate([np.arange(2.0, 8.0, 0.01), np.arange(11.0, 18.0, 0.01)])
     constant = 1_400_000_000.0
     moved = correction(START + constant + epochs, SHIFT)
     outside = write_corrected(cloud_of(path, constant), target, moved)
-    old, new = laspy.read(path), laspy.read(target)
+    old = laspy.read(path)
+    new = laspy.read(target)
     inside = moved.recorded.segment(old.gps_time + constant) >= 0
     assert outside == np.count_nonzero(~inside) > 1000
     assert np.array_equal(new.xyz[~inside], old.xyz[~inside])
@@ -366,7 +378,8 @@ def test_a_missing_file_is_named(tmp_path):
 
 def test_points_without_a_time_stay_as_they_are(tmp_path):
     "Points whose gps_time is NaN are read by nobody, counted as untouched, and kept to the bit"
-    path, target = write_street(tmp_path / "in.laz", nan=5), tmp_path / "out.laz"
+    path = write_street(tmp_path / "in.laz", nan=5)
+    target = tmp_path / "out.laz"
     assert np.isfinite(sample_gps_times(path)[2]).all()
     cloud = CloudFile(path, 12_345, 0.0, "week")
     is_measured = np.isfinite(laspy.read(path).gps_time) & ~is_flagged(laspy.read(path))
@@ -374,7 +387,8 @@ def test_points_without_a_time_stay_as_they_are(tmp_path):
     moved = correction(START + np.arange(-1.0, 22.0), SHIFT)
     with pytest.warns(UserWarning, match="5 of 12345 points of .*in.laz have a gps_time that is"):
         assert write_corrected(cloud, target, moved) == 5
-    old, new = laspy.read(path), laspy.read(target)
+    old = laspy.read(path)
+    new = laspy.read(target)
     assert np.array_equal(new.xyz[:5], old.xyz[:5])
     assert (np.abs(new.xyz[5:] - old.xyz[5:] - SHIFT) < 0.00051).all()  # m
 
@@ -398,7 +412,8 @@ def test_an_interrupted_write_leaves_nothing(failure, tmp_path):
 def test_a_full_disk_is_told_as_the_system_tells_it(suffix, tmp_path):
     "A file that may not grow further raises the system's OSError and leaves nothing"
     path = write_street(tmp_path / "in.laz", points=120_000)
-    cloud, correct = cloud_of(path), covering(path)
+    cloud = cloud_of(path)
+    correct = covering(path)
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1_500_000, limits[1]))
     try:
@@ -411,7 +426,8 @@ def test_a_full_disk_is_told_as_the_system_tells_it(suffix, tmp_path):
 
 def test_a_killed_write_leaves_no_target(tmp_path):
     "A process killed while it writes leaves no file under the target's name; the next succeeds"
-    path, target = write_street(tmp_path / "in.laz"), tmp_path / "out.laz"
+    path = write_street(tmp_path / "in.laz")
+    target = tmp_path / "out.laz"
     script = (
         "import os, sys; sys.path.insert(0, sys.argv[1]); "
         "from tests.io.clouds import test_las as t; "

@@ -40,7 +40,8 @@ def test_a_corrected_las_1_5_is_that_of_las_1_4(suffix, point_format, tmp_path):
     assert out.read_bytes()[6] == new.read_bytes()[6] and out.read_bytes()[6] & OFFSET_FLAG
     back = tmp_path / f"back{suffix}"
     assert from_las_1_5(out, back) == (times.max(), times.min(), 1250)
-    one, other = laspy.read(expected), laspy.read(back)
+    one = laspy.read(expected)
+    other = laspy.read(back)
     assert np.array_equal(one.points.array, other.points.array)
     assert [v.record_data_bytes() for v in one.evlrs] == [
         v.record_data_bytes() for v in other.evlrs

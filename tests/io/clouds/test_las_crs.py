@@ -18,7 +18,8 @@ PLACE = np.array([532_000.0, 3_374_000.0, 40.0])  # in UTM zone 50
 def written(path, crs=None, keys=(), place=PLACE):
     "LasLayout of a file of two points, with its CRS as WKT or as GeoKeys"
     header = laspy.LasHeader(point_format=6 if crs else 1, version="1.4" if crs else "1.2")
-    header.scales, header.offsets = [0.001] * 3, place
+    header.scales = [0.001] * 3
+    header.offsets = place
     add_crs(header, crs)
     if keys:
         rows = [(1, 1, 0, len(keys)), *((key, 0, 1, value) for key, value in keys)]
@@ -56,7 +57,10 @@ def test_wkt_and_codes_state_the_same(tmp_path):
 )
 def test_a_conflict_is_of_places_units_or_heights(stated, crs, words, tmp_path):
     "Names don't count: what puts the cloud elsewhere, or is not in metres, does"
-    place = np.array([40.0, 30.0, 5.0]) if stated == "EPSG:4326" else PLACE
+    if stated == "EPSG:4326":
+        place = np.array([40.0, 30.0, 5.0])
+    else:
+        place = PLACE
     sentence = crs_conflict(written(tmp_path / "a.las", stated, place=place), crs)
     if words is None:
         assert sentence == ""

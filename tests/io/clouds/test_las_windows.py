@@ -11,7 +11,9 @@ from mlscorr.io.clouds import read_chunks, read_layout, read_windows, spread_rec
 from mlscorr.io.clouds.las import records_at
 from mlscorr.survey import CloudFile, PointCloud
 
-POINTS, RATE = 400_000, 50_000.0  # and points a second
+# and points a second
+POINTS = 400_000
+RATE = 50_000.0
 
 
 @pytest.fixture(scope="module")
@@ -59,9 +61,11 @@ def test_a_short_file_is_read_whole_and_a_long_one_only_in_order(file, tmp_path)
 
 def test_a_file_of_more_than_2_to_the_32_points(tmp_path):
     "Numbers of points and bytes beyond 32 bits are sought and read; the file is a sparse one"
-    points, late = 5_000_000_000, 1_000
+    points = 5_000_000_000
+    late = 1_000
     header = laspy.LasHeader(point_format=6, version="1.4")
-    header.scales, header.offsets = np.full(3, 0.001), [532_000.0, 3_374_000.0, 40.0]
+    header.scales = np.full(3, 0.001)
+    header.offsets = [532_000.0, 3_374_000.0, 40.0]
     las = laspy.LasData(header)
     las.points = laspy.ScaleAwarePointRecord.zeros(late, header=header)
     las.gps_time, las.X = 357_900.0 + np.arange(late) * 1e-3, np.arange(late)

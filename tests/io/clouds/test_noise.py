@@ -7,14 +7,17 @@ import pytest
 from mlscorr.io.clouds import counted_noise, read_chunks
 from mlscorr.survey import CloudFile
 
-START, CORNER = 357_900.0, [532_000.0, 3_374_000.0, 40.0]  # s of week; UTM
+# s of week; UTM
+START = 357_900.0
+CORNER = [532_000.0, 3_374_000.0, 40.0]
 POINTS = 1_000
 
 
 def write_flagged(path, point_format):
     "A file with all classes of its format, every fifth point withheld, and what of them is noise"
     header = laspy.LasHeader(point_format=point_format)
-    header.scales, header.offsets = [0.001] * 3, CORNER
+    header.scales = [0.001] * 3
+    header.offsets = CORNER
     las = laspy.LasData(header)
     number = np.arange(POINTS)
     las.xyz = np.array(CORNER) + np.outer(number, [0.01, 0.0, 0.0])

@@ -9,7 +9,8 @@ from mlscorr.io.store import NpzWriter
 def test_blocks_become_one_array(tmp_path):
     "Of any number of rows, of vectors and of numbers, each of its own type"
     rng = np.random.default_rng(1)
-    xyz, number = rng.normal(size=(1000, 3)), rng.integers(0, 9, 1000).astype(np.int16)
+    xyz = rng.normal(size=(1000, 3))
+    number = rng.integers(0, 9, 1000).astype(np.int16)
     with NpzWriter(tmp_path / "truth.npz") as writer:
         for start, end in ((0, 1), (1, 1), (1, 700), (700, 1000)):
             writer.append("xyz", xyz[start:end])

@@ -52,7 +52,8 @@ def test_an_upload_that_is_cut_leaves_what_was_there(store, tmp_path, megabytes)
     "An object is the old one, in one part as in three, and the upload of parts is aborted"
     (tmp_path / "cut.laz").write_bytes(bytes(megabytes << 20))
     store.files.pipe_file("results/cut.laz", b"old")
-    store.lost, store.lost_after = "cut.laz", megabytes // 40
+    store.lost = "cut.laz"
+    store.lost_after = megabytes // 40
     try:
         with pytest.raises(OSError, match=r"s3://results/cut\.laz can't be reached"):
             publish(tmp_path / "cut.laz", as_path("s3://results/cut.laz"))
@@ -84,7 +85,8 @@ def test_results_of_tasks_are_kept_in_a_store(store):
     for key in ("key", "none"):
         with pytest.raises(KeyError):
             results.get("tiles", key)
-    store.lost, store.lost_after = "key.result", 0
+    store.lost = "key.result"
+    store.lost_after = 0
     try:
         with pytest.raises(OSError, match="can't be reached"):
             results.get("tiles", "key")
@@ -130,7 +132,8 @@ def test_the_lock_of_a_killed_run_is_taken_over_by_a_single_one(store):
     "A lock that nobody renews gives way after three beats; of two that wait one is refused"
     lock = as_path("s3://results/city/tasks/lock")
     store.files.pipe_file("results/city/tasks/lock", b"elsewhere, process 1\n0")
-    outcomes, refused = [], threading.Event()
+    outcomes = []
+    refused = threading.Event()
 
     def run():
         try:

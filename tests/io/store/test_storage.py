@@ -30,14 +30,17 @@ from tests.beds.foreign_clouds import points_of, write_ply
 from tests.beds.object_store import object_store
 
 CORNER = np.array([532_000.0, 3_374_000.0, 40.0])  # m
-START, RATE = 413_200.0, 1e5  # s, points/s
+# s, points/s
+START = 413_200.0
+RATE = 1e5
 
 
 @pytest.fixture(scope="module")
 def store(street, tmp_path_factory):
     "An ObjectStore whose bucket has the survey of a street, and a cloud of 1.5 million points"
     clouds = tmp_path_factory.mktemp("clouds")
-    rng, points = np.random.default_rng(3), 1_500_000
+    rng = np.random.default_rng(3)
+    points = 1_500_000
     xyz = CORNER + rng.uniform(-900, 900, (points, 3))  # nothing to compress
     times = START + np.arange(points) / RATE
     for name in ("long.laz", "long.las"):
@@ -46,7 +49,8 @@ def store(street, tmp_path_factory):
     with object_store("streets") as (store, files):
         files.put(f"{street}/", "streets/monday/", recursive=True)
         files.put(f"{clouds}/", "streets/", recursive=True)
-        store.clouds, store.files = clouds, files
+        store.clouds = clouds
+        store.files = files
         yield store
 
 
@@ -54,7 +58,8 @@ def test_a_survey_in_a_store_is_the_one_on_a_disk(store, street):
     "Trajectory, control and clouds are the same by URL, patterns and paths with .. included"
     text = (street / "survey.toml").read_text().replace('"pass-1.laz"', '"../monday/pass-?.laz"')
     store.files.pipe_file("streets/monday/other.toml", text.encode())
-    here, there = read_survey(street), read_survey("s3://streets/monday")
+    here = read_survey(street)
+    there = read_survey("s3://streets/monday")
     for far in (there, read_survey("s3://streets/monday/other.toml")):
         assert digest(here.trajectory, here.control) == digest(far.trajectory, far.control)
         assert [str(cloud.path) for cloud in far.clouds] == ["s3://streets/monday/pass-1.laz"]
@@ -90,7 +95,8 @@ def test_a_survey_elsewhere_names_its_files_by_url(store, tmp_path):
     "A survey.toml written anew on a disk, as calibrate does, reads what that in a store did"
     path = as_path("s3://streets/monday/survey.toml")
     write_survey_copy(path, tmp_path / "survey.toml", tmp_path)
-    there, copy = read_survey(path), read_survey(tmp_path)
+    there = read_survey(path)
+    copy = read_survey(tmp_path)
     assert copy.cloud_paths == there.cloud_paths
     assert digest(copy.trajectory, copy.control) == digest(there.trajectory, there.control)
 
@@ -106,7 +112,8 @@ def test_clouds_of_other_formats_are_copied_first(store, street, tmp_path):
 
 def test_a_header_and_a_window_are_read_by_ranges(store):
     "Of a LAZ of 15 MB the header takes 0.3 MB in six requests, and 0.2 s of 15 s less than 5 MB"
-    path, size = as_path("s3://streets/long.laz"), (store.clouds / "long.laz").stat().st_size
+    path = as_path("s3://streets/long.laz")
+    size = (store.clouds / "long.laz").stat().st_size
     store.requests.clear()
     layout = read_layout(path)
     header, count = store.read("long.laz")
@@ -143,7 +150,8 @@ def test_a_file_in_a_store_is_told_by_its_content(store):
     "Its ETag changes with it, not with its name, and no byte of it is read for that"
     path = as_path("s3://streets/some.bin")
     store.files.pipe_file("streets/some.bin", b"a" * 9)
-    first, named = FileIdentity.of(path), input_file("cloud", path)
+    first = FileIdentity.of(path)
+    named = input_file("cloud", path)
     store.requests.clear()
     assert FileIdentity.of(path) == first
     assert store.read("some.bin") == (0, 0)
@@ -182,7 +190,8 @@ def test_other_stores_have_the_same_interface():
 def test_a_lost_connection_is_no_damaged_file(store):
     "What the network did is said, and not that the file should be copied anew"
     layout = read_layout(as_path("s3://streets/long.laz"))
-    store.lost, store.lost_after = "long.laz", 3
+    store.lost = "long.laz"
+    store.lost_after = 3
     try:
         with pytest.raises(OSError, match=r"long\.laz can't be reached .* when tried again"):
             list(read_chunks(CloudFile(layout.path, layout.points, 0.0, "week")))

@@ -52,7 +52,8 @@ def folder(tmp_path):
 
 def write_las(path, gps_time, is_standard=False):
     header = laspy.LasHeader(point_format=6, version="1.4")
-    header.scales, header.offsets = [0.001] * 3, [532000.0, 3374000.0, 0.0]
+    header.scales = [0.001] * 3
+    header.offsets = [532000.0, 3374000.0, 0.0]
     header.global_encoding.gps_time_type = laspy.header.GpsTimeType(int(is_standard))
     las = laspy.LasData(header)
     las.x = 532000.0 + np.arange(len(gps_time))
@@ -146,7 +147,8 @@ def test_each_cloud_has_its_own_time_constant(folder):
 def test_only_a_planned_survey_may_have_no_cloud(folder):
     "Without [cloud] a survey is refused; planned, it is read"
     text = (folder / "survey.toml").read_text()
-    start, end = text.index("[cloud]"), text.index("[trajectory]")
+    start = text.index("[cloud]")
+    end = text.index("[trajectory]")
     (folder / "survey.toml").write_text(text[:start] + text[end:])
     with pytest.raises(ValueError, match="cloud is missing"):
         read_survey(folder)
@@ -755,10 +757,13 @@ def test_a_measured_lever_arm_needs_no_boresight_sigma(mounted):
         ('files = ["./pass-2.las"]', "", r"scanner\.1: files is missing"),
         ('files = ["./pass-2.las"]', "point_source_ids = [2]", r"1 of the 2 .*1.las \(2, left"),
         ("range_noise", "range_nose", r"scanner\.0\.range_nose .* scanner\.range_noise"),
-        ("[control]", "[mounting]\nlever_arm = [0, 0, 0]\nboresight = [0, 0, 0]\n[control]",
-         r"\[mounting\] is that of one scanner"),
+        (
+            "[control]",
+            "[mounting]\nlever_arm = [0, 0, 0]\nboresight = [0, 0, 0]\n[control]",
+            r"\[mounting\] is that of one scanner",
+        ),
     ],
-)  # fmt: skip
+)
 def test_scanners_that_do_not_part_the_files_are_refused(mounted, old, new, message):
     "Files of none or of two, patterns of none, doubled names, keys of one scanner: a sentence each"
     toml(mounted, old, new)

@@ -44,60 +44,71 @@ def read(folder, content, drive=None, encoding="utf-8", **section):
 LISTS = {  # what writes such a file: content, its letters, and what is understood
     "total station, blanks, no header": (
         "P1   532012.49  3373991.48  44.48\nP2   532030.00  3373978.17  44.50\n",
-        "utf-8", "easting = column 2, northing = column 3, height = column 4 (blanks",
+        "utf-8",
+        "easting = column 2, northing = column 3, height = column 4 (blanks",
     ),
     "name, northing, easting, height, code": (
         "P1,3373991.48,532012.49,44.48,GCP\nP2,3373978.17,532030.0,44.5,\n",
-        "utf-8", "easting = column 3, height = column 4 (commas, decimal point), easting and "
+        "utf-8",
+        "easting = column 3, height = column 4 (commas, decimal point), easting and "
         "northing told by the trajectory",
     ),
     "Leica, header behind a comment mark": (
         "# Infinity 4.1\n# Point Id\tEasting\tNorthing\tOrthometric Height\n"
         "P1\t532012.49\t3373991.48\t44.48\n# P9\t1\t2\t3\n\nP2\t532030.0\t3373978.17\t44.5\n",
-        "utf-8", "name = Point Id, height = Orthometric Height, easting, northing by name (tabs",
+        "utf-8",
+        "name = Point Id, height = Orthometric Height, easting, northing by name (tabs",
     ),
     "Trimble, northing first": (
         "\ufeffPoint ID,Northing,Easting,Elevation,Code\n"
         "P1,3373991.48,532012.49,44.48,\nP2,3373978.17,532030.0,44.5,x\n",
-        "utf-8", "height = Elevation, northing, easting by name (commas",
+        "utf-8",
+        "height = Elevation, northing, easting by name (commas",
     ),
     "German office, letters of Windows": (
         "Punktnr.;Rechtswert;Hochwert;Höhe\nP1;532012,49;3373991,48;44,48\n"
         "P2;532030;3373978,17;44,5\n",
-        "cp1252", "height = Höhe (semicolons, decimal comma, letters of Windows-1252)",
+        "cp1252",
+        "height = Höhe (semicolons, decimal comma, letters of Windows-1252)",
     ),
     "Gauss-Krueger habit, units in brackets": (
         "Pkt X[m] Y[m] Z[m]\nP1 3373991,48 532012,49 44,48\nP2 3373978,17 532030,00 44,50\n",
-        "utf-8", "northing = X[m], easting = Y[m], height = Z[m] (blanks, decimal comma)",
+        "utf-8",
+        "northing = X[m], easting = Y[m], height = Z[m] (blanks, decimal comma)",
     ),
     "French, units in a row": (
         "N°;Est;Nord;Altitude\n;(m);(m);(m)\nP1;532012,49;3373991,48;44,48\n"
         "P2;532030;3373978,17;44,5\n",
-        "utf-8", "name = N°, easting = Est, northing = Nord, height = Altitude",
+        "utf-8",
+        "name = N°, easting = Est, northing = Nord, height = Altitude",
     ),
     "English, abbreviated heights, codes and dates": (
         "Point Id,Easting,Northing,Ortho Ht,Code,Date/Time\n"
         "P1,532012.49,3373991.48,44.48,TGT,05/12/2026 10:11:12\n"
         "P2,532030.0,3373978.17,44.5,TGT,05/12/2026 10:14:02\n",
-        "utf-8", "name = Point Id, height = Ortho Ht",
+        "utf-8",
+        "name = Point Id, height = Ortho Ht",
     ),
     "Spanish, Excel's Unicode text": (
         "Punto\tEste\tNorte\tCota\nP1\t532012,49\t3373991,48\t44,48\n"
         "P2\t532030\t3373978,17\t44,5\n",
-        "utf-16", "height = Cota (tabs, decimal comma, letters of UTF-16)",
+        "utf-16",
+        "height = Cota (tabs, decimal comma, letters of UTF-16)",
     ),
     "Swiss, letters in names alone, remarks in brackets": (
         "Nr. Ostwert(LV95/LN02) Nordwert(LV95/LN02) Höhe Bemerkung\n"
         "----------------------------------------\n"
         "P1  532012.490  3373991.480  44.480 Tafel\nP2  532030.000  3373978.170  44.500 Säule\n",
-        "cp1252", "easting = Ostwert(LV95/LN02)",
+        "cp1252",
+        "easting = Ostwert(LV95/LN02)",
     ),
     "Chinese": (
         "点号,东坐标(m),北坐标(m),高程(m)\nP1,532012.49,3373991.48,44.48\n"
         "P2,532030,3373978.17,44.5\n",
-        "gb18030", "name = 点号, easting = 东坐标(m), northing = 北坐标(m)",
+        "gb18030",
+        "name = 点号, easting = 东坐标(m), northing = 北坐标(m)",
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("kind", LISTS)
@@ -123,8 +134,9 @@ def test_letters_of_names_are_told_apart(name, encoding, drive, tmp_path):
 @pytest.mark.parametrize("rows", [1, 180], ids=["at first", "behind the first block"])
 def test_our_own_columns_in_other_letters_are_read_and_said_alike(rows, drive, tmp_path):
     "control.csv of an office whose letters are Windows-1252 is read as in UTF-8, and that is said"
-    points = [f"{532000 + i % 40},{3374000 + i},44.5,0.003,0.004,circle,0.6,control"
-              for i in range(rows)]  # fmt: skip
+    points = [
+        f"{532000 + i % 40},{3374000 + i},44.5,0.003,0.004,circle,0.6,control" for i in range(rows)
+    ]
     names = [f"P{i}" for i in range(rows - 1)] + ["Brücke"]
     lines = [",".join(COLUMNS), *map(",".join, zip(names, points, strict=True)), ""]
     lists = {letters: read(tmp_path, "\n".join(lines), drive, letters) for letters in LETTERS}
@@ -248,9 +260,18 @@ def test_a_workbook_is_read_from_the_sheet_that_holds_the_table(drive, tmp_path)
         read_control(tmp_path / "list.xlsx", section, drive)
 
 
-@pytest.mark.parametrize("columns", [{"height": "Elevation"}, {
-    "name": 1, "easting": 2, "northing": 3, "height": 4,
-}])  # fmt: skip
+@pytest.mark.parametrize(
+    "columns",
+    [
+        {"height": "Elevation"},
+        {
+            "name": 1,
+            "easting": 2,
+            "northing": 3,
+            "height": 4,
+        },
+    ],
+)
 def test_survey_toml_chooses_columns(columns, drive, tmp_path):
     "By their names where two may be meant, or by their numbers"
     content = (
@@ -291,7 +312,7 @@ P1 = "P1;532012,49;3373991,48;44,48\n"
         ("Punkt;E;N;H\n", "header but no points"),
         ("P1;GCP;532012,49;3373991,48;44,48\n", "no header: number .*control.columns. in .* as"),
     ],
-)  # fmt: skip
+)
 def test_what_may_mean_two_things_or_nothing_is_refused(content, message, drive, tmp_path):
     "Axes, decimals, units, shifted columns, roles under another name: named, with the way out"
     with pytest.raises(ValueError, match=message):
@@ -301,11 +322,9 @@ def test_what_may_mean_two_things_or_nothing_is_refused(content, message, drive,
 def test_all_rows_that_are_wrong_are_named_at_once(drive, tmp_path):
     "Nobody mends a table a row a time: cells, names, kinds and sizes stand in the sentence"
     rows = [f"P{n};532012,49;3373991,48;44,48" for n in range(12)]
-    rows[2], rows[5], rows[8] = (
-        "P2;532012,49;hoch;44,48",
-        "P1;532012,49;tief;44,48",
-        ";532012,49;1;2",
-    )
+    rows[2] = "P2;532012,49;hoch;44,48"
+    rows[5] = "P1;532012,49;tief;44,48"
+    rows[8] = ";532012,49;1;2"
     with pytest.raises(ValueError, match="has 4 faults") as error:
         read(tmp_path, "\n".join(["Punkt;E;N;H", *rows]), drive)
     for part in ("Line 4", "'hoch'", "Line 7", "'tief'", "Line 10", "no name", "names P1 more"):

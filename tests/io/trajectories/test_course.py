@@ -21,7 +21,9 @@ from tests.beds.shared import shared
 from tests.io.surveys.test_survey_file import CONTROL, TOML, write_las
 from tests.io.trajectories.test_trajectory_io import csv_of, table_of
 
-CRS, CORNER = "EPSG:32650", np.array([532_000.0, 3_374_000.0, 42.0])  # m
+# m
+CRS = "EPSG:32650"
+CORNER = np.array([532_000.0, 3_374_000.0, 42.0])
 WORDS = r"is ([+-][\d.]+) deg beside the course over ground all along"
 
 
@@ -49,7 +51,9 @@ def offset_of(path, **read):
         read_trajectory(path, **read)
     found = [re.search(WORDS, str(warning.message)) for warning in caught]
     assert len(found) == len(caught) <= 1
-    return float(found[0][1]) if found else None
+    if found:
+        return float(found[0][1])
+    return None
 
 
 @pytest.mark.parametrize("turned", [20.0, -8.0, 29.0])

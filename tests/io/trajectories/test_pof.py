@@ -101,7 +101,8 @@ def test_what_is_no_whole_pof_is_refused(content, message, tmp_path):
 def test_every_cut_of_a_pof_and_a_poq_is_refused_or_whole(tmp_path):
     "At any byte: a sentence, or a POQ that ends between two records and covers less"
     expected = drive(10)
-    pof, poq = pof_bytes(expected, CRS), poq_bytes(expected)
+    pof = pof_bytes(expected, CRS)
+    poq = poq_bytes(expected)
     path = put(tmp_path / "a.pof", pof)
     for end in range(len(poq) - 2 * 68):  # two steps of it may lack
         with pytest.raises(ValueError, match=r"cut off|covers"):

@@ -89,9 +89,12 @@ def test_a_table_of_positions_alone_is_named(tmp_path):
 
 @pytest.mark.parametrize(
     "header",
-    [HEADER, HEADER.replace("easting,northing,height", "X,Y,Z"),
-     HEADER.replace("easting,northing,height", "X-ECEF [m],Y-ECEF [m],Z-ECEF [m]")],
-)  # fmt: skip
+    [
+        HEADER,
+        HEADER.replace("easting,northing,height", "X,Y,Z"),
+        HEADER.replace("easting,northing,height", "X-ECEF [m],Y-ECEF [m],Z-ECEF [m]"),
+    ],
+)
 def test_geocentric_coordinates_are_named(header, tmp_path):
     "ECEF in our columns, as X, Y, Z and by their own names: refused with what to export"
     table = table_of(drive(50))

@@ -37,10 +37,13 @@ def put(path, header, table, separator=" ", time="{:.6f}"):
         ("#time;x;y;z;q_w;q_x;q_y;q_z", ";"),
         ("timestamp,p_x,p_y,p_z,q_w,q_x,q_y,q_z", ","),
         ("time,easting,northing,height,quat_w,quat_x,quat_y,quat_z", ","),
-        ("time,pose.position.x,pose.position.y,pose.position.z,pose.orientation.w,"
-         "pose.orientation.x,pose.orientation.y,pose.orientation.z", ","),
+        (
+            "time,pose.position.x,pose.position.y,pose.position.z,pose.orientation.w,"
+            "pose.orientation.x,pose.orientation.y,pose.orientation.z",
+            ",",
+        ),
     ],
-)  # fmt: skip
+)
 def test_names_in_a_header_say_where_w_is(header, separator, tmp_path):
     "qw before qx: attitudes are right to 1e-6 deg, where they were 160 deg off by place"
     expected = drive(100, sigmas=False)
@@ -53,13 +56,16 @@ def test_names_in_a_header_say_where_w_is(header, separator, tmp_path):
 @pytest.mark.parametrize(
     ("header", "time"),
     [
-        ("#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], "
-         "q_RS_z [], v_RS_R_x [m s^-1]", "nanoseconds"),
+        (
+            "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], "
+            "q_RS_y [], q_RS_z [], v_RS_R_x [m s^-1]",
+            "nanoseconds",
+        ),
         ("#timestamp [ns],p_x [m],p_y [m],p_z [m],q_w [],q_x [],q_y [],q_z [],v_x", "nanoseconds"),
         ("timestamp,p_x,p_y,p_z,q_w,q_x,q_y,q_z,v", "microseconds"),
         ("timestamp,p_x,p_y,p_z,q_w,q_x,q_y,q_z,v", "milliseconds"),
     ],
-)  # fmt: skip
+)
 def test_times_of_euroc_are_read_in_nanoseconds(header, time, tmp_path):
     "Unix time in whole ns, us or ms becomes seconds, by its unit or by its size, and it is said"
     expected = drive(100, sigmas=False)

@@ -31,7 +31,8 @@ def trajectory(start=OF_WEEK[0] - 5.0, end=OF_WEEK[-1] + 5.0):
 @pytest.mark.parametrize("cloud_system", SYSTEMS)
 def test_recovers_the_constant_between_any_two_systems(cloud_system, trajectory_system):
     "Cloud and trajectory may each use any of three systems: the constant is found to the bit"
-    cloud, goal = SYSTEMS[cloud_system], SYSTEMS[trajectory_system]
+    cloud = SYSTEMS[cloud_system]
+    goal = SYSTEMS[trajectory_system]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # plain GPS seconds contradict either flag
         match = match_times(
@@ -81,7 +82,8 @@ def test_a_few_times_outside_are_normal():
 @pytest.mark.parametrize("system", ["week", "gps"])
 def test_a_few_points_past_the_end_do_not_choose_the_system(system):
     "A gap of days holds nothing: equal times stay equal where others put all points into the gap"
-    first, last = SYSTEMS[system][0] - 300_000.0, SYSTEMS[system][-1]
+    first = SYSTEMS[system][0] - 300_000.0
+    last = SYSTEMS[system][-1]
     days = Trajectory.concatenate([trajectory(first, first + 500.0), trajectory(last - 500, last)])
     match = match_times("a.laz", OF_WEEK + 9.0, False, days)
     assert (match.constant, match.trajectory_system) == (last - OF_WEEK[-1], system)
@@ -274,7 +276,8 @@ def test_points_without_a_time_do_not_judge_the_time_system(value, system):
 def test_both_placeholders_are_counted():
     "Points with 0 and with -1 are counted apart; where all points have one of them, that is said"
     times = SYSTEMS["week"].copy()
-    times[:3], times[3:5] = -1.0, 0.0
+    times[:3] = -1.0
+    times[3:5] = 0.0
     with pytest.warns(UserWarning, match=r"5 of 500 points .* gps_time -1 \(3\) and 0 \(2\):"):
         match_times("a.laz", times, False, trajectory())
     with pytest.raises(ValueError, match=r"have gps_time -1 \(3\) and 0 \(2\) throughout"):

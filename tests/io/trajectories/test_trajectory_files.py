@@ -14,7 +14,8 @@ from mlscorr.survey import Trajectory
 from tests.io.trajectories.test_trajectory_io import csv_of, drive, sbet_records, table_of, written
 
 CRS = "EPSG:32650"
-TRUE, GRID = "clockwise from true north", "clockwise from grid north"
+TRUE = "clockwise from true north"
+GRID = "clockwise from grid north"
 # By the columns of a text export of NovAtel Inertial Explorer 8
 EXPLORER = """Project:     street
 Program:     Inertial Explorer Version 8.90
@@ -75,10 +76,12 @@ def test_an_export_of_inertial_explorer_is_read(tmp_path):
 def test_an_export_of_pospac_is_read(tmp_path):
     "Names by commas, rows by blanks, words on units between, and a height that stands there twice"
     expected = drive(100)
-    table, place = table_of(expected), geographic(expected)
+    table = table_of(expected)
+    place = geographic(expected)
     table[:, 6] += place[:, 2]
     sigmas = np.column_stack([expected.position_sigma, np.degrees(expected.attitude_sigma)])
-    height, nothing = table[:, 3:4], np.zeros((100, 1))
+    height = table[:, 3:4]
+    nothing = np.zeros((100, 1))
     rows = [table[:, :1], nothing, table[:, 1:4], place[:, 1::-1], height, table[:, 4:], sigmas]
     names = (
         "TIME, DISTANCE, EASTING, NORTHING, ELLIPSOID HEIGHT, LATITUDE, LONGITUDE, ELLIPSOID "
@@ -125,7 +128,8 @@ def test_units_below_the_names_are_heeded(tmp_path):
 def test_latitude_and_longitude_in_radians_are_not_taken_for_degrees(tmp_path):
     "No land lies within pi degrees of 0, 0: radians are refused, and read with angles = 'rad'"
     expected = drive(100, sigmas=False)
-    table, place = table_of(expected), geographic(expected)
+    table = table_of(expected)
+    place = geographic(expected)
     table[:, 6] += place[:, 2]
     table = np.column_stack([table[:, 0], np.radians(place[:, 1::-1]), table[:, 3:]])
     table[:, 4:] = np.radians(table[:, 4:])
@@ -139,10 +143,12 @@ def test_latitude_and_longitude_in_radians_are_not_taken_for_degrees(tmp_path):
 def test_latitude_and_longitude_are_projected(tmp_path):
     "Geographic positions in degrees come into the CRS, and their headings to grid north"
     expected = drive(100)
-    table, place = table_of(expected), geographic(expected)
+    table = table_of(expected)
+    place = geographic(expected)
     table = np.column_stack([table[:, 0], place[:, 1::-1], table[:, 3:]])
     table[:, 6] += place[:, 2]
-    names, units = "GPSTime Latitude Longitude H-Ell Roll Pitch Heading", "(sec) (deg) (deg) (m)"
+    names = "GPSTime Latitude Longitude H-Ell Roll Pitch Heading"
+    units = "(sec) (deg) (deg) (m)"
     path = explorer(tmp_path / "ie.txt", names, f"{units} (deg) (deg) (deg)", table)
     file = read(path)
     assert_same(file.trajectory, expected, metres=2e-4)
@@ -238,8 +244,11 @@ def test_quaternions_of_tum_are_read_by_the_course(axes, tmp_path):
     np.savetxt(tmp_path / "t.tum", table, fmt="%.9f")
     with pytest.raises(ValueError, match="the course over ground does not tell: name"):
         read(tmp_path / "t.tum")
-    still = Trajectory(expected.gps_time, read(tmp_path / "t.tum", axes=axes).trajectory.position,
-                       expected.attitude)  # fmt: skip
+    still = Trajectory(
+        expected.gps_time,
+        read(tmp_path / "t.tum", axes=axes).trajectory.position,
+        expected.attitude,
+    )
     assert_same(read(tmp_path / "t.tum", axes=axes).trajectory, still)
 
 
@@ -254,7 +263,8 @@ def terrascan(trajectory, version=20010715):
 
 def test_terrascan_trajectories_are_read(tmp_path):
     "Header and records by TerraScan's guide; cut off, or of another version, they are refused"
-    expected, path = drive(100, sigmas=False), tmp_path / "line.trj"
+    expected = drive(100, sigmas=False)
+    path = tmp_path / "line.trj"
     path.write_bytes(terrascan(expected))
     file = read(path)
     assert_same(file.trajectory, expected)

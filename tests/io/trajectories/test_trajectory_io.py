@@ -300,7 +300,8 @@ def test_sbet_height_is_transformed_with_a_geoid_grid(tmp_path):
     )
     path = written(tmp_path / "sbet.out", sbet_records())
     compound = f"+proj=utm +zone=11 +datum=WGS84 +geoidgrids={grid} +type=crs"
-    flat, physical = read_sbet(path, "EPSG:32611"), read_sbet(path, compound)
+    flat = read_sbet(path, "EPSG:32611")
+    physical = read_sbet(path, compound)
     assert np.abs(physical.position - flat.position - [0, 0, -25.0]).max() < 1e-6
     assert (physical.attitude * flat.attitude.inv()).magnitude().max() < 1e-12
     assert "transformed" in describe_projection(compound)[1]
@@ -310,7 +311,8 @@ def test_sbet_height_is_transformed_with_a_geoid_grid(tmp_path):
 def test_sbet_datum_is_the_one_of_the_crs(tmp_path):
     "ETRS89 and WGS84 zones give the same coordinates: no datum shift is applied in silence"
     path = written(tmp_path / "sbet.out", sbet_records())
-    nad83, wgs84 = read_sbet(path, "EPSG:6340"), read_sbet(path, "EPSG:32611")
+    nad83 = read_sbet(path, "EPSG:6340")
+    wgs84 = read_sbet(path, "EPSG:32611")
     assert np.abs(nad83.position - wgs84.position).max() < 1e-3
     assert "NAD83(2011), the datum of" in describe_projection("EPSG:6340")[0]
 

@@ -18,7 +18,9 @@ from mlscorr.survey import Pos, Trajectory
 from tests.io.surveys.test_survey_file import CONTROL, TOML, write_las
 from tests.pipeline.test_starting import write_sbet
 
-START, CORNER = 413_200.0, np.array([532_000.0, 3_374_000.0, 42.0])  # s, m
+# s, m
+START = 413_200.0
+CORNER = np.array([532_000.0, 3_374_000.0, 42.0])
 NAMES = ["run-1.csv", "run-2.csv", "run-3.csv"]
 
 
@@ -27,7 +29,10 @@ def drive(start, seconds=10.0, step=0.05, aside=0.0, sigma=None, turned=0.0):
     time = START + start + step * np.arange(round(seconds / step))
     position = CORNER + np.outer(time - START, [5.0, 0.0, 0.0]) + [0.0, aside, 0.0]
     heading = np.full(len(time), np.radians(90.0 + turned))
-    sigma = None if sigma is None else np.full((len(time), 3), sigma)
+    if sigma is None:
+        sigma = None
+    else:
+        sigma = np.full((len(time), 3), sigma)
     return Trajectory(time, position, attitude_from_angles(0.0, 0.0, heading), sigma)
 
 
@@ -119,7 +124,10 @@ def test_two_vehicles_are_refused(change):
     "Both files, the seconds that they overlap and by how much they differ are named"
     with pytest.raises(ValueError) as error:
         joined(drive(0.0, 10.0), drive(8.0, 10.0, **change))
-    apart = "differ there by 3.000 m" if "aside" in change else "0.000 m and 1.0000 deg"
+    if "aside" in change:
+        apart = "differ there by 3.000 m"
+    else:
+        apart = "0.000 m and 1.0000 deg"
     for words in (
         "run-1.csv and run-2.csv overlap by 2.0 s",
         apart,
@@ -207,7 +215,9 @@ def test_trajectories_of_two_time_systems_are_refused(folder):
 
 def test_seconds_of_week_may_start_again_between_two(folder):
     "Saturday night, then Sunday morning, a week later: each cloud finds its run, and all is said"
-    late, early = 604_000.0 - START, 100.0 - START - 20.0  # s, added to each run
+    # s, added to each run
+    late = 604_000.0 - START
+    early = 100.0 - START - 20.0
     week = 604_800.0 * 2300 - 1e9
     for number, start, added, weeks in ((1, 0.0, late, 0), (2, 20.0, early, 1)):
         run = drive(start, 15.0)
@@ -247,7 +257,8 @@ def test_sigmas_that_one_lacks_are_those_of_pos_or_asked_for(folder):
 
 def test_points_that_belong_to_a_trajectory_lie_within_it(folder):
     "files and point_source_ids that are right say nothing; a file under the wrong run is refused"
-    one, other = '"run-1.csv"', '"run-2.csv"'
+    one = '"run-1.csv"'
+    other = '"run-2.csv"'
     change(folder, one, f'{one}\nfiles = ["pass-1.*"]\npoint_source_ids = [0]')
     change(folder, other, f'{other}\nfiles = ["pass-2.las"]')
     with warnings.catch_warnings():
@@ -281,7 +292,7 @@ def test_some_points_outside_their_trajectory_are_warned_of(folder):
         ('"run-1.csv"', '"run-1.csv"\nfile_s = []', r"\.1\.file_s .* is trajectory\.file"),
         ("[control]", "[[trajectory]]\n[control]", r"trajectory\.2\.file is missing"),
     ],
-)  # fmt: skip
+)
 def test_wrong_keys_of_several_trajectories_are_named(folder, old, new, message):
     "Doubled, missing, unknown: a sentence each, and check says the same"
     change(folder, old, new)

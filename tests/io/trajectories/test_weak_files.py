@@ -9,8 +9,14 @@ import pytest
 from mlscorr.io.trajectories import write_weak
 from tests.beds.reports import START, drive
 
-STRETCH = {"from": START + 10.0, "to": START + 20.0, "length_m": 60.0, "chainage": 60.0,
-           "sigma": 0.4, "why": "its pass has no control point"}  # fmt: skip
+STRETCH = {
+    "from": START + 10.0,
+    "to": START + 20.0,
+    "length_m": 60.0,
+    "chainage": 60.0,
+    "sigma": 0.4,
+    "why": "its pass has no control point",
+}
 
 
 def test_a_stretch_lies_where_the_trajectory_ran(tmp_path):
@@ -28,8 +34,9 @@ def test_a_stretch_lies_where_the_trajectory_ran(tmp_path):
     line = np.column_stack(to_map.transform(*np.transpose(feature["geometry"]["coordinates"])))
     ends = trajectory.at([STRETCH["from"], STRETCH["to"]]).position[:, :2]
     assert line[[0, -1]] == pytest.approx(ends, abs=0.002)
-    table = [[float(row[f"{axis}_{end}"]) for axis in ("easting", "northing")]
-             for end in ("from", "to")]  # fmt: skip
+    table = [
+        [float(row[f"{axis}_{end}"]) for axis in ("easting", "northing")] for end in ("from", "to")
+    ]
     assert np.array(table) == pytest.approx(ends, abs=0.001)
 
 

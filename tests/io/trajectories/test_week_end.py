@@ -21,7 +21,9 @@ from tests.io.surveys.test_survey_file import CONTROL, TOML, write_las
 from tests.io.trajectories.test_trajectory_io import drive, table_of
 
 CRS = "EPSG:32650"
-WEEK, DAY = 604_800.0, 86_400.0  # s
+# s
+WEEK = 604_800.0
+DAY = 86_400.0
 SATURDAY = date(2026, 5, 9)
 
 
@@ -129,7 +131,8 @@ def test_a_cloud_counts_on_with_its_trajectory(tmp_path):
     (tmp_path / "control.csv").write_text(CONTROL)
     counted = WEEK - 15.0 + 0.05 * np.arange(800)
     table = np.tile([0.0, 532_000.0, 3_374_000.0, 42.0, 0.1, -0.2, 90.0], (800, 1))
-    table[:, 0], table[:, 1] = counted % WEEK, 532_000.0 + 5.0 * (counted - counted[0])
+    table[:, 0] = counted % WEEK
+    table[:, 1] = 532_000.0 + 5.0 * (counted - counted[0])
     csv(tmp_path / "trajectory.csv", table)
     times = np.linspace(WEEK - 5.0, WEEK + 10.0, 301)
     write_las(tmp_path / "pass-1.las", times % WEEK)

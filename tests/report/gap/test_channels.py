@@ -15,8 +15,9 @@ def test_the_first_sentence_stands_first():
     document["contrasts"][0]["sentences"] = []
     (statement,) = channel_statements(document)
     assert (statement.rating, statement.sentence) == (
-        "green", "No difference beyond chance in intensity. Not compared: edge width.",
-    )  # fmt: skip
+        "green",
+        "No difference beyond chance in intensity. Not compared: edge width.",
+    )
     assert not list(channel_statements(gap_document(contrasts=[])))
 
 

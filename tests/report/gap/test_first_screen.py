@@ -61,7 +61,8 @@ ASSUMED = [
 def test_a_default_is_called_assumed_and_judges_nothing():
     "12 cm where nobody stated a sigma are neither more nor less than stated"
     _, rows = facts(gap_document("none", assumed=ASSUMED))
-    accuracy, assumed = rows["Accuracy"], rows["Assumed"]
+    accuracy = rows["Accuracy"]
+    assumed = rows["Assumed"]
     assert accuracy["rating"] == assumed["rating"] == "amber"
     assert "no sigma of the POS is stated" in accuracy["sentence"]
     assert accuracy["items"][0]["text"] == "off by 1.4 cm (RMS per axis)"

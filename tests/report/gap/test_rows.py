@@ -43,7 +43,8 @@ def test_the_worst_part_of_an_effect_counts():
 def test_every_bin_and_every_parameter_has_a_row():
     "Bins of all splits with their edges; a cause without parameters has a row of dashes"
     document = gap_document()
-    bins, causes = bin_rows(document), cause_rows(document)
+    bins = bin_rows(document)
+    causes = cause_rows(document)
     assert len(bins) == sum(len(split["count"]) for split in document["where"])
     assert (bins[0].by, bins[0].bin) == ("Time since the start (s)", "0 to 25.0")
     assert [row.chosen for row in causes if row.title == "Scanner clock offset"] == [True]

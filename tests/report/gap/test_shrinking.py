@@ -75,7 +75,8 @@ def test_the_page_calls_nothing_held_out_that_was_not():
 
 def test_less_than_chance_leaves_is_too_much_put_in():
     "A gap of 18.7 mm that became -53.9 mm is no chance: before, below the band is; after, not"
-    band, document = [-0.5, 1.17], gap_document("range_noise", 0.99)
+    band = [-0.5, 1.17]
+    document = gap_document("range_noise", 0.99)
     assert is_within(-53.9, band, "scatter") and not is_within(-53.9, band, "scatter", is_left=True)
     over = {"before": 18.7, "after": -53.9, "null_band": band, "kind": "scatter", "shrink": -0.88}
     document["closure"] |= over

@@ -42,15 +42,18 @@ def test_the_share_stands_on_the_bin_that_holds_more_than_its_rows():
     assert not where_figure(gap_document(where=[split])).axes[0].texts
 
 
-@pytest.mark.parametrize(("by", "extent", "drawn"), [
-    ("time", {"low": 1.5, "high": 3.0, "share": 0.9, "rows": 0.3}, [(1.5, 3.0)]),
-    ("time", {"low": 0.5, "high": 3.5, "share": 0.8, "rows": 0.75}, []),
-    (
-        "scan_angle",
-        {"low": 3.5, "high": 361.0, "share": 0.9, "rows": 0.3},
-        [(3.5, 4.0), (0.0, 1.0)],
-    ),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("by", "extent", "drawn"),
+    [
+        ("time", {"low": 1.5, "high": 3.0, "share": 0.9, "rows": 0.3}, [(1.5, 3.0)]),
+        ("time", {"low": 0.5, "high": 3.5, "share": 0.8, "rows": 0.75}, []),
+        (
+            "scan_angle",
+            {"low": 3.5, "high": 361.0, "share": 0.9, "rows": 0.3},
+            [(3.5, 4.0), (0.0, 1.0)],
+        ),
+    ],
+)
 def test_the_stretch_in_which_the_cause_acts_is_shaded(by, extent, drawn):
     "From its low to its high end, over the turn of an angle; not what acts nearly everywhere"
     split = {"by": by, "name": by, "unit": "s", "edges": [0.0, 1.0, 2.0, 3.0, 4.0]}

@@ -22,7 +22,8 @@ def test_sigma_of_a_point_grows_with_its_distance():
     )
     xyz = ORIGIN + np.array([[0.0, 0, 0], [100.0, 0, 0], [0, 0, 100.0], [0, 0, 0]])
     times = np.array([START, START + 1.2, START + 2.0, START + 9.0])
-    cloud, sigma = PointCloud(xyz, times, np.zeros(4)), point_sigma(trajectory)
+    cloud = PointCloud(xyz, times, np.zeros(4))
+    sigma = point_sigma(trajectory)
     _, after = CloudPair(cloud, cloud, (None, sigma)).values("correction")
     np.testing.assert_allclose(after, [0.05, np.hypot(0.05, 0.1), 0.05, np.nan], atol=1e-7)
     assert point_sigma(None) is None

@@ -23,7 +23,8 @@ def test_order_and_chunks_change_no_pixel():
     xyz = scattered(20_000)
     xyz[10_000:] = xyz[:10_000]
     value = np.random.default_rng(2).uniform(0, 9, len(xyz))
-    whole, pieces = Canvas.blank(camera), Canvas.blank(camera)
+    whole = Canvas.blank(camera)
+    pieces = Canvas.blank(camera)
     whole.draw(xyz, value)
     order = np.random.default_rng(3).permutation(len(xyz))
     for part in np.array_split(order, 7):
@@ -34,8 +35,10 @@ def test_order_and_chunks_change_no_pixel():
 def test_growing_points_equals_drawing_discs():
     "Discs grown after drawing are those that drawing each point as a disc would have given"
     camera = Camera.towards(ORIGIN, 30.0, 45.0, 8.0, SIZE)
-    xyz, value = scattered(300), np.arange(300.0)
-    canvas, plain = Canvas.blank(camera), Canvas.blank(camera)
+    xyz = scattered(300)
+    value = np.arange(300.0)
+    canvas = Canvas.blank(camera)
+    plain = Canvas.blank(camera)
     canvas.draw(xyz, value)
     pixel, depth = camera.project(xyz)
     column, row = np.floor(pixel).astype(int).T
@@ -63,7 +66,8 @@ def test_what_lies_behind_an_edge_is_darker():
     camera = Camera.towards(ORIGIN, 0.0, 90.0, 1.0, SIZE)
     columns, rows = np.meshgrid(np.arange(-100.0, 100.0), np.arange(-80.0, 80.0))
     plan = np.column_stack([columns.ravel(), rows.ravel()]) + 0.5
-    step, slope = Canvas.blank(camera), Canvas.blank(camera)
+    step = Canvas.blank(camera)
+    slope = Canvas.blank(camera)
     step.draw(ORIGIN + np.column_stack([plan, 50.0 * (plan[:, 0] > 0)]), plan[:, 0])
     slope.draw(ORIGIN + np.column_stack([plan, plan[:, 0]]), plan[:, 0])
     assert step.light[90, 119] < 0.9 and step.light[90, 60] == 1.0

@@ -32,7 +32,8 @@ def test_the_slowdown_is_where_it_is_asked_for():
 def test_a_stop_is_one():
     "Exactly no speed from 30 to 40 s, no distance either, and full speed well before and after"
     pace = Pace(8.0, 0.0, FAR, stops=((30.0, 10.0),))
-    speed, distance = pace.speed(ELAPSED), pace.distance(ELAPSED)
+    speed = pace.speed(ELAPSED)
+    distance = pace.distance(ELAPSED)
     stands = (ELAPSED >= 30.0) & (ELAPSED <= 40.0)
     assert not speed[stands].any() and (speed[~stands][[0, -1]] > 7.0).all()
     assert np.ptp(distance[stands][1:]) == 0.0

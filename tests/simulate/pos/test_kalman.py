@@ -43,7 +43,10 @@ class Case:
 
     def posterior(self, last):
         "Mean (n, d) and covariance (n d, n d) of all states by the measurements up to an epoch"
-        joint, rows, values, blocks = self.joint(), [], [], []
+        joint = self.joint()
+        rows = []
+        values = []
+        blocks = []
         for k, several in self.measurements.items():
             for each in several if k <= last else ():
                 row = np.zeros((len(each.measured), EPOCHS, STATES))
@@ -51,8 +54,10 @@ class Case:
                 rows.append(row.reshape(len(row), -1))
                 values.append(each.measured)
                 blocks.append(each.covariance)
-        h, n = np.vstack(rows), sum(map(len, values))
-        noise, at = np.zeros((n, n)), 0
+        h = np.vstack(rows)
+        n = sum(map(len, values))
+        noise = np.zeros((n, n))
+        at = 0
         for block in blocks:
             noise[at : at + len(block), at : at + len(block)] = block
             at += len(block)
