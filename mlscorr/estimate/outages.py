@@ -108,11 +108,11 @@ def _contradicted(equations, parameters):
     number = equations.fallbacks
     if number == 0:
         return None
-    solved, first = equations.solve(parameters), 3 * (len(equations.gps_time) - number)
+    solved, first = equations.solve(parameters), 3 * (len(equations.gps_time) - 2 * number)
     critical = chdtri(3, SETTINGS.significance / number)
     statistics = []
     for step in range(number):
-        residual, covariance = solved.leave_out(np.arange(3) + first + 3 * step)
+        residual, covariance = solved.leave_out(np.arange(3) + first + 6 * step)
         statistics.append(float(residual @ np.linalg.solve(covariance, residual)))
     worst = int(np.argmax(statistics))
     return worst if statistics[worst] > critical else None
