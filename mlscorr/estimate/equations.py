@@ -196,9 +196,17 @@ class Equations(Summary):
             return collocate(*control, ())
         rows, believed = self.rows(parameters), self.believed(parameters)
         if self.ties is None:
-            return collocate(*control, rows[0].signals, believed)
+            return self._without_places(collocate(*control, rows[0].signals, believed))
         like = None if like is None else like.solver
-        return collocate_rows(rows, like, self.tolerance, believed)
+        return self._without_places(collocate_rows(rows, like, self.tolerance, believed))
+
+    def _without_places(self, solved):
+        """A Collocation whose sigma0 counts no place of a fall-back as known."""
+        redundancy = len(solved.misclosure) + len(solved.believed) - solved.design.shape[1]
+        known = redundancy - 3 * self.fallbacks
+        if self.fallbacks == 0 or known <= 0:
+            return solved
+        return replace(solved, sigma0=solved.sigma0 * np.sqrt(redundancy / known))
 
     def weigh(self, parameters: SignalParameters, like: Collocation | None = None) -> Collocation:
         """As solve, for the likelihood alone: few rows with ties by their covariance matrix.

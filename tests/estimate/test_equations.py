@@ -127,6 +127,17 @@ def test_least_squares_is_the_solution_without_parameters():
     np.testing.assert_allclose(solved.trend, expected, atol=1e-9)
 
 
+def test_a_step_adds_three_to_the_redundancy():
+    "sigma0 of two epochs of a step, whose place nothing tells, is that of one row of differences"
+    complete = with_fallbacks(EQUATIONS, steps(80.0))
+    objective = Objective.of(complete)
+    solved = complete.solve(objective.parameters("matern32", objective.initial))
+    squares = (solved.misclosure - solved.design @ solved.trend) @ solved.weights
+    redundancy = 3 * N + 3 + 6 - solved.design.shape[1]
+    squares += np.sum((solved.believed @ solved.trend) ** 2)
+    assert solved.sigma0 == pytest.approx(np.sqrt(squares / redundancy), rel=1e-9)
+
+
 @pytest.mark.parametrize("family", ["exponential", "matern52", "integrated"])
 def test_the_solution_is_the_dense_one(family):
     "With fall-backs, in any family: trend, likelihood and weights to 1e-7 of their size"
