@@ -13,6 +13,8 @@ from mlscorr.frames import mounting_partials, partials_by_scanner, pose_partials
 from mlscorr.pos import Steps, stated_sigma
 from mlscorr.survey import SEARCH_RADIUS, Matched, Mounting, Pos, Trajectory
 
+PLACE = np.full(3, SEARCH_RADIUS)  # m; sigma of where the POS is, but for what control says of it
+
 
 def position_equations(
     trajectory: Trajectory, matched: Matched, pos: Pos, order: int, prior: Callable
@@ -47,12 +49,11 @@ def position_equations(
 
 
 def with_fallbacks(equations: Equations, steps: Steps) -> Equations:
-    """The equations, and below them three rows for each fall-back of the POS.
+    """The equations, and below them two epochs for each fall-back of the POS.
 
-    The errors of GNSS at its best run on, so what the recorded position moves is the drift of the
-    epoch before, or what another solution adds in the epoch after: the larger one, as far as the
-    smaller one is known. Where nothing is stated, drift starts anew with the errors that GNSS has.
-    It tells nothing of attitude and trend.
+    The recorded position steps by as much as its error does, whatever parts the error has. So the
+    epochs before and after a step are two views of one place that nobody surveyed: what each says
+    of the error by itself is unknown, by how much it differs is the step.
 
     Parameters
     ----------
@@ -63,25 +64,15 @@ def with_fallbacks(equations: Equations, steps: Steps) -> Equations:
     steps = steps[np.linalg.norm(steps.size, axis=1) < SEARCH_RADIUS]
     if len(steps) == 0:
         return equations
-    before, after = (_stated(equations, times) for times in (steps.before, steps.after))
-    if before.history.is_stated:
-        turns = before.history.turns
-        shown = np.searchsorted(turns, steps.after) > np.searchsorted(turns, steps.before)
-        added = before.added**2, after.added**2
-        ends = [side.drift**2 + shown[:, None] * side.added**2 for side in (before, after)]
-        hidden = np.where(shown[:, None], 0.0, added[0] + added[1])
-    else:
-        shown = np.zeros(len(steps), bool)
-        ends = [before.drift**2, np.zeros_like(after.drift)]
-        hidden = before.gnss**2 + after.gnss**2
-    is_after = ends[1].sum(axis=1) > ends[0].sum(axis=1)
-    hidden = hidden + np.where(is_after[:, None], *ends)
-    times = np.where(is_after, steps.after, steps.before)
-    size = np.where(is_after[:, None], -steps.size, steps.size)
-    variance = (steps.sigma[:, None] ** 2 + hidden)[:, :, None] * np.eye(3)
-    inserted = times, size, variance, np.tile(np.eye(3, 6), (len(steps), 1, 1))
+    number = np.repeat(np.arange(len(steps)), 2)
+    times = np.column_stack([steps.before, steps.after]).ravel()
+    misclosure = np.stack([steps.size, np.zeros_like(steps.size)], axis=1).reshape(-1, 3)
+    variance = steps.sigma[number, None, None] ** 2 / 2 * np.eye(3)
+    partials = np.tile(np.eye(3, 6), (len(times), 1, 1))
+    inserted = times, misclosure, variance, partials
     complete = _insert(equations, len(equations.gps_time), *inserted)
-    return replace(complete, shown=shown)
+    noise = complete.noise.share(len(equations.gps_time) + np.arange(len(times)), number, PLACE)
+    return replace(complete, noise=noise, fallbacks=len(steps))
 
 
 def mounting_equations(

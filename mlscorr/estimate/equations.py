@@ -6,7 +6,7 @@ Both have the same misclosures, signals and noise; they differ in A, the trend.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -23,7 +23,7 @@ from mlscorr.collocation import (
 )
 from mlscorr.estimate._tie_equations import TieEquations
 from mlscorr.estimate.settings import SETTINGS
-from mlscorr.estimate.signals import SignalParameters, drift_alone, pose_signals
+from mlscorr.estimate.signals import SignalParameters, pose_signals
 from mlscorr.pos import StatedSigma, stated_sigma
 from mlscorr.survey import SAME_EPOCH, Pos, Summary, Trajectory
 
@@ -38,8 +38,9 @@ class Equations(Summary):
     ----------
     names : (n,) array of str
     gps_time : (n + h,) array
-        The last h epochs observe no target: they are fall-backs of the POS, or hold the mounting
-        weakly, so that what a site doesn't determine stays as it was recorded. Units: s.
+        The last h epochs observe no target: they are those before and after each fall-back of the
+        POS, or hold the mounting weakly, so that what a site doesn't determine stays as it was
+        recorded. Units: s.
     misclosure : (n + h, 3) array
         Surveyed - observed. Units: m.
     noise : Noise
@@ -57,8 +58,8 @@ class Equations(Summary):
         What is believed of the parameters before the misclosures: a Prior.
     trajectory : Trajectory
     pos : Pos
-    shown : (h,) bool array
-        Which of the last h epochs, fall-backs, show what another solution of GNSS adds.
+    fallbacks : int
+        Number of the fall-backs, of which the last epochs are, two each.
     ties : TieEquations, optional
         Of what two passes both saw.
     trend_span : (float, float), optional
@@ -78,15 +79,10 @@ class Equations(Summary):
     trajectory: Trajectory
     pos: Pos
     mounting: np.ndarray | None = None
-    shown: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
+    fallbacks: int = 0
     ties: TieEquations | None = None
     trend_span: tuple[float, float] | None = None
     tolerance: float = SETTINGS.knot_tolerance
-
-    @property
-    def fallbacks(self) -> int:
-        """Number of fall-backs."""
-        return len(self.shown)
 
     @cached_property
     def stated_epochs(self) -> StatedSigma:
@@ -139,16 +135,16 @@ class Equations(Summary):
         """The equations of control points alone."""
         if len(self.names) == len(self.gps_time):
             return self
-        return replace(self._rows(np.arange(len(self.names))), shown=self.shown[:0])
+        return replace(self._rows(np.arange(len(self.names))), fallbacks=0)
 
     def without_outer_fallbacks(self) -> Equations:
         """The equations without fall-backs outside the control span."""
         n = len(self.gps_time)
-        first = len(self.gps_time) - self.fallbacks
-        fallbacks = self.gps_time[first:]
-        inside = (fallbacks >= self.span[0]) & (fallbacks <= self.span[1])
-        kept = np.append(np.arange(first), np.arange(first, n)[inside])
-        return replace(self._rows(kept), shown=self.shown[inside])
+        first = n - 2 * self.fallbacks
+        ends = self.gps_time[first:].reshape(-1, 2)
+        inside = (ends[:, 0] >= self.span[0]) & (ends[:, 1] <= self.span[1])
+        kept = np.append(np.arange(first), np.arange(first, n)[np.repeat(inside, 2)])
+        return replace(self._rows(kept), fallbacks=int(inside.sum()))
 
     def without(self, names: Collection[str]) -> Equations:
         """The equations of all targets but some.
@@ -210,9 +206,17 @@ class Equations(Summary):
         rows = self.rows(parameters)
         believed = self.believed(parameters)
         if self.ties is None:
-            return collocate(*control, rows[0].signals, believed)
+            return self._without_places(collocate(*control, rows[0].signals, believed))
         like = None if like is None else like.solver
-        return collocate_rows(rows, like, self.tolerance, believed)
+        return self._without_places(collocate_rows(rows, like, self.tolerance, believed))
+
+    def _without_places(self, solved):
+        """A Collocation whose sigma0 counts no place of a fall-back as known."""
+        redundancy = len(solved.misclosure) + len(solved.believed) - solved.design.shape[1]
+        known = redundancy - 3 * self.fallbacks
+        if self.fallbacks == 0 or known <= 0:
+            return solved
+        return replace(solved, sigma0=solved.sigma0 * np.sqrt(redundancy / known))
 
     def weigh(self, parameters: SignalParameters, like: Collocation | None = None) -> Collocation:
         """As solve, for the likelihood alone: few rows with ties by their covariance matrix.
@@ -262,7 +266,6 @@ class Equations(Summary):
         parameters : SignalParameters
         """
         signals = pose_signals(self.stated, parameters, self.partials)
-        signals = drift_alone(signals, parameters, self.shown)
         times = self.gps_time[:, None]
         control = SparseRows(times, self.misclosure, self.noise, self.design, signals)
         if self.ties is None:

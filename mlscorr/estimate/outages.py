@@ -113,11 +113,11 @@ def _contradicted(equations, parameters):
     if number == 0:
         return None
     solved = equations.solve(parameters)
-    first = 3 * (len(equations.gps_time) - number)
+    first = 3 * (len(equations.gps_time) - 2 * number)
     critical = chdtri(3, SETTINGS.significance / number)
     statistics = []
     for step in range(number):
-        residual, covariance = solved.leave_out(np.arange(3) + first + 3 * step)
+        residual, covariance = solved.leave_out(np.arange(3) + first + 6 * step)
         statistics.append(float(residual @ np.linalg.solve(covariance, residual)))
     worst = int(np.argmax(statistics))
     if statistics[worst] > critical:

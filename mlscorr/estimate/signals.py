@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -114,29 +114,3 @@ def _drift(stated, parameters, position):
         Signal(velocity, Covariance(INTEGRATED, 1.0), clock),
         Signal(walk, Covariance("exponential", 2.0), clock),
     )
-
-
-def drift_alone(
-    signals: tuple[Signal, ...], parameters: SignalParameters, shown: np.ndarray
-) -> tuple[Signal, ...]:
-    """The signals, of which the last rows show drift, and another solution where it is shown.
-
-    Parameters
-    ----------
-    signals : tuple of Signal
-        As pose_signals gives them: the last three run on across steps.
-    parameters : SignalParameters
-    shown : (h,) bool array
-        Of the last h rows.
-    """
-    rows = len(shown)
-    first = drift_signals(parameters)
-    if rows == 0:
-        return signals
-    changed = []
-    for number, signal in enumerate(signals[first:], first):
-        mixing = signal.mixing.copy()
-        is_added = number < len(signals) - 3
-        mixing[-rows:] *= np.reshape(shown & is_added, (-1, 1, 1))
-        changed.append(replace(signal, mixing=mixing))
-    return (*signals[:first], *changed)

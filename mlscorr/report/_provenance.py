@@ -120,7 +120,7 @@ def coverage(correction: Correction, report: CorrectionReport) -> list[tuple[str
         "Points flagged as noise (not measured, corrected like all others)": points(noise),
         "Time and way whose correction is extrapolated": f"{seconds} s, {metres} m",
         "Gaps of the trajectory (nothing is interpolated across them)": len(gaps),
-        "Jumps of the correction, at steps of the recorded path": _jumps(report),
+        "Jumps of the correction, where the recorded position jumps": _jumps(report),
     }
     return list(values.items())
 

@@ -73,7 +73,7 @@ def _figure(height, correction, report, change, sigma, rows, words):
         _unused(panel, new, [row for row in rows if row.group == "unused"], axis)
     panels[0].set_title(f"Correction of {words[0]}: corrected − recorded")
     _shade(panels, new, span if report.control.n else (), report.support)
-    handles = _legend(new, {row.group for row in rows}, report.support)
+    handles = _legend(new, {row.group for row in rows}, report)
     style.legend_above(figure, handles, columns=2)
     return figure
 
@@ -150,12 +150,13 @@ def _shade(panels, trajectory, span, support):
         for step in support.steps:
             panel.axvline(step - start, **style.STEP)
         for edge in span:
-            panel.axvline(edge - start, color="#8a6d00", linewidth=0.8, linestyle=(0, (4, 3)))
+            panel.axvline(edge - start, **style.SPAN)
     panels[-1].set_xlabel(f"Time since gps_time {start:.0f} s (s)")
 
 
-def _legend(trajectory, groups, support):
+def _legend(trajectory, groups, report):
     """Legend entries of what is really drawn."""
+    support = report.support
     handles = [Line2D([], [], color=style.BLUE, label="Correction")]
     handles.append(Patch(**style.BAND, label="1 sigma of the corrected value"))
     handles += style.mark_handles(WORDS, groups)
@@ -164,7 +165,10 @@ def _legend(trajectory, groups, support):
     if support.outages:
         handles.append(Patch(**style.OUTAGE, label="GNSS outage: the position drifts"))
     if support.steps:
-        handles.append(Line2D([], [], **style.STEP, label="Step of the recorded position"))
+        words = "GNSS re-acquired: the recorded position jumps"
+        handles.append(Line2D([], [], **style.STEP, label=words))
+    if report.control.n:
+        handles.append(Line2D([], [], **style.SPAN, label="First and last control point"))
     if len(trajectory.gaps):
         handles.append(Patch(linewidth=0, **style.GAP, label="Gap of the trajectory"))
     return handles

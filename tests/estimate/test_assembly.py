@@ -80,19 +80,26 @@ def steps_at(*times, size=0.5):
     return Steps(at, at + 0.1, np.tile([size, 0.0, 0.0], (n, 1)), np.full(n, 0.01))
 
 
-def test_a_fall_back_is_an_epoch_of_drift_alone():
-    "Three rows each: its step as misclosure, the position as partials, a noise of jitter twice"
+def test_a_fall_back_is_a_place_seen_before_and_after_it():
+    "Of two views of a place that nobody surveyed only the difference counts: step and its sigma"
     equations = smooth_case(5, n=8).equations(order=1)
     steps = steps_at(60.0, 120.0)
     complete = with_fallbacks(equations, steps)
-    assert complete.fallbacks == 2 and len(complete.names) == 8 and len(complete.gps_time) == 10
-    np.testing.assert_array_equal(complete.gps_time[-2:], steps.before)
-    np.testing.assert_array_equal(complete.misclosure[-2:], steps.size)
+    assert complete.fallbacks == 2 and len(complete.names) == 8 and len(complete.gps_time) == 12
+    ends = np.column_stack([steps.before, steps.after]).ravel()
+    np.testing.assert_array_equal(complete.gps_time[-4:], ends)
+    before, after = complete.misclosure[-4:].reshape(2, 2, 3).swapaxes(0, 1)
+    np.testing.assert_array_equal(before - after, steps.size)
     np.testing.assert_array_equal(complete.partials[-1], np.eye(3, 6))
-    expected = 0.01**2 + 2 * complete.stated.gnss[-2:].ravel() ** 2
-    np.testing.assert_allclose(complete.noise.matrix[-6:, -6:], np.diag(expected), rtol=1e-9)
-    assert not complete.noise.matrix[:-6, -6:].any()
-    assert not complete.design[-2:].any() and complete.design[:-2].any()
+    covariance = complete.noise.matrix
+    difference = np.hstack([np.eye(3), -np.eye(3)])
+    for first in (-12, -6):
+        rows = slice(first, first + 6 or None)
+        of_both = difference @ covariance[rows, rows] @ difference.T
+        np.testing.assert_allclose(of_both, 0.01**2 * np.eye(3), atol=1e-9)
+        assert np.diag(covariance)[rows].min() > SEARCH_RADIUS**2
+    assert not covariance[:-12, -12:].any() and not covariance[-12:-6, -6:].any()
+    assert not complete.design[-4:].any() and complete.design[:-4].any()
 
 
 def test_no_step_no_row():

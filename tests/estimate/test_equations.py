@@ -17,7 +17,7 @@ from mlscorr.collocation import (
 )
 from mlscorr.estimate import Objective, estimate_correction, with_ties
 from mlscorr.estimate.assembly import with_fallbacks
-from mlscorr.estimate.signals import drift_alone, pose_signals
+from mlscorr.estimate.signals import pose_signals
 from mlscorr.estimate.tied import sample
 from mlscorr.pos import Steps
 from mlscorr.survey import Pos, control_epochs
@@ -56,8 +56,8 @@ def test_fall_backs_stay_with_any_choice_of_targets():
     complete = with_fallbacks(EQUATIONS, steps(60.0, 120.0))
     part = complete.select([4, 1])
     assert part.names.tolist() == [EQUATIONS.names[4], EQUATIONS.names[1]]
-    assert part.fallbacks == 2 and len(part.gps_time) == 4
-    np.testing.assert_array_equal(part.gps_time[2:], START + np.array([60.0, 120.0]))
+    assert part.fallbacks == 2 and len(part.gps_time) == 6
+    np.testing.assert_array_equal(part.gps_time[2::2], START + np.array([60.0, 120.0]))
     np.testing.assert_array_equal(part.observed, EQUATIONS.gps_time[[4, 1]])
 
 
@@ -66,8 +66,8 @@ def test_outer_fall_backs_go():
     first, last = (time - START for time in EQUATIONS.span)
     complete = with_fallbacks(EQUATIONS, steps(first / 2, 100.0, (last + LENGTH) / 2))
     inner = complete.without_outer_fallbacks()
-    assert inner.fallbacks == 1 and len(inner.gps_time) == N + 1
-    assert inner.gps_time[-1] == START + 100.0
+    assert inner.fallbacks == 1 and len(inner.gps_time) == N + 2
+    assert inner.gps_time[-2] == START + 100.0
     assert EQUATIONS.without_outer_fallbacks().fallbacks == 0
 
 
@@ -131,6 +131,17 @@ def test_least_squares_is_the_solution_without_parameters():
     np.testing.assert_allclose(solved.trend, expected, atol=1e-9)
 
 
+def test_a_step_adds_three_to_the_redundancy():
+    "sigma0 of two epochs of a step, whose place nothing tells, is that of one row of differences"
+    complete = with_fallbacks(EQUATIONS, steps(80.0))
+    objective = Objective.of(complete)
+    solved = complete.solve(objective.parameters("matern32", objective.initial))
+    squares = (solved.misclosure - solved.design @ solved.trend) @ solved.weights
+    redundancy = 3 * N + 3 + 6 - solved.design.shape[1]
+    squares += np.sum((solved.believed @ solved.trend) ** 2)
+    assert solved.sigma0 == pytest.approx(np.sqrt(squares / redundancy), rel=1e-9)
+
+
 @pytest.mark.parametrize("family", ["exponential", "matern52", "integrated"])
 def test_the_solution_is_the_dense_one(family):
     "With fall-backs, in any family: trend, likelihood and weights to 1e-7 of their size"
@@ -139,7 +150,6 @@ def test_the_solution_is_the_dense_one(family):
     parameters = objective.parameters(family, objective.initial)
     solved = complete.solve(parameters)
     signals = pose_signals(complete.stated, parameters, complete.partials)
-    signals = drift_alone(signals, parameters, complete.shown)
     rows = SparseRows(
         complete.gps_time[:, None], complete.misclosure, complete.noise, complete.design, signals
     )

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from mlscorr.collocation import FAMILIES, INTEGRATED
 from mlscorr.estimate import SignalParameters
-from mlscorr.estimate.signals import drift_alone, pose_signals
+from mlscorr.estimate.signals import pose_signals
 from mlscorr.pos import stated_sigma
 from mlscorr.survey import Pos, Trajectory
 
@@ -83,14 +83,3 @@ def test_drift_that_a_smoother_ties_down_is_a_walk_that_is_known_at_its_end():
         covariance = np.outer(root, root) * lags
         scale = covariance[3, 3] / expected[3, 3]
         np.testing.assert_allclose(covariance, scale * expected, rtol=1e-3)
-
-
-def test_fall_backs_show_nothing_but_drift(stated):
-    "In the last rows jitter, bias and attitude are hidden, in the others they stay"
-    signals = pose_signals(stated, PARAMETERS, partials(len(TIME)))
-    drift, *others = drift_alone(signals, PARAMETERS, np.zeros(2, bool))
-    assert drift.mixing[-2:].any()
-    for shown, signal in zip(others, signals[1:], strict=True):
-        assert not shown.mixing[-2:].any()
-        assert np.array_equal(shown.mixing[:-2], signal.mixing[:-2])
-    assert drift_alone(signals, PARAMETERS, np.zeros(0, bool)) is signals
