@@ -74,8 +74,9 @@ def distinct_parameters(cause: Cause) -> tuple[CauseParameter, ...]:
         Its parts are in the order of its parameters.
     """
     often = Counter(parameter.name for parameter in cause.parameters)
+    parts = [(part.name, {*part.parameters, *part.kind.moment()}) for part, _ in cause.parts]
     owners = {
-        name: iter([part.name for part, _ in cause.parts if name in part.parameters])
+        name: iter([part for part, names in parts if name in names])
         for name, count in often.items()
         if count > 1
     }
