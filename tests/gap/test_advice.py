@@ -20,6 +20,7 @@ from mlscorr.gap.infer.causes import Cause, Inference
 from mlscorr.gap.infer.verdict import GapVerdict
 from mlscorr.gap.infer.where import Where
 from mlscorr.gap.plan.additions import NextData
+from mlscorr.gap.signatures.signatures import NO_MOUNTING
 
 BAND = (-0.4, 0.7)  # mm
 AGAIN = NextData("the same road again", "two passes share errors")
@@ -86,6 +87,17 @@ def test_the_nearest_effect_is_advised_against_by_its_share():
     first, second = advice_of(found, closure("range_scale", 9.0, 0.6, 0.9952), [], "")
     assert "makes an easting error" in first
     assert "closes 99.5 % of the squared gap" in second
+
+
+def test_what_no_judged_effect_explains_may_be_one_that_needs_a_mounting():
+    "Two of three effects lack [mounting]: to state it comes first, and no effect is ruled out"
+    found = inference("unknown", labels=("unknown",), lead="error to the right")
+    mounting = f"It acts on the mounting, {NO_MOUNTING}."
+    left_out = {"lever_arm": mounting, "boresight": mounting, "beam_divergence": "No row."}
+    first, second = advice_of(found, closure(), [], "", left_out=left_out)
+    assert first.startswith("State [mounting] in survey.toml") and "2 kinds of error" in first
+    assert second.endswith("no effect that was judged does.")
+    assert "that was judged explains it" in sentence_of(found, "")
 
 
 def test_what_chance_makes_is_not_closed():
