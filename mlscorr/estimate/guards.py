@@ -209,8 +209,7 @@ def few_targets(targets: int) -> Iterator[str]:
     if 0 < targets < SETTINGS.smallest_targets:
         yield (
             f"Only {targets} control {'point takes' if targets == 1 else 'points take'} part: a "
-            "wrong one can't be found, and how fast the POS drifts is what it states itself. "
-            f"Survey at least {SETTINGS.smallest_targets}."
+            f"wrong one cannot be found. Survey at least {SETTINGS.smallest_targets}."
         )
 
 

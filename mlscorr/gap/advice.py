@@ -1,14 +1,16 @@
 """What is said of a verdict in a sentence, and what to do about it."""
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 from mlscorr.effects import effect_class, lowered, percent, size, title, with_articles
 from mlscorr.gap._agreement import Agreement
 from mlscorr.gap.closure import Closure
 from mlscorr.gap.evidence import SETTINGS, Cause, CauseParameter, Inference
 from mlscorr.gap.plan import NextData
+from mlscorr.gap.signatures import NO_MOUNTING
 
 NOTHING_TO_DO = "Nothing needs to be done: what is left agrees with what the simulator says."
 ONLY_DRIFT = (
@@ -72,8 +74,9 @@ def distinct_parameters(cause: Cause) -> tuple[CauseParameter, ...]:
         Its parts are in the order of its parameters.
     """
     often = Counter(parameter.name for parameter in cause.parameters)
+    parts = [(part.name, {*part.parameters, *part.kind.moment()}) for part, _ in cause.parts]
     owners = {
-        name: iter([part.name for part, _ in cause.parts if name in part.parameters])
+        name: iter([part for part, names in parts if name in names])
         for name, count in often.items()
         if count > 1
     }
@@ -103,7 +106,7 @@ def sentence_of(inference: Inference, excess: str) -> str:
             f"is a {verdict.lead} (probability of something unknown {verdict.probability:.2f})."
         )
     if verdict.label == "unknown":
-        return f"No known effect explains it ({chance}): it looks like a {verdict.lead}."
+        return f"No effect that was judged explains it ({chance}): it looks like a {verdict.lead}."
     parameters = distinct_parameters(cause)
     sizes = [f"{p.name} {size(p.estimate, p.sigma, p.unit)}" for p in parameters]
     do = "explain" if "+" in verdict.label else "explains"
@@ -116,6 +119,7 @@ def advice_of(
     next_data: Sequence[NextData],
     excess: str,
     is_stated: bool = True,
+    left_out: Mapping[str, str] = MappingProxyType({}),
 ) -> list[str]:
     """What to do about a verdict, in sentences.
 
@@ -129,6 +133,8 @@ def advice_of(
         As ``excess_of`` gives it.
     is_stated : bool
         Whether somebody stated the sigmas of the POS.
+    left_out : mapping of str to str
+        Why effects were not judged.
     """
     verdict = inference.verdict
     sentences = []
@@ -140,7 +146,12 @@ def advice_of(
             "trusted there: the warnings give each one's reason."
         )
     elif verdict.label == "unknown":
-        sentences.append(f"Look for what makes a {verdict.lead}: no effect of the library does.")
+        if unjudged := sum(NO_MOUNTING in why for why in left_out.values()):
+            sentences.append(
+                f"State [mounting] in survey.toml and diagnose again: {unjudged} kinds of error "
+                "can't be judged without it, and one of them may be the cause."
+            )
+        sentences.append(f"Look for what makes a {verdict.lead}: no effect that was judged does.")
         if closure.effect != "none":  # it impersonates the cause
             share = f"closes {percent(max(0.0, closure.shrink))} of the squared gap, but "
             if closure.is_within_noise:

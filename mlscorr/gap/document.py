@@ -71,7 +71,7 @@ def gap_document(
         "gap": vars(closure.gap) | {"unit": closure.unit, "kind": closure.kind},
         "headline": headline(where, verdict.label, verdict.lead, rows.reference.start),
         "agreement": [vars(part) for part in agreement],
-        "advice": advice_of(inference, closure, next_data, excess, is_stated),
+        "advice": advice_of(inference, closure, next_data, excess, is_stated, left_out),
         "where": [_split(split) for split in where.splits],
         "causes": [cause_document(rows, cause) for cause in inference.causes],
         "separability": separability_document(inference.separability),

@@ -51,7 +51,7 @@ class DiagnosedRounds:
                 left = "nothing is left to find"
             return f"Round {number}: {whole}{left}."
         if label == "unknown":
-            return f"Round {number}: what is left no known effect explains."
+            return f"Round {number}: no effect that was judged explains what is left."
         words = lowered(title(label))
         if number < SETTINGS.rounds:
             return f"Round {number}: {words} can't be put into the simulator once more."

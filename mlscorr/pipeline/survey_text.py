@@ -25,13 +25,13 @@ OPTIONAL = {
     ],
     "scanner": [
         "# range_noise = 0.005           # m, one sigma, of the data sheet",
-        "# angle_noise = 0.001           # deg, likewise",
+        "# angle_noise = 0.002           # deg, likewise",
         "# lines_per_second = 100        # of the mirror",
     ],
     "pos": [
         "# What is believed where the trajectory has no sigmas: one sigma, of the data sheet.",
         "# position_sigma = 0.02         # m",
-        "# attitude_sigma = [0.005, 0.005, 0.015]  # deg: roll, pitch, heading",
+        "# attitude_sigma = [0.0063, 0.0063, 0.014]  # deg: roll, pitch, heading",
         "# correlation_time = 30.0       # s",
     ],
     "matching": ["# search_radius = 10.0          # m, how far a target may lie from its point"],

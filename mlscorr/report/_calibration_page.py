@@ -125,8 +125,10 @@ def _lack(content):
         sentence = "This geometry does not tell whether the recorded mounting holds."
         return Statement("Mounting", "amber", sentence)
     if not lacks:
-        sigmas = f"{SETTINGS.setup_sigmas:g} sigmas"
-        sentence = f"The recorded mounting holds: it lacks nothing beyond {sigmas}."
+        sigmas = f"it lacks nothing beyond {SETTINGS.setup_sigmas:g} sigmas"
+        if all(content["determined"]):
+            return Statement("Mounting", "green", f"The recorded mounting holds: {sigmas}.")
+        sentence = f"The recorded mounting holds in the parts that are determined: {sigmas}."
         return Statement("Mounting", "green", sentence)
     return Statement("Mounting", "amber", f"The recorded mounting lacks {', '.join(lacks)}.")
 

@@ -78,4 +78,5 @@ def _share(section, control):
             "about as well (to a tenth of its sigma)."
         )
     else:
-        yield f"All {control} control points were needed: with fewer the drive is known less well."
+        points = "Both" if control == 2 else f"All {control}"
+        yield f"{points} control points were needed: with fewer the drive is known less well."

@@ -106,13 +106,17 @@ def _grow(xyz, level, brightest_first, voxel, keys_of, keys, number, limits):
             end += 1
         for k in range(start, end):
             root = root_of(parent, voxel[brightest_first[k]])
-            extent = (box[1][:, root] - box[0][:, root]).max()
-            if touched[root] != now and sums[1, root] >= smallest and extent <= largest:
+            if touched[root] == now:
+                continue
+            touched[root] = now
+            extent = 0.0
+            for axis in range(3):
+                extent = max(extent, box[1][axis, root] - box[0][axis, root])
+            if sums[1, root] >= smallest and extent <= largest:
                 entries[length, 0] = now
                 entries[length, 1] = root
                 entries[length, 2] = sums[0, root]
                 length += 1
-            touched[root] = now
         start = end
     place = _places(parent, chain[0])
     for entry in range(length):  # a root is its component's first voxel

@@ -14,6 +14,7 @@ from mlscorr.gap.closure.closure import Gap
 from mlscorr.gap.evidence import Cause, Inference, Where
 from mlscorr.gap.evidence._verdict import GapVerdict
 from mlscorr.gap.plan import NextData
+from mlscorr.gap.signatures import NO_MOUNTING
 
 BAND = (-0.4, 0.7)  # mm
 AGAIN = NextData("the same road again", "two passes share errors")
@@ -95,6 +96,17 @@ def test_the_nearest_effect_is_advised_against_by_its_share():
     first, second = advice_of(found, closure("range_scale", 9.0, 0.6, 0.9952), [], "")
     assert "makes an easting error" in first
     assert "closes 99.5 % of the squared gap" in second
+
+
+def test_what_no_judged_effect_explains_may_be_one_that_needs_a_mounting():
+    "Two of three effects lack [mounting]: to state it comes first, and no effect is ruled out"
+    found = inference("unknown", labels=("unknown",), lead="error to the right")
+    mounting = f"It acts on the mounting, {NO_MOUNTING}."
+    left_out = {"lever_arm": mounting, "boresight": mounting, "beam_divergence": "No row."}
+    first, second = advice_of(found, closure(), [], "", left_out=left_out)
+    assert first.startswith("State [mounting] in survey.toml") and "2 kinds of error" in first
+    assert second.endswith("no effect that was judged does.")
+    assert "that was judged explains it" in sentence_of(found, "")
 
 
 def test_what_chance_makes_is_not_closed():

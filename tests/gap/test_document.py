@@ -72,3 +72,20 @@ def test_sizes_of_an_effect_and_of_noise_have_names_of_their_own():
     assert owned["range_noise"]["magnitude"].estimate == 0.02
     alone = Cause("time_offset", 0.9, sizes[:1], parts[:1], np.zeros(len(g.rows)))
     assert distinct_parameters(alone) == sizes[:1]
+
+
+def test_times_of_two_events_have_names_of_their_own():
+    "A step beside a bump has two times: each is told with its effect's name, the width as it is"
+    g = features.geometry(3, targets=6, patches=20)
+    kinds = [effect_class(name) for name in ("position_step", "position_bump")]
+    events = signatures(g.rows, g.survey, kinds)[0]
+    step, bump = (next(each for each in events if each.name == kind.name) for kind in kinds)
+    times = CauseParameter("time", "s", 3.0), CauseParameter("time", "s", 5.0)
+    moment = (*times, CauseParameter("width", "s", 2.0))
+    parts = (step, np.zeros(3)), (bump, np.zeros(3))
+    cause = Cause("position_step+position_bump", 0.9, moment, parts, np.zeros(len(g.rows)))
+    told = [vars(parameter) for parameter in distinct_parameters(cause)]
+    assert [row["name"] for row in told] == ["position_step time", "position_bump time", "width"]
+    owned = parameters_of(cause.effect, told)
+    assert owned["position_step"]["time"].estimate == 3.0
+    assert owned["position_bump"]["time"].estimate == 5.0

@@ -18,7 +18,7 @@ from mlscorr.cli import app
 from mlscorr.io.trajectories import read_trajectory
 from mlscorr.pipeline.line_rate import line_rate
 from mlscorr.pipeline.survey_text import SurveyText
-from mlscorr.survey import PointCloud
+from mlscorr.survey import PointCloud, Pos, Scanner
 from tests.beds.las_crs import add_crs
 from tests.beds.pof import pof_bytes, poq_bytes
 
@@ -710,3 +710,20 @@ def test_init_and_check_state_the_same_duration_and_passes(folder):
     amounts = {amount.what: amount for amount in mlscorr.check(folder).read}
     assert amounts["trajectory"].number == pytest.approx(70.0, abs=0.2)  # s
     assert amounts["passes"].number == 2
+
+
+def test_accuracies_behind_a_hash_are_those_that_are_assumed():
+    "Uncommented as they stand, noises and sigmas are the defaults within 1 %"
+    lines = [line.removeprefix("# ") for line in str(SurveyText({})).splitlines()]
+    stated = tomllib.loads("\n".join(line for line in lines if re.match(r"\w+ = |\[", line)))
+    scanner, pos = Scanner(), Pos()
+    assert stated["scanner"] == {
+        "range_noise": pytest.approx(scanner.range_noise, rel=0.01),
+        "angle_noise": pytest.approx(np.degrees(scanner.angle_noise), rel=0.01),
+        "lines_per_second": scanner.lines_per_second,
+    }
+    assert stated["pos"] == {
+        "position_sigma": pytest.approx(pos.position_sigma, rel=0.01),
+        "attitude_sigma": pytest.approx(np.degrees(pos.attitude_sigma), rel=0.01),
+        "correlation_time": pos.correlation_time,
+    }

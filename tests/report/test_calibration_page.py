@@ -59,7 +59,13 @@ def test_the_page_says_first_what_the_mounting_lacks_and_what_the_site_does_not_
     ("determined", "lack", "rating", "sentence"),
     [
         (5, 0.424, "amber", "mounting lacks lever arm up 424 ± 41 mm (not determined)."),
-        (5, 0.024, "green", "mounting holds: it lacks nothing beyond 3 sigmas."),
+        (
+            5,
+            0.024,
+            "green",
+            "holds in the parts that are determined: it lacks nothing beyond 3 sigmas.",
+        ),
+        (6, 0.024, "green", "mounting holds: it lacks nothing beyond 3 sigmas."),
         (0, 0.024, "amber", "This geometry does not tell whether the recorded mounting holds."),
     ],
 )
@@ -69,7 +75,7 @@ def test_a_mounting_holds_where_nothing_else_is_seen(determined, lack, rating, s
     zero = {"correction": [0.0, 0.0, 0.0], "sigma": [0.01, 0.01, 0.041]}
     arm = zero | {"correction": [0.0, 0.0, lack]}
     content["lsc"] = content["lsc"] | {"lever_arm": arm, "boresight": zero}
-    content["determined"] = [bool(determined)] * 2 + [False] + [bool(determined)] * 3
+    content["determined"] = [bool(determined)] * 2 + [determined == 6] + [bool(determined)] * 3
     mounting = calibration_screen(content, [])["statements"][0]
     assert mounting["rating"] == rating
     assert mounting["sentence"].endswith(sentence)

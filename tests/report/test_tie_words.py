@@ -36,10 +36,13 @@ def test_without_control_nothing_absolute_is_claimed():
     assert "%" not in text
 
 
-@pytest.mark.parametrize("enough, expected", [(6, "All 6 control points"), (1, "1 of them would")])
-def test_all_points_or_a_single_one_are_named_so(enough, expected):
+@pytest.mark.parametrize(
+    "control, enough, expected",
+    [(6, 6, "All 6 control points"), (2, 2, "Both control points"), (6, 1, "1 of them would")],
+)
+def test_all_points_or_a_single_one_are_named_so(control, enough, expected):
     "No sentence says that 6 of 6 would have sufficed"
-    assert expected in words(6, sufficient_control=enough)
+    assert expected in words(control, sufficient_control=enough)
 
 
 def test_a_share_of_next_to_nothing_is_not_zero():

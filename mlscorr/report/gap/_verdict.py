@@ -109,7 +109,9 @@ def _unknown(document):
     else:
         text = "It can't be said what it looks like."
     more = "This is a lead to follow, not a cause: whatever behaves like that may have made it."
-    return VerdictBox("open", "Something is wrong that no known effect explains", [text, more])
+    return VerdictBox(
+        "open", "Something is wrong that no effect judged here explains", [text, more]
+    )
 
 
 def _cause(document):

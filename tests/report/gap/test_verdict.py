@@ -19,7 +19,10 @@ def summary(document):
         ("effect", ["The clock of the scanner is 4.5 ms ± 0.5 ms behind", "98 in 100"]),
         ("vector", ["the scanner really sits 93 mm ± 4 mm farther left."]),
         ("none", ["Nothing is wrong that this survey could show", "97 in 100", "Of 100 surveys"]),
-        ("unknown", ["no known effect explains", "height error that grows with speed squared"]),
+        (
+            "unknown",
+            ["no effect judged here explains", "height error that grows with speed squared"],
+        ),
         ("unknown", ["91 in 100", "the nearest known effect, lever arm", "16.4 mm → 1.9 mm"]),
         ("pair", ["Two things are wrong", "2.1 ms ± 0.4 ms ahead of", "93 mm ± 4 mm farther left"]),
         ("noise", ["Noisier than stated", "7.1 mm ± 0.4 mm of scatter", "more than 99 in 100"]),
