@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mlscorr.collocation import Covariance, Noise, Signal, collocate
-from tests.beds.dense import collocate_dense
+from tests.collocation.dense import collocate_dense
 
 START = 413200.0  # s
 RESTARTS = START + np.array([100.0, 180.0])

@@ -13,7 +13,7 @@ from mlscorr.collocation._conditional import (
     predict_between,
 )
 from mlscorr.collocation._states import Layout, fill_noise
-from tests.beds.joint_states import ALL_FAMILIES, carried, stationary
+from tests.collocation.joint_states import ALL_FAMILIES, carried, stationary
 
 
 def layout_of(family):

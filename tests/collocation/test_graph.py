@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 
 from mlscorr.collocation._graph import information_edges
-from tests.beds.linked_rows import Street
+from tests.collocation.linked_rows import Street
 from tests.collocation.test_sparse_rows import sides_of
 
 

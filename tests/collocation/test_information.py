@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mlscorr.collocation import Covariance, Noise, Signal, SparseRows, collocate, collocate_rows
-from tests.beds.joint_states import ALL_FAMILIES
-from tests.beds.linked_rows import LENGTH, START, Street
+from tests.collocation.joint_states import ALL_FAMILIES
+from tests.collocation.linked_rows import LENGTH, START, Street
 
 
 @pytest.mark.parametrize("time", [5.0, 60.0, 600.0])

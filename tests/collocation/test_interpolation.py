@@ -7,7 +7,7 @@ from mlscorr.collocation import Covariance, Noise, Signal, collocate
 from mlscorr.collocation._conditional import Epochs
 from mlscorr.collocation._recursion import filter_columns, smooth_columns, smooth_covariance
 from mlscorr.collocation.interpolation import interpolate
-from tests.beds.joint_states import ALL_FAMILIES, START, Bed
+from tests.collocation.joint_states import ALL_FAMILIES, START, Bed
 
 ASKED = START + np.array([-1e5, -3.0, 0.0, 7.0, 7.001, 22.0, 41.0, 59.0, 80.0, 1e6])
 BEDS = [Bed(seed) for seed in range(4)]

@@ -12,7 +12,7 @@ from mlscorr.collocation import (
     leave_each_out,
     reweight,
 )
-from tests.beds.linked_rows import Street
+from tests.collocation.linked_rows import Street
 
 STREET = Street("matern32", 60.0, targets=5, ties=30)
 SOLVED = collocate_rows(STREET.rows)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from mlscorr.collocation import FAMILIES, Covariance, Noise, Signal, collocate
-from tests.beds.dense import collocate_dense
+from tests.collocation.dense import collocate_dense
 
 START = 413_200.0  # s of week
 SPAN = 200.0  # s

@@ -15,8 +15,8 @@ from mlscorr.collocation import (
     collocate_rows_dense,
 )
 from mlscorr.collocation.model import signal_clocks, solve_trend
-from tests.beds.dense import collocate_dense
 from tests.beds.shared_noise import noise_of, written_out
+from tests.collocation.dense import collocate_dense
 
 START = 413_200.0  # s of week
 

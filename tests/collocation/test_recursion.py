@@ -11,7 +11,7 @@ from mlscorr.collocation._recursion import (
     smooth_columns,
     smooth_covariance,
 )
-from tests.beds.joint_states import ALL_FAMILIES, Bed
+from tests.collocation.joint_states import ALL_FAMILIES, Bed
 
 BEDS = [Bed(seed, r=1 + seed % 3) for seed in range(6)]
 BEDS += [Bed(20 + i, (family,) * 3) for i, family in enumerate(ALL_FAMILIES)]

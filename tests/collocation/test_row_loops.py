@@ -10,7 +10,7 @@ from mlscorr.collocation._row_loops import (
     observe,
     row_covariances,
 )
-from tests.beds.linked_rows import Street
+from tests.collocation.linked_rows import Street
 from tests.collocation.test_block_cholesky import blocks
 from tests.collocation.test_sparse_rows import sides_of
 

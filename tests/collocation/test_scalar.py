@@ -5,7 +5,7 @@ import pytest
 
 from mlscorr.collocation._recursion import Recursion, filter_columns
 from mlscorr.collocation._scalar import common_innovations, whiten_columns
-from tests.beds.joint_states import Bed
+from tests.collocation.joint_states import Bed
 
 
 def scalar_recursion(bed):

@@ -6,8 +6,8 @@ import pytest
 from mlscorr.collocation._knots import Knots, knot_step
 from mlscorr.collocation._states import Layout
 from mlscorr.collocation.sparse_rows import Sides
-from tests.beds.joint_states import ALL_FAMILIES
-from tests.beds.linked_rows import Street
+from tests.collocation.joint_states import ALL_FAMILIES
+from tests.collocation.linked_rows import Street
 
 
 def sides_of(street, nodes=1000):

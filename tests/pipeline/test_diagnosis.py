@@ -13,8 +13,7 @@ from typer.testing import CliRunner
 import mlscorr
 from mlscorr.cli import app
 from mlscorr.effects import make_effect
-from mlscorr.gap.evidence import Cause, Costs
-from mlscorr.gap.evidence._error_models import STATED
+from mlscorr.gap.evidence import Cause, Costs, ErrorModel
 from mlscorr.gap.evidence.decision import kind_of
 from mlscorr.gap.signatures import Signature, as_believed, with_cause
 from mlscorr.io.clouds import read_chunks
@@ -148,14 +147,14 @@ def test_a_cause_that_the_simulator_has_already_is_joined_with_it(late, tmp_path
     kind = Signature(
         type(effect), {}, ("magnitude",), ("s",), none + 1e-3, none[:, None], none, none
     )
-    cause = Cause("time_offset", 1.0, (), ((kind, np.array([0.005])),), none, None, STATED)
+    cause = Cause("time_offset", 1.0, (), ((kind, np.array([0.005])),), none, None, ErrorModel())
     (joined,) = with_cause(simulator, survey, cause).effects
     assert abs(joined.magnitude - OFFSET) < 1e-12
-    worse = Cause("position_noise", 1.0, (), (), none, None, replace(STATED, scale=2.0))
+    worse = Cause("position_noise", 1.0, (), (), none, None, ErrorModel(scale=2.0))
     pos = with_cause(simulator, survey, worse).pos
     assert pos.position_sigma == 2 * survey.pos.position_sigma
     window = (357710.0, 20.0, 12.0, "rise")
-    outage = Cause("position_noise", 1.0, (), (), none, None, replace(STATED, windows=(window,)))
+    outage = Cause("position_noise", 1.0, (), (), none, None, ErrorModel(windows=(window,)))
     improved = with_cause(simulator, survey, outage)
     assert improved.pos.windows == (window,)
     write_simulator(improved, tmp_path / "simulator.toml")
