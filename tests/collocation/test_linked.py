@@ -54,29 +54,6 @@ def test_a_millionth_of_weight_leaves_a_wrong_tie_out():
         reweight(SOLVED, [np.ones(10), np.append(np.ones(29), 0.0)])
 
 
-@pytest.mark.long
-def test_each_tie_left_out_is_what_the_others_predict():
-    "Residual and variance by leaving it out in earnest, to 1e-7 m; control rows by leave_out"
-    left_out = leave_each_out(SOLVED)
-    total = STREET.total
-    design = STREET.design
-    for row in (30, 41, 59):
-        others = np.delete(np.arange(60), row)
-        inverse = np.linalg.inv(total[np.ix_(others, others)])
-        normal = np.linalg.inv(design[others].T @ inverse @ design[others])
-        trend = normal @ design[others].T @ inverse @ STREET.misclosure[others]
-        gain = total[row, others] @ inverse
-        residual = STREET.misclosure[row] - design[row] @ trend
-        residual -= gain @ (STREET.misclosure[others] - design[others] @ trend)
-        lacking = design[row] - gain @ design[others]
-        variance = total[row, row] - gain @ total[others, row] + lacking @ normal @ lacking
-        assert left_out[1].residual[row - 30, 0] == pytest.approx(residual, abs=1e-7)
-        assert left_out[1].covariance[row - 30, 0, 0] == pytest.approx(variance, rel=1e-6)
-    residual, covariance = SOLVED.leave_out([6, 7, 8])
-    assert left_out[0].residual[2] == pytest.approx(residual, abs=1e-9)
-    assert left_out[0].covariance[2] == pytest.approx(covariance, rel=1e-6, abs=1e-12)
-
-
 def test_redundancy_numbers_say_what_a_residual_shows_of_an_error():
     "An error of a tie shows in its residual by its redundancy number: R V^-1 less the trend's part"
     left_out = leave_each_out(SOLVED)
