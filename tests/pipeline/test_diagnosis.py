@@ -21,6 +21,7 @@ from mlscorr.pipeline import read_effects
 from mlscorr.simulate import Scenario, beliefs_of, read_simulator, simulate, write_simulator
 from tests.beds import diagnosed_street
 from tests.beds.documents import undocumented
+from tests.beds.made_once import copied_once
 from tests.beds.shared import shared
 
 OFFSET = 0.02  # s
@@ -36,8 +37,7 @@ KEYS = {
 @pytest.fixture(scope="module")
 def late(tmp_path_factory):
     "A survey whose scanner clock is 20 ms off, without its truth"
-    effect = {"name": "time_offset", "magnitude": OFFSET}
-    return diagnosed_street.write(tmp_path_factory.mktemp("late") / "survey", effect)
+    return copied_once(tmp_path_factory, "late", diagnosed_street.write_late)
 
 
 @pytest.fixture(scope="module")
@@ -253,7 +253,7 @@ def _with_control_moved(folder, out, names, away):
 @pytest.fixture(scope="module")
 def sound(tmp_path_factory):
     "A survey in which nothing is wrong"
-    return diagnosed_street.write(tmp_path_factory.mktemp("sound") / "survey")
+    return copied_once(tmp_path_factory, "sound", diagnosed_street.write)
 
 
 @pytest.mark.long
