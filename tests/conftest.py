@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from mlscorr.simulate import Scenario, simulate
+from tests.beds.made_once import contents, made_once
 from tests.beds.places import MLSCORR
 
 
@@ -23,17 +24,22 @@ def pytest_configure(config):
         config.option.loadscopereorder = False
 
 
-@pytest.fixture(scope="session")
-def street(tmp_path_factory):
-    "Folder of a simulated survey of 8 s: 4 control points and 1 check point; copy it to change it"
-    folder = tmp_path_factory.mktemp("street")
+def write_street(folder):
     scenario = Scenario(
         drive={"duration": 8.0},
         targets={"control": 4, "check": 1},
         scanner=[{"lines_per_second": 75, "points_per_line": 400}],
     )
     simulate(scenario, np.random.default_rng(1)).write(folder)
-    return folder
+
+
+@pytest.fixture(scope="session")
+def street(tmp_path_factory):
+    "Folder of a simulated survey of 8 s: 4 control points and 1 check point; copy it to change it"
+    folder = made_once(tmp_path_factory, "street", write_street)
+    before = contents(folder)
+    yield folder
+    assert contents(folder) == before, "A test changed the street, which all tests share."
 
 
 @pytest.fixture(scope="session")

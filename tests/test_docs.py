@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import tomllib
 from pkgutil import resolve_name
 from typing import get_args
@@ -81,9 +82,9 @@ def test_names_of_the_package_are_there(page):
 
 
 @pytest.mark.parametrize("name", ["tutorial", "own-simulator"])
-def test_python_of_the_manual_runs(name, street, monkeypatch):
+def test_python_of_the_manual_runs(name, street, tmp_path, monkeypatch):
     "The blocks of a page run one after the other beside a survey.toml"
-    monkeypatch.chdir(street)
+    monkeypatch.chdir(shutil.copytree(street, tmp_path / "street"))
     monkeypatch.setattr(catalogue, "_registered", {})
     text = (ROOT / "docs" / f"{name}.md").read_text()
     exec("\n".join(re.findall(r"```python\n(.*?)```", text, flags=re.S)), {"__name__": name})

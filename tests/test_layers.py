@@ -3,15 +3,15 @@
 import ast
 import subprocess
 import sys
+from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
-import pytest
-
 import mlscorr
 
 PACKAGE = Path(mlscorr.__file__).parent
+TESTS = Path(__file__).parent
 FLOORS = (  # from the ground up; rooms on one floor do not know each other
     ("compiled_loops",),
     ("survey",),
@@ -46,8 +46,8 @@ SIMULATOR = (  # floors inside simulate; its rooms on one floor do not know each
     ("drive", "pos", "scan"),
     ("recording", "scenario_file", "simulator_file"),
     ("survey",),
-    ("displacement", "random_survey"),
-    ("mechanisms",),
+    ("displacement", "_random_survey"),
+    ("_mechanisms",),
 )
 SIMULATOR_FLOOR = {room: number for number, rooms in enumerate(SIMULATOR) for room in rooms}
 MODULES = sorted(
@@ -66,76 +66,104 @@ PROJECT_FLOORS = (  # of the modules within pipeline/project, which stands on to
     ("status",),
 )
 PROJECT_FLOOR = {room: number for number, rooms in enumerate(PROJECT_FLOORS) for room in rooms}
-GAP_MODULES = sorted((PACKAGE / "gap").rglob("*.py"))
 
 
 def room_of(path):
     return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
 
 
+@cache
+def statements(path):
+    "Imports of a module, inside functions too"
+    kinds = ast.Import | ast.ImportFrom
+    return [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, kinds)]
+
+
 def imports_of(path):
     "Dotted names of all that a module imports, inside functions too"
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in statements(path):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
+        else:
             assert node.level == 0, f"{path}: relative imports hide the floor"
             yield node.module
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
 
 
-@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
-def test_imports_point_downward(path):
+def imports_within(room):
+    """Imports of a room's modules from the room itself: (path in the room, part, dotted name)
+
+    Of mlscorr.gap: (evidence/decision.py, "residuals", "mlscorr.gap.residuals.Residuals").
+    """
+    folder = PACKAGE.parent / room.replace(".", "/")
+    for path in sorted(folder.rglob("*.py")):
+        for name in imports_of(path):
+            if name.startswith(f"{room}."):
+                yield path.relative_to(folder), name.removeprefix(f"{room}.").split(".")[0], name
+
+
+def assert_none(offenders):
+    "All that break a law stand in one message"
+    distinct = list(dict.fromkeys(offenders))
+    assert not distinct, "\n".join(distinct)
+
+
+def test_imports_point_downward():
     "Every module stands on a floor and imports only its own room and floors below"
-    room = room_of(path)
-    for name in imports_of(path):
-        parts = name.split(".")
-        if parts[0] != "mlscorr" or len(parts) == 1 or parts[1] == room:
-            continue
-        assert FLOOR[parts[1]] < FLOOR[room], f"{room} imports {name}"
+    offenders = []
+    for path in MODULES:
+        room = room_of(path)
+        for name in imports_of(path):
+            parts = name.split(".")
+            if parts[0] != "mlscorr" or len(parts) == 1 or parts[1] == room:
+                continue
+            if FLOOR[parts[1]] >= FLOOR[room]:
+                offenders.append(f"{path}: {name}")
+    assert_none(offenders)
 
 
-@pytest.mark.parametrize("path", GAP_MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
-def test_imports_within_the_gap_point_downward(path):
+def test_imports_within_the_gap_point_downward():
     "Residuals, signatures, evidence, closure and plan, document: each knows those before it"
-    room = path.relative_to(PACKAGE / "gap").parts[0].removesuffix(".py")
-    for name in imports_of(path):
-        parts = name.split(".")
-        if parts[:2] == ["mlscorr", "gap"] and len(parts) > 2 and parts[2] in GAP_FLOOR:
-            below = GAP_FLOOR[parts[2]] < GAP_FLOOR.get(room, len(GAP_FLOORS))
-            assert below or parts[2] == room, f"{room} imports {name}"
+    offenders = []
+    for path, other, name in imports_within("mlscorr.gap"):
+        room = path.parts[0].removesuffix(".py")
+        if other not in GAP_FLOOR or other == room:
+            continue
+        if GAP_FLOOR[other] >= GAP_FLOOR.get(room, len(GAP_FLOORS)):
+            offenders.append(f"{path}: {name}")
+    assert_none(offenders)
 
 
-@pytest.mark.parametrize("path", sorted((PACKAGE / "pipeline").glob("*.py")), ids=lambda p: p.stem)
-def test_a_survey_knows_no_project(path):
+def test_a_survey_knows_no_project():
     "Commands for one survey do without those for many"
-    assert not any(name.startswith("mlscorr.pipeline.project") for name in imports_of(path))
+    assert_none(
+        f"{path}: {name}"
+        for path, other, name in imports_within("mlscorr.pipeline")
+        if other == "project" and path.parts[0] != "project"
+    )
 
 
-@pytest.mark.parametrize(
-    "path", sorted((PACKAGE / "pipeline" / "project").glob("[a-z]*.py")), ids=lambda p: p.stem
-)
-def test_imports_within_a_project_point_downward(path):
+def test_imports_within_a_project_point_downward():
     "Tasks and engines, what touches files, what joins drives, the story: each knows those below"
-    for name in imports_of(path):
-        parts = name.split(".")
-        if parts[:3] == ["mlscorr", "pipeline", "project"] and len(parts) > 3:
-            assert PROJECT_FLOOR[parts[3]] < PROJECT_FLOOR[path.stem], f"{path.stem}: {name}"
+    assert_none(
+        f"{path}: {name}"
+        for path, other, name in imports_within("mlscorr.pipeline.project")
+        if path.stem != "__init__" and PROJECT_FLOOR[other] >= PROJECT_FLOOR[path.stem]
+    )
 
 
 IO_FLOORS = ("store", "tables", "trajectories", "clouds", "surveys")  # from the ground up
 
 
-@pytest.mark.parametrize(
-    "path", sorted((PACKAGE / "io").rglob("*/*.py")), ids=lambda p: f"{p.parent.name}/{p.stem}"
-)
-def test_imports_within_the_files_point_downward(path):
+def test_imports_within_the_files_point_downward():
     "Bytes, tables, trajectories, clouds, surveys: each knows what comes before it alone"
-    room = IO_FLOORS.index(path.parent.name)
-    for name in imports_of(path):
-        parts = name.split(".")
-        if parts[:2] == ["mlscorr", "io"] and len(parts) > 2 and parts[2] in IO_FLOORS:
-            assert IO_FLOORS.index(parts[2]) <= room, name
+    offenders = []
+    for path, other, name in imports_within("mlscorr.io"):
+        if other not in IO_FLOORS or len(path.parts) == 1:
+            continue
+        if IO_FLOORS.index(other) > IO_FLOORS.index(path.parts[0]):
+            offenders.append(f"{path}: {name}")
+    assert_none(offenders)
 
 
 FACES = {  # dotted name of each room -> its folder; what stands directly in mlscorr has no face
@@ -157,15 +185,40 @@ def room_of_module(name):
     return name
 
 
-@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
-def test_no_import_reaches_past_a_face(path):
-    "A module of another room is known by what the room's __init__ offers"
-    own = room_of_module(dotted(path).removesuffix(".__init__"))
-    for node in ast.walk(ast.parse(path.read_text())):
+def imported_modules(path):
+    "(module, name) of each `from mlscorr.module import name`"
+    for node in statements(path):
         if isinstance(node, ast.ImportFrom) and node.module.startswith("mlscorr."):
-            room = room_of_module(node.module)
+            yield from ((node.module, alias.name) for alias in node.names)
+
+
+def test_no_import_reaches_past_a_face():
+    "A module of another room is known by what the room's __init__ offers"
+    offenders = []
+    for path in MODULES:
+        own = room_of_module(dotted(path).removesuffix(".__init__"))
+        for module, name in imported_modules(path):
+            room = room_of_module(module)
             is_inside = f"{own}.".startswith(f"{room}.")  # a room within another knows its parent
-            assert is_inside or room in (node.module, "mlscorr"), node.module
+            if not is_inside and room not in (module, "mlscorr"):
+                offenders.append(f"{path}: {module}.{name}")
+    assert_none(offenders)
+
+
+def test_tests_enter_other_rooms_by_their_faces():
+    "No test outside tests/ROOM knows a private module of ROOM, or takes past its face what it has"
+    offenders = []
+    for path in sorted(TESTS.rglob("*.py")):
+        own = path.relative_to(TESTS).parts[0]
+        for module, name in imported_modules(path):
+            room = room_of_module(module)
+            if room == "mlscorr" or room.split(".")[1] == own:
+                continue
+            is_private = any(part.startswith("_") for part in (*module.split("."), name))
+            is_past_face = module != room and hasattr(import_module(room), name)
+            if is_private or is_past_face:
+                offenders.append(f"{path.relative_to(TESTS)}: {module}.{name}")
+    assert_none(offenders)
 
 
 def test_no_imports_go_in_circles():
@@ -184,41 +237,27 @@ def test_no_imports_go_in_circles():
     assert not open_modules
 
 
-@pytest.mark.parametrize(
-    "path",
-    sorted((PACKAGE / "simulate").rglob("*/*.py")),
-    ids=lambda path: str(path.relative_to(PACKAGE)),
-)
-def test_rooms_of_the_simulator_know_those_below(path):
+def test_rooms_of_the_simulator_know_those_below():
     "A scene knows no drive, and scanners no POS; other rooms enter by the door of each"
-    room = path.parent.name
-    for node in ast.walk(ast.parse(path.read_text())):
-        if not isinstance(node, ast.ImportFrom) or not node.module.startswith("mlscorr.simulate."):
+    offenders = []
+    for path, other, _ in imports_within("mlscorr.simulate"):
+        own = path.parts[0].removesuffix(".py")
+        if own in ("__init__", other) or other not in SIMULATOR_FLOOR:
             continue
-        other, *inner = node.module.split(".")[2:]
-        if other != room:
-            assert SIMULATOR_FLOOR[other] < SIMULATOR_FLOOR[room], node.module
-            assert not inner, f"{node.module} is behind the door of {other}"
+        if SIMULATOR_FLOOR[other] >= SIMULATOR_FLOOR[own]:
+            offenders.append(f"{path}: {other}")
+    assert_none(offenders)
 
 
-@pytest.mark.parametrize(
-    "path", sorted((PACKAGE / "simulate").glob("[a-z]*.py")), ids=lambda path: path.stem
-)
-def test_modules_of_the_simulator_know_those_below(path):
-    "Scenario and settings know nothing of what is made of them; only write opens a module later"
-    for node in ast.parse(path.read_text()).body:
-        if isinstance(node, ast.ImportFrom) and node.module.startswith("mlscorr.simulate."):
-            other, *inner = node.module.split(".")[2:]
-            assert SIMULATOR_FLOOR[other] < SIMULATOR_FLOOR[path.stem], node.module
-            assert not inner, f"{node.module} is behind the door of {other}"
-
-
-@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
-def test_heavy_libraries_stay_in_their_rooms(path):
+def test_heavy_libraries_stay_in_their_rooms():
     "laspy and pye57 are known to io alone, open3d and sklearn to the rooms that ROOMS_OF names"
-    for name in imports_of(path):
-        library = name.split(".")[0]
-        assert library not in ROOMS_OF or room_of(path) in ROOMS_OF[library], name
+    offenders = []
+    for path in MODULES:
+        for name in imports_of(path):
+            library = name.split(".")[0]
+            if library in ROOMS_OF and room_of(path) not in ROOMS_OF[library]:
+                offenders.append(f"{path}: {name}")
+    assert_none(offenders)
 
 
 def loaded_by(statement):
@@ -263,7 +302,7 @@ def test_studies_import_what_there_is():
     folder = PACKAGE.parent / "benchmarks"
     lacking = []
     for path in sorted(folder.glob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in statements(path):
             if not isinstance(node, ast.ImportFrom) or node.module is None:
                 continue
             own = folder / f"{node.module}.py"

@@ -5,8 +5,15 @@ import lazy_loader
 __getattr__, __dir__, __all__ = lazy_loader.attach(
     __name__,
     submod_attrs={
-        "_mechanisms": ["Described", "Mechanism", "described", "load_mechanisms", "mechanisms"],
-        "_random_survey": ["random_survey"],
+        "_mechanisms": [
+            "Described",
+            "Mechanism",
+            "described",
+            "load_mechanisms",
+            "mechanisms",
+            "training_mechanisms",
+        ],
+        "_random_survey": ["random_scenario", "random_survey"],
         "displacement": ["DisplacedSurvey", "RecordedPoints"],
         "scenario": ["DEMO", "Scenario", "SceneScenario"],
         "scenario_file": ["read_scenario", "scenario_files"],

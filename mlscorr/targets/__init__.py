@@ -1,9 +1,10 @@
 """Targets in the cloud: candidates -> clusters -> plane and outline -> observations."""
 
+from mlscorr.targets._outline import Outline
 from mlscorr.targets.balls import Neighbourhoods
 from mlscorr.targets.candidates import NO_POINTS, Candidates, collect, number_passes, search_radius
 from mlscorr.targets.extract import PassTarget, as_observations, fit_near_control
-from mlscorr.targets.fit import FittedTarget, distinct, fit_targets
+from mlscorr.targets.fit import FittedTarget, TargetView, distinct, fit_targets
 from mlscorr.targets.intensity import why_useless
 from mlscorr.targets.regions import BrightRegion
 from mlscorr.targets.scanner_path import ScannerPath

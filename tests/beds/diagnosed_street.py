@@ -6,7 +6,7 @@ from mlscorr.simulate import Scenario, simulate
 
 
 def write(folder, *effects):
-    "Folder of the survey with effects (dicts), without its truth"
+    "Write the survey with effects (dicts), without its truth"
     scenario = Scenario(
         drive={"duration": 30.0},
         targets={"control": 12, "check": 3},
@@ -16,4 +16,8 @@ def write(folder, *effects):
     simulate(scenario, np.random.default_rng(3)).write(folder)
     for truth in ("truth.json", "truth.npz"):
         (folder / truth).unlink()
-    return folder
+
+
+def write_late(folder):
+    "Write the survey whose scanner clock is 20 ms off"
+    write(folder, {"name": "time_offset", "magnitude": 0.02})

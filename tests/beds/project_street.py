@@ -71,6 +71,11 @@ def write_project(folder, duration=8.0, tiles=1):
     return folder / "project.toml"
 
 
+def write_tiled(folder):
+    "The project of two drives of 6 s, of two tiles each"
+    write_project(folder, duration=6.0, tiles=2)
+
+
 def share_tiles(folder):
     "The tiles of both drives as tiles of the project, whose points point_source_ids tell apart"
     names = sorted(path.name for path in (folder / "first").glob("*.laz"))

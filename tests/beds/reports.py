@@ -11,8 +11,7 @@ from mlscorr.correction import Correction
 from mlscorr.estimate import REASONS, Support, WeakStretch
 from mlscorr.evaluate import Score, Statistics, TargetRow
 from mlscorr.frames import attitude_from_angles
-from mlscorr.report import CorrectionReport, Coverage, FileRow
-from mlscorr.report.correction_page import write_report
+from mlscorr.report import CorrectionReport, Coverage, FileRow, write_report
 from mlscorr.report.correction_report import array
 from mlscorr.survey import CloudFile, ControlPoints, Survey, Trajectory
 

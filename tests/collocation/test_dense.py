@@ -14,8 +14,8 @@ from mlscorr.collocation import (
     collocate_rows_dense,
     covariance_given,
 )
-from tests.beds.dense import collocate_correlated
-from tests.beds.linked_rows import Street
+from tests.collocation.dense import collocate_correlated
+from tests.collocation.linked_rows import Street
 
 START = 413_200.0  # s of week
 SPAN = 200.0  # s

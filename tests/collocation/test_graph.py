@@ -5,8 +5,19 @@ from itertools import combinations
 import numpy as np
 
 from mlscorr.collocation._graph import information_edges
-from tests.beds.linked_rows import Street
-from tests.collocation.test_sparse_rows import sides_of
+from mlscorr.collocation._knots import Knots, knot_step
+from mlscorr.collocation._states import Layout
+from mlscorr.collocation.sparse_rows import Sides
+from tests.collocation.linked_rows import Street
+
+
+def sides_of(street, nodes=1000):
+    "Layout, knots, and Sides of control and ties"
+    rows = street.rows
+    times, clocks = (np.concatenate(part) for part in zip(*(r.epochs for r in rows), strict=True))
+    layout = Layout.of(rows[0].signals)
+    knots = Knots.of(times, clocks, [knot_step(signal.covariance) for signal in rows[0].signals])
+    return layout, knots, [Sides.of(part, layout, knots, nodes) for part in rows]
 
 
 def test_knots_about_a_time_and_those_of_a_tie_are_linked():

@@ -1,46 +1,12 @@
-"""Sparse rows solved in information form give what the dense formula and the recursion give."""
+"""Sparse rows solved in information form: what they share, what is refused, what is smooth."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from mlscorr.collocation import Covariance, Noise, Signal, SparseRows, collocate, collocate_rows
-from tests.beds.joint_states import ALL_FAMILIES
-from tests.beds.linked_rows import LENGTH, START, Street
-
-
-@pytest.mark.parametrize("time", [5.0, 60.0, 600.0])
-@pytest.mark.parametrize("family", ALL_FAMILIES)
-def test_ties_and_control_equal_the_dense_formula(family, time):
-    "1e-5 m and 1e-6 rad, 1 % of sigma, 0.01 in log-likelihood: pose, weights, leave-one-out"
-    street = Street(family, time)
-    solved, (mean, sigma, weights, likelihood) = collocate_rows(street.rows), street.predicted()
-    there, spread = street.predict(solved)
-    assert np.abs(there - mean)[:, :3].max() < 1e-5
-    assert np.abs(there - mean)[:, 3:].max() < 1e-6
-    assert spread == pytest.approx(sigma, rel=0.01)
-    assert solved.log_likelihood == pytest.approx(likelihood, abs=0.01)
-    noise = np.sqrt(np.append(np.full(36, 1e-5), street.tie_noise.own.ravel()))
-    assert np.abs((solved.weights - weights) * noise).max() < 0.01
-
-
-@pytest.mark.parametrize("family", ALL_FAMILIES)
-def test_rows_of_one_epoch_are_solved_as_by_the_recursion(family):
-    "1e-5 m, 1 % of sigma and 0.01 in log-likelihood, with errors that both passes share"
-    street = Street(family, 60.0, seed=2, targets=20)
-    rows = street.rows[0]
-    recursion = collocate(
-        rows.gps_time[:, 0], rows.misclosure, rows.noise, rows.design, rows.signals
-    )
-    solved = collocate_rows([rows])
-    for here, there in zip(street.predict(solved), street.predict(recursion), strict=True):
-        assert np.abs(here - there).max() < 1e-5
-        assert here == pytest.approx(there, rel=0.01, abs=1e-5)
-    assert solved.log_likelihood == pytest.approx(recursion.log_likelihood, abs=0.01)
-    target = recursion.leave_out([0, 1, 2, 60, 61, 62])  # both passes of a target
-    for here, there in zip(solved.leave_out([0, 1, 2, 60, 61, 62]), target, strict=True):
-        assert here == pytest.approx(there, rel=1e-3, abs=1e-6)
+from mlscorr.collocation import Covariance, Noise, Signal, SparseRows, collocate_rows
+from tests.collocation.linked_rows import LENGTH, START, Street
 
 
 def test_least_squares_needs_no_signal():
@@ -132,20 +98,6 @@ def test_what_cannot_be_solved_is_refused_in_a_sentence():
         collocate_rows([ties])
     with pytest.raises(ValueError, match="72 observations see other epochs"):
         collocate_rows([control, replace(ties, gps_time=ties.gps_time[::-1])], solved.solver)
-
-
-def test_a_tie_may_link_two_moments_between_the_same_knots():
-    "Sides 0.1 ms to 50 ms apart: pose to 1e-5 m and log-likelihood to 0.01 of the dense formula"
-    street = Street("matern52", 60.0, seed=4)
-    street.tie_time[:, 1] = street.tie_time[:, 0] + np.geomspace(1e-4, 0.05, street.ties)
-    del street.__dict__["total"], street.__dict__["_views"]
-    root = np.linalg.cholesky(street.total)
-    street.misclosure = root @ np.random.default_rng(1).normal(size=len(root))
-    solved, (mean, sigma, _, likelihood) = collocate_rows(street.rows), street.predicted()
-    there, spread = street.predict(solved)
-    assert np.abs(there - mean)[:, :3].max() < 1e-5
-    assert spread == pytest.approx(sigma, rel=0.01)
-    assert solved.log_likelihood == pytest.approx(likelihood, abs=0.01)
 
 
 def test_no_tie_at_all_changes_nothing():

@@ -16,7 +16,7 @@ from mlscorr.collocation._knots import (
 )
 from mlscorr.collocation._pattern import Pattern, diagonal
 from mlscorr.collocation._states import Layout
-from tests.beds.joint_states import ALL_FAMILIES, START, carried, stationary
+from tests.collocation.joint_states import ALL_FAMILIES, START, carried, stationary
 
 
 @pytest.mark.parametrize("family", ALL_FAMILIES)

@@ -2,74 +2,7 @@ import numpy as np
 import pytest
 
 from mlscorr.collocation import FAMILIES, Covariance, Noise, Signal, collocate
-from tests.beds.dense import collocate_dense
-
-START = 413_200.0  # s of week
-SPAN = 200.0  # s
-
-
-class Survey:
-    "Targets at random times in any order, three signals of 3, 2 and 3 processes, shared noise"
-
-    def __init__(self, seed, families=None, n=14, p=3, asked=30, groups=6):
-        rng = np.random.default_rng(seed)
-        if families is None:
-            families = rng.choice(FAMILIES, 3)
-        times = 10 ** rng.uniform(0, 3, 3)
-        self.covariances = [Covariance(f, t) for f, t in zip(families, times, strict=True)]
-        self.gps_time = START + rng.uniform(0, SPAN, n)
-        self.gps_time[3:5] = self.gps_time[2]  # three targets at one time,
-        self.gps_time[6] = self.gps_time[5] + 1e-3  # and two a millisecond apart
-        self.mixing = [rng.normal(size=(n, 3, k)) for k in (3, 2, 3)]
-        root = 0.1 * rng.normal(size=(n, 3, 3))
-        own = root @ root.swapaxes(1, 2) + 1e-4 * np.eye(3)
-        shared = rng.uniform(0.0, 0.1, (groups, 3))
-        self.noise = Noise(own, rng.integers(0, groups, n), shared)
-        self.design = rng.normal(size=(n, 3, p))
-        self.misclosure = rng.normal(size=(n, 3))
-        self.asked = START + rng.uniform(-100, SPAN + 100, asked)
-        self.asked[:3] = self.gps_time[0], self.gps_time.max() + 1e6, START - 1e6
-        self.asked_design = rng.normal(size=(asked, 6, p))
-        self.asked_mixing = [rng.normal(size=(asked, 6, k)) for k in (3, 2, 3)]
-        self.rng = rng
-
-    def solve(self, collocate=collocate):
-        signals = [Signal(m, c) for m, c in zip(self.mixing, self.covariances, strict=True)]
-        return collocate(self.gps_time, self.misclosure, self.noise, self.design, signals)
-
-    def predict(self, solved):
-        return solved.predict(self.asked, self.asked_design, self.asked_mixing)
-
-
-def assert_same(solved, expected, atol):
-    for name in ("trend", "trend_covariance", "weights", "log_likelihood", "sigma0"):
-        scale = 1.0 + np.abs(getattr(expected, name)).max()
-        difference = np.abs(getattr(solved, name) - getattr(expected, name)).max()
-        assert difference < atol * scale, name
-
-
-MIXES = [(family,) * 3 for family in FAMILIES] + [None] * 9
-
-
-@pytest.mark.parametrize(("seed", "families"), list(enumerate(MIXES)))
-def test_recursion_equals_the_dense_formula(seed, families):
-    """Everything a collocation says is that of the dense formula, to 1e-9.
-
-    Of random surveys with signals of unit size: times in any order, some the same, some a
-    millisecond apart; epochs at, between, before and after; errors shared by several passes.
-    """
-    survey = Survey(seed, families)
-    solved = survey.solve()
-    expected = survey.solve(collocate_dense)
-    assert_same(solved, expected, 1e-9)
-    for here, there in zip(survey.predict(solved), survey.predict(expected), strict=True):
-        assert np.abs(here - there).max() < 1e-9
-    asked = survey.asked, survey.asked_design, survey.asked_mixing
-    assert np.array_equal(solved.predict_mean(*asked), solved.predict(*asked)[0])
-    for rows in ([0, 1, 2], [9], [40, 3, 16, 17], list(range(6, 18))):
-        assert solved.determined_without(rows) == expected.determined_without(rows)
-        for here, there in zip(solved.leave_out(rows), expected.leave_out(rows), strict=True):
-            assert here == pytest.approx(there, rel=1e-7, abs=1e-9)
+from tests.collocation.random_survey import SPAN, START, RandomSurvey
 
 
 def exact(gps_time, misclosure, sigma, covariance, asked):
@@ -122,7 +55,7 @@ def test_nearly_singular_surveys_are_solved_to_the_last_digits(family, correlati
 
 def test_origin_of_time_and_order_of_observations_do_not_matter():
     "A day later and shuffled: the same result to 1e-9, save what rounding leaves of the times"
-    survey = Survey(3)
+    survey = RandomSurvey(3)
     survey.gps_time = np.round(survey.gps_time * 1024) / 1024
     survey.asked = survey.asked
     survey.asked = np.round(survey.asked * 1024) / 1024
@@ -146,7 +79,7 @@ def test_origin_of_time_and_order_of_observations_do_not_matter():
 
 def test_prediction_in_parts_equals_the_whole():
     "Epochs one at a time, backward, or as broadcast arrays: bit for bit what all together are"
-    survey = Survey(4)
+    survey = RandomSurvey(4)
     solved = survey.solve()
     mean, covariance = survey.predict(solved)
     for i in range(len(survey.asked) - 1, -1, -1):
@@ -178,7 +111,7 @@ def test_passes_do_not_average_the_survey_error_away():
 
 def test_without_observations_near_or_at_all_the_prior_remains():
     "A million seconds away, or of no observation at all, the covariance is B B^T"
-    survey = Survey(5, p=0)
+    survey = RandomSurvey(5, p=0)
     _, covariance = survey.predict(survey.solve())
     prior = sum(m @ m.swapaxes(1, 2) for m in survey.asked_mixing)
     assert np.abs(covariance[1:3] - prior[1:3]).max() < 1e-12
@@ -194,19 +127,19 @@ def test_without_observations_near_or_at_all_the_prior_remains():
 
 def test_what_cannot_be_solved_is_refused_in_a_sentence():
     "No number, no noise, no rank, and mixings of other signals are named"
-    survey = Survey(6)
+    survey = RandomSurvey(6)
     survey.misclosure[4, 1] = np.nan
     with pytest.raises(ValueError, match="1 of 14 observation epochs have a time, misclosure"):
         survey.solve()
-    survey = Survey(6)
+    survey = RandomSurvey(6)
     survey.noise = Noise(np.zeros((14, 3, 3)))
     with pytest.raises(ValueError, match="42 misclosures is not positive definite: two obs"):
         survey.solve()
-    survey = Survey(6)
+    survey = RandomSurvey(6)
     survey.design[:, :, 2] = survey.design[:, :, 1]
     with pytest.raises(ValueError, match="3 trend parameters are not determined by 42 miscl"):
         survey.solve()
-    solved = Survey(6).solve()
+    solved = RandomSurvey(6).solve()
     with pytest.raises(
         ValueError, match=r"30 epochs are asked with a design .* of 3 and \[3, 2, 3\]"
     ):

@@ -11,12 +11,11 @@ from mlscorr.collocation import (
     Signal,
     SparseRows,
     collocate,
-    collocate_rows,
     collocate_rows_dense,
 )
 from mlscorr.collocation.model import signal_clocks, solve_trend
-from tests.beds.dense import collocate_dense
 from tests.beds.shared_noise import noise_of, written_out
+from tests.collocation.dense import collocate_dense
 
 START = 413_200.0  # s of week
 
@@ -99,8 +98,7 @@ class Passes:
 
 
 @pytest.mark.parametrize("rows", [[0], [3, 4, 5], [0, 29], [6, 7, 8, 21, 22, 23]])
-@pytest.mark.parametrize("by", [collocate, collocate_dense])
-def test_what_is_left_out_is_judged_by_the_others(by, rows):
+def test_what_is_left_out_is_judged_by_the_others(rows):
     "Residuals and covariance are those of universal kriging from all other rows"
     case = Passes(6)
     mixing = case.signal.mixing.reshape(30, 3)
@@ -114,7 +112,7 @@ def test_what_is_left_out_is_judged_by_the_others(by, rows):
     wanted = np.vstack([total[np.ix_(others, rows)], design[rows].T])
     weights = np.linalg.solve(system, wanted)
     flat = case.misclosure.ravel()
-    residual, covariance = case.solve(by).leave_out(np.array(rows))
+    residual, covariance = case.solve(collocate_dense).leave_out(np.array(rows))
     np.testing.assert_allclose(residual, flat[rows] - weights[:-2].T @ flat[others], atol=1e-9)
     expected = total[np.ix_(rows, rows)] - weights.T @ wanted
     np.testing.assert_allclose(covariance, expected, atol=1e-10)
@@ -192,22 +190,11 @@ def believing_rows(seed, p=2, n=7):
     return rows, rng.uniform(0.05, 0.3, p)
 
 
-def solved_by(solver, rows, believed):
-    "By one of the three solvers"
-    if solver == "recursion":
-        parts = rows.misclosure, rows.noise, rows.design, rows.signals
-        return collocate(rows.gps_time[:, 0], *parts, believed)
-    if solver == "knots":
-        return collocate_rows([rows], believed=believed)
-    return collocate_rows_dense([rows], believed)
-
-
-@pytest.mark.parametrize("solver", ["recursion", "knots", "dense"])
 @pytest.mark.parametrize("seed", range(3))
-def test_what_is_believed_of_the_trend_is_a_part_of_the_covariance(seed, solver):
+def test_what_is_believed_of_the_trend_is_a_part_of_the_covariance(seed):
     "Likelihood, coefficients and left-out misclosures are those of V + A S A^T without any trend"
     rows, sigma = believing_rows(seed)
-    solved = solved_by(solver, rows, np.diag(1 / sigma))
+    solved = collocate_rows_dense([rows], np.diag(1 / sigma))
     (drift,), n = rows.signals, rows.misclosure.size
     time = np.repeat(drift.clock, 3)
     mixing = drift.mixing.reshape(n, 3)
@@ -216,7 +203,7 @@ def test_what_is_believed_of_the_trend_is_a_part_of_the_covariance(seed, solver)
     total += spread @ spread.T
     misclosure = rows.misclosure.ravel()
     density = multivariate_normal(np.zeros(n), total).logpdf(misclosure)
-    assert solved.log_likelihood == pytest.approx(density, abs=0.01 if solver == "knots" else 1e-7)
+    assert solved.log_likelihood == pytest.approx(density, abs=1e-7)
     weights = np.linalg.solve(total, misclosure)
     np.testing.assert_allclose(solved.trend, sigma * (spread.T @ weights), atol=1e-5)  # m
     residual, covariance = solved.leave_out(np.arange(3, 6))
@@ -229,14 +216,14 @@ def test_what_is_believed_of_the_trend_is_a_part_of_the_covariance(seed, solver)
 def test_a_trend_of_any_size_is_that_of_least_squares():
     "Believed within 100 km they are those of Eq. 13 to 1e-6 m; within 1 nm there is no trend"
     rows, _ = believing_rows(7)
-    free = solved_by("dense", rows, None).trend
-    np.testing.assert_allclose(solved_by("dense", rows, np.eye(2) / 1e5).trend, free, atol=1e-6)
-    assert np.abs(solved_by("dense", rows, np.eye(2) * 1e9).trend).max() < 1e-9  # m
+    free = collocate_rows_dense([rows], None).trend
+    np.testing.assert_allclose(collocate_rows_dense([rows], np.eye(2) / 1e5).trend, free, atol=1e-6)
+    assert np.abs(collocate_rows_dense([rows], np.eye(2) * 1e9).trend).max() < 1e-9  # m
 
 
 def test_a_part_of_the_trend_may_be_believed():
     "Of more coefficients than misclosures some must be"
     rows, _ = believing_rows(8, p=22)
-    assert np.isfinite(solved_by("dense", rows, np.eye(22)[:2]).trend).all()
+    assert np.isfinite(collocate_rows_dense([rows], np.eye(22)[:2]).trend).all()
     with pytest.raises(ValueError, match="22 trend parameters are not determined by 21"):
-        solved_by("dense", rows, None)
+        collocate_rows_dense([rows], None)

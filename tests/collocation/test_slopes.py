@@ -13,7 +13,7 @@ from mlscorr.collocation import (
     collocate_rows_dense,
     likelihood_changes,
 )
-from tests.beds.linked_rows import Street
+from tests.collocation.linked_rows import Street
 
 
 @pytest.mark.parametrize("family", [*FAMILIES, INTEGRATED])

@@ -15,7 +15,7 @@ from mlscorr.collocation._states import (
     observe,
     send_back,
 )
-from tests.beds.joint_states import ALL_FAMILIES, Bed, carried, stationary
+from tests.collocation.joint_states import ALL_FAMILIES, Bed, carried, stationary
 
 LAGS = np.array([1e-3, 0.3, 4.0, 50.0])  # s
 BEDS = [Bed(seed) for seed in range(3)] + [Bed(9, (family,) * 3) for family in ALL_FAMILIES]

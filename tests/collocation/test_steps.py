@@ -9,8 +9,8 @@ from mlscorr.collocation import Noise, collocate_rows
 from mlscorr.collocation._knots import knot_step
 from mlscorr.collocation._steps import LARGEST_SHARE, sufficient_steps
 from mlscorr.estimate import SETTINGS
-from tests.beds.joint_states import ALL_FAMILIES
-from tests.beds.linked_rows import Street
+from tests.collocation.joint_states import ALL_FAMILIES
+from tests.collocation.linked_rows import Street
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from mlscorr.effects import (
     in_order,
     make_effect,
 )
-from tests.beds.effects import (
+from tests.effects.bed import (
     NAMES,
     REFERENCE,
     RETURNS,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.beds.effects import (
+from tests.effects.bed import (
     AGREEMENT,
     CONTROL,
     REFERENCE,

@@ -20,7 +20,7 @@ from mlscorr.simulate.scenario import (
     TargetScenario,
 )
 from mlscorr.survey import Mounting, Trajectory
-from tests.beds.effects import (
+from tests.effects.bed import (
     AGREEMENT,
     GRAZING,
     MOUNTING,

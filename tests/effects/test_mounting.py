@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.beds.effects import (
+from tests.effects.bed import (
     MOUNTING,
     applied,
 )

@@ -9,7 +9,7 @@ from mlscorr.effects import (
     make_effect,
 )
 from mlscorr.effects._pulses import pulse_number
-from tests.beds.effects import (
+from tests.effects.bed import (
     REFERENCE,
     RETURNS,
     SMALL,

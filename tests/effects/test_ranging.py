@@ -8,7 +8,7 @@ import pytest
 from mlscorr.effects import (
     make_effect,
 )
-from tests.beds.effects import (
+from tests.effects.bed import (
     GRAZING,
     REFERENCE,
     RETURNS,

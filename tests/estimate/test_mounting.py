@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 import mlscorr
 from mlscorr.effects import make_effect
-from mlscorr.estimate import believed_mounting, estimate_mounting, mounting
+from mlscorr.estimate import believed_mounting, estimate_mounting
 from mlscorr.estimate.mounting import prior_sigma
 from mlscorr.evaluate import misclosures
 from mlscorr.frames import (
@@ -595,14 +595,6 @@ def test_no_target_makes_a_mounting_worse_than_it_is_without_any(count):
     assert np.allclose(estimate.covariance, estimate.covariance.T)
     assert (np.linalg.eigvalsh(estimate.covariance) > 0.0).all()
     assert (estimate.sigma0 == 1.0) == (count < 2)
-
-
-def test_a_search_that_is_cut_off_counts_no_step_twice(monkeypatch):
-    "After a single iteration collocation finds what is lacking, not twice as much"
-    monkeypatch.setattr(mounting, "SETTINGS", replace(mounting.SETTINGS, iterations=1))
-    site = Site(5)
-    found = believed_mounting(site.recorded, [RECORDED], site.matched).lsc
-    assert np.abs(found.correction[3:] - LACKS[3:]).max() < 0.2 * np.abs(LACKS[3:]).max()
 
 
 @pytest.mark.parametrize(

@@ -52,3 +52,12 @@ def test_without_any_point_the_accuracy_is_not_determined():
         and found["based_on"] is None
     )
     assert "Not determined" in found["statement"][0]
+
+
+@pytest.mark.parametrize(("ratio", "doubtful"), [(0.45, False), (0.55, True)])
+def test_check_points_must_be_twice_as_accurate(ratio, doubtful):
+    "A survey of 0.45 of the product's error passes without a word, one of 0.55 is named"
+    residuals = np.tile([0.02, 0.02, 0.02], (40, 1))
+    sigma = np.full((40, 3), 0.02 * ratio)
+    statement = positional_accuracy(residuals, sigma, 40)["statement"]
+    assert any("twice as accurate" in sentence for sentence in statement) == doubtful

@@ -9,7 +9,7 @@ import pytest
 
 from mlscorr.estimate import estimate_correction
 from mlscorr.evaluate import datum_differences
-from mlscorr.simulate._random_survey import random_scenario
+from mlscorr.simulate import random_scenario
 from mlscorr.survey import Pos
 from tests.beds.places import BENCHMARKS
 from tests.faults.sizes import IS_FULL, tries

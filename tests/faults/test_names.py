@@ -4,7 +4,7 @@ import matplotlib
 import matplotlib.pyplot as plt
 import pytest
 
-from mlscorr.cli.terminal import warn
+from mlscorr.cli import warn
 from mlscorr.io.store import shown
 from mlscorr.report.style import STYLE, label
 

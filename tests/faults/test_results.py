@@ -1,5 +1,6 @@
 """Results appear whole or not at all, whatever stands where they belong and whoever else writes."""
 
+import ctypes
 import json
 import os
 import shutil
@@ -13,7 +14,6 @@ import pytest
 import typer
 
 from mlscorr.cli.terminal import Exit, exit_code
-from mlscorr.io.store import _folders as folders
 from mlscorr.io.store import check_output, check_unchanged, input_file, output, output_folder
 from mlscorr.io.surveys import read_survey
 from tests.beds.places import ROOT
@@ -65,7 +65,7 @@ def test_a_disk_that_cannot_exchange_moves_file_by_file(tmp_path, monkeypatch):
     "Without the system's call files are replaced in turn"
     out = tmp_path / "out"
     write(out, "old")
-    monkeypatch.setattr(folders.ctypes, "CDLL", lambda *_, **__: object())
+    monkeypatch.setattr(ctypes, "CDLL", lambda *_, **__: object())
     write(out, "new", overwrite=True)
     assert set(texts(out).values()) == {"new"}
     assert list(tmp_path.iterdir()) == [out]

@@ -13,7 +13,6 @@ from mlscorr.gap.advice import distinct_parameters
 from mlscorr.gap.evidence import Cause, CauseParameter, Separability
 from mlscorr.gap.evidence._error_models import STATED
 from mlscorr.gap.signatures import signatures
-from mlscorr.report.gap._labels import parameters_of
 
 
 def test_separability_is_told_in_plain_numbers():
@@ -67,9 +66,7 @@ def test_sizes_of_an_effect_and_of_noise_have_names_of_their_own():
     cause = Cause("time_offset+range_noise", 0.9, sizes, parts, np.zeros(len(g.rows)))
     told = [vars(parameter) for parameter in distinct_parameters(cause)]
     assert [row["name"] for row in told] == ["time_offset magnitude", "range_noise magnitude"]
-    owned = parameters_of(cause.effect, told)
-    assert owned["time_offset"]["magnitude"].unit == "s"
-    assert owned["range_noise"]["magnitude"].estimate == 0.02
+    assert [(row["unit"], row["estimate"]) for row in told] == [("s", 0.005), ("m", 0.02)]
     alone = Cause("time_offset", 0.9, sizes[:1], parts[:1], np.zeros(len(g.rows)))
     assert distinct_parameters(alone) == sizes[:1]
 

@@ -14,7 +14,7 @@ from mlscorr.gap.open_scale import SIGMAS, STEP
 from mlscorr.gap.residuals import background
 from mlscorr.gap.signatures import signatures
 from mlscorr.survey import Pos
-from tests.beds.gap_inference import surveyed
+from tests.gap.inference import surveyed
 
 ASSUMED = ("position_sigma", "attitude_sigma", "correlation_time")
 

@@ -13,8 +13,7 @@ from typer.testing import CliRunner
 import mlscorr
 from mlscorr.cli import app
 from mlscorr.effects import make_effect
-from mlscorr.gap.evidence import Cause, Costs
-from mlscorr.gap.evidence._error_models import STATED
+from mlscorr.gap.evidence import Cause, Costs, ErrorModel
 from mlscorr.gap.evidence.decision import kind_of
 from mlscorr.gap.signatures import Signature, as_believed, with_cause
 from mlscorr.io.clouds import read_chunks
@@ -22,6 +21,7 @@ from mlscorr.pipeline import read_effects
 from mlscorr.simulate import Scenario, beliefs_of, read_simulator, simulate, write_simulator
 from tests.beds import diagnosed_street
 from tests.beds.documents import undocumented
+from tests.beds.made_once import copied_once
 from tests.beds.shared import shared
 
 OFFSET = 0.02  # s
@@ -37,8 +37,7 @@ KEYS = {
 @pytest.fixture(scope="module")
 def late(tmp_path_factory):
     "A survey whose scanner clock is 20 ms off, without its truth"
-    effect = {"name": "time_offset", "magnitude": OFFSET}
-    return diagnosed_street.write(tmp_path_factory.mktemp("late") / "survey", effect)
+    return copied_once(tmp_path_factory, "late", diagnosed_street.write_late)
 
 
 @pytest.fixture(scope="module")
@@ -148,14 +147,14 @@ def test_a_cause_that_the_simulator_has_already_is_joined_with_it(late, tmp_path
     kind = Signature(
         type(effect), {}, ("magnitude",), ("s",), none + 1e-3, none[:, None], none, none
     )
-    cause = Cause("time_offset", 1.0, (), ((kind, np.array([0.005])),), none, None, STATED)
+    cause = Cause("time_offset", 1.0, (), ((kind, np.array([0.005])),), none, None, ErrorModel())
     (joined,) = with_cause(simulator, survey, cause).effects
     assert abs(joined.magnitude - OFFSET) < 1e-12
-    worse = Cause("position_noise", 1.0, (), (), none, None, replace(STATED, scale=2.0))
+    worse = Cause("position_noise", 1.0, (), (), none, None, ErrorModel(scale=2.0))
     pos = with_cause(simulator, survey, worse).pos
     assert pos.position_sigma == 2 * survey.pos.position_sigma
     window = (357710.0, 20.0, 12.0, "rise")
-    outage = Cause("position_noise", 1.0, (), (), none, None, replace(STATED, windows=(window,)))
+    outage = Cause("position_noise", 1.0, (), (), none, None, ErrorModel(windows=(window,)))
     improved = with_cause(simulator, survey, outage)
     assert improved.pos.windows == (window,)
     write_simulator(improved, tmp_path / "simulator.toml")
@@ -254,7 +253,7 @@ def _with_control_moved(folder, out, names, away):
 @pytest.fixture(scope="module")
 def sound(tmp_path_factory):
     "A survey in which nothing is wrong"
-    return diagnosed_street.write(tmp_path_factory.mktemp("sound") / "survey")
+    return copied_once(tmp_path_factory, "sound", diagnosed_street.write)
 
 
 @pytest.mark.long

@@ -198,22 +198,6 @@ def test_what_glitters_everywhere_is_bounded():
     assert objects([glitter], trajectory) == []
 
 
-def test_at_most_a_quarter_of_a_chunk_is_carried_on(monkeypatch):
-    "However many points a second has, a chunk is searched with a quarter of the one before"
-    seen = []
-
-    def watched(xyz, intensity):
-        seen.append(len(xyz))
-        return bright_regions(xyz, intensity)
-
-    monkeypatch.setattr("mlscorr.targets.search.bright_regions", watched)
-    cloud, trajectory = flat_plate(np.random.default_rng(6))
-    size = len(cloud) // 6
-    objects([cloud[i : i + size] for i in range(0, 6 * size, size)], trajectory)
-    assert seen[0] == size
-    assert max(seen) <= (1 + SETTINGS.largest_carry) * size + 1
-
-
 @pytest.mark.long
 def test_targets_near_control_do_not_depend_on_how_many_points_are_held(street, monkeypatch):
     "Handed on a thousand points at a time, the street's targets are the same to the last digit"

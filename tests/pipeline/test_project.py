@@ -21,6 +21,7 @@ from mlscorr.pipeline.project.stages import tile_tasks
 from mlscorr.pipeline.project.tasks import carry_out
 from tests.beds import project_street as bed
 from tests.beds.documents import undocumented
+from tests.beds.made_once import copied_once
 
 COMMAND = [sys.executable, "-m", "mlscorr"]
 QUICK = Options(page=False)
@@ -29,7 +30,7 @@ QUICK = Options(page=False)
 @pytest.fixture(scope="module")
 def project(tmp_path_factory):
     "project.toml of two drives, each of two tiles"
-    return bed.write_project(tmp_path_factory.mktemp("city"), duration=6.0, tiles=2)
+    return copied_once(tmp_path_factory, "city", bed.write_tiled) / "project.toml"
 
 
 @pytest.fixture(scope="module")

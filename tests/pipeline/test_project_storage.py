@@ -11,6 +11,7 @@ from mlscorr.pipeline.project import Options, correct_project, project_status
 from tests.beds import project_street as bed
 from tests.beds.copc_files import write_copc
 from tests.beds.las_1_5 import as_las_1_5
+from tests.beds.made_once import copied_once
 from tests.beds.object_store import object_store
 
 pytestmark = pytest.mark.long
@@ -22,7 +23,7 @@ OUT = "s3://city/out"
 @pytest.fixture(scope="module")
 def store(tmp_path_factory):
     "An ObjectStore with a project of two drives of two tiles, corrected there by two processes"
-    folder = bed.write_project(tmp_path_factory.mktemp("city"), duration=6.0, tiles=2).parent
+    folder = copied_once(tmp_path_factory, "city", bed.write_tiled)
     with object_store("city") as (store, files):
         files.put(f"{folder}/", "city/", recursive=True)
         store.files = files
@@ -89,9 +90,9 @@ def test_a_connection_that_is_lost_fails_a_single_file(store, lost):
     assert resumed(store)[1] == ["second/tile-1.laz"]
 
 
-def test_copc_and_las_1_5_in_a_store_are_corrected_as_on_a_disk(store, tmp_path):
+def test_copc_and_las_1_5_in_a_store_are_corrected_as_on_a_disk(store, tmp_path, tmp_path_factory):
     "The same bytes from a store into it: an octree that is read by ranges, and LAS 1.5 with offset"
-    folder = bed.write_project(tmp_path, duration=6.0, tiles=2).parent
+    folder = copied_once(tmp_path_factory, "city", bed.write_tiled)
     old, older = (folder / "second" / f"tile-{number}.laz" for number in (1, 2))
     write_copc(old, old.with_suffix(".copc.laz"))
     as_las_1_5(older, folder / "second" / "new.laz", laspy.read(older).gps_time, flags=0)

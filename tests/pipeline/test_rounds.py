@@ -14,6 +14,7 @@ from mlscorr.pipeline.rounds import DiagnosedRounds
 from mlscorr.simulate import read_simulator
 from tests.beds import diagnosed_street
 from tests.beds.documents import undocumented
+from tests.beds.made_once import copied_once
 
 pytestmark = pytest.mark.long
 
@@ -21,8 +22,7 @@ pytestmark = pytest.mark.long
 @pytest.fixture(scope="module")
 def survey(tmp_path_factory):
     "A survey whose scanner clock is 20 ms off"
-    effect = {"name": "time_offset", "magnitude": 0.02}
-    return diagnosed_street.write(tmp_path_factory.mktemp("rounds") / "survey", effect)
+    return copied_once(tmp_path_factory, "late", diagnosed_street.write_late)
 
 
 def test_one_command_finds_the_cause_and_then_none(survey, tmp_path):

@@ -19,7 +19,6 @@ from mlscorr.estimate import believed_correction, corrected_mounting
 from mlscorr.evaluate import BeamCheck
 from mlscorr.io.clouds import read_chunks
 from mlscorr.pipeline.tying import tie_passes
-from mlscorr.report._provenance import systems
 from mlscorr.ties import TieCollector
 from tests.beds import scanner_pair
 from tests.beds.documents import undocumented
@@ -196,11 +195,8 @@ def test_sigmas_of_points_are_those_of_their_scanner(corrected):
         )  # m, the file's rounding
 
 
-def test_the_report_names_the_lever_arm_of_each_scanner(survey):
-    "Two rows, and a note which files each scanner wrote"
-    pairs = dict(systems(survey))
-    assert pairs["Lever arm of scanner 1"].startswith("right, forward, up -0.33, -0.58, 0.4 m")
-    assert pairs["Lever arm of scanner 2"].startswith("right, forward, up 0.32, -0.6, 0.4 m")
+def test_a_note_says_which_files_each_scanner_wrote(survey):
+    "By the names of survey.toml"
     assert any("1 wrote pass-1.laz, pass-2.laz; 2 wrote" in note for note in survey.notes)
 
 

@@ -2,8 +2,11 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from mlscorr.report import FileRow
 from mlscorr.report._provenance import coverage, files, systems
+from mlscorr.survey import MountedScanner, Mounting, Scanner
 from tests.beds.reports import START, drive, fabricate
 
 
@@ -15,6 +18,30 @@ def test_the_systems_and_beliefs_are_named():
     assert pairs["Time of pass-1.laz"] == "GPS week seconds, as the trajectory's"
     assert pairs["Epochs of the trajectory"] == "3 000 at 50 Hz"
     assert "not stated" in dict(systems(replace(survey, crs=None)))["Coordinate reference system"]
+
+
+def test_times_counted_over_the_end_of_the_week_are_named():
+    "Of the trajectory, and of a cloud whose times start again: with the seconds that are added"
+    trajectory = drive()
+    trajectory = replace(trajectory, weeks=np.zeros(len(trajectory), int))
+    survey, _, _ = fabricate(trajectory)
+    late = replace(survey.clouds[0], time_system="week", new_week=100.0)
+    pairs = dict(systems(replace(survey, clouds=(late,))))
+    assert pairs["Time of the trajectory"].endswith("counted on over the end of the GPS week")
+    assert "counted on where they start again (+604800 s)" in pairs["Time of pass-1.laz"]
+
+
+def test_each_scanner_has_its_lever_arm():
+    "A row for each of two scanners"
+    survey, _, _ = fabricate(drive())
+    arms = {"1": [-0.33, -0.58, 0.4], "2": [0.32, -0.6, 0.4]}  # m
+    scanners = tuple(
+        MountedScanner(name, Scanner(), Mounting(np.array(arm), np.eye(3)), survey.clouds)
+        for name, arm in arms.items()
+    )
+    pairs = dict(systems(replace(survey, scanners=scanners)))
+    assert pairs["Lever arm of scanner 1"] == "right, forward, up -0.33, -0.58, 0.4 m"
+    assert pairs["Lever arm of scanner 2"] == "right, forward, up 0.32, -0.6, 0.4 m"
 
 
 def test_the_coverage_is_told_in_seconds_and_points():

@@ -4,8 +4,14 @@ import numpy as np
 import pytest
 
 from mlscorr.io.surveys import read_survey
-from mlscorr.simulate import DisplacedSurvey, Scenario, SceneScenario, random_survey, simulate
-from mlscorr.simulate._random_survey import random_scenario
+from mlscorr.simulate import (
+    DisplacedSurvey,
+    Scenario,
+    SceneScenario,
+    random_scenario,
+    random_survey,
+    simulate,
+)
 from mlscorr.simulate.scene import read_mesh
 from mlscorr.simulate.scene.shapes import ray_caster
 

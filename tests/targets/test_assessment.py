@@ -9,7 +9,7 @@ from mlscorr.targets._echoes import Echoes
 from mlscorr.targets._outline import Outline
 from mlscorr.targets._seeds import Seed
 from mlscorr.targets.shapes import BRIGHT, DARK
-from tests.beds.planes import plane_through
+from tests.targets.planes import plane_through
 
 SIZE = 0.6  # m
 BLUR = 0.002  # m

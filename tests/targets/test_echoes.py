@@ -4,7 +4,7 @@ import pytest
 from mlscorr.targets import ScannerPath
 from mlscorr.targets._echoes import Echoes, beams_at_plane, missed_points
 from mlscorr.targets.shapes import BRIGHT, DARK, MISS
-from tests.beds.planes import plane_through
+from tests.targets.planes import plane_through
 
 FACE = plane_through(np.array([0.0, 5.0, 0.0]), np.array([0.0, -1.0, 0.0]))  # 5 m off
 

@@ -3,7 +3,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mlscorr.targets._plane import fit_plane, most_common
-from tests.beds.planes import plane_through
+from tests.targets.planes import plane_through
 
 ORIGIN = np.array([523_000.0, 3_378_000.0, 42.0])  # m, UTM
 

@@ -17,7 +17,7 @@ from mlscorr.targets._seeds import (
     plate_seeds,
     region_seeds,
 )
-from tests.beds.target_views import KINDS, SIZE, TOLERANCE, centre_of, echoes_of, views, wall
+from tests.targets.target_views import KINDS, SIZE, TOLERANCE, centre_of, echoes_of, views, wall
 
 RNG = np.random.default_rng
 

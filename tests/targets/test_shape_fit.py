@@ -10,7 +10,7 @@ from mlscorr.targets import SETTINGS
 from mlscorr.targets._seeds import bright_seeds, hole_seeds, plate_seeds
 from mlscorr.targets._shape_fit import exact_fit, rough_fit
 from mlscorr.targets.shapes import BRIGHT, DARK, MISS
-from tests.beds.target_views import KINDS, SIZE, centre_of, echoes_of, views, wall
+from tests.targets.target_views import KINDS, SIZE, centre_of, echoes_of, views, wall
 
 
 def seeds_of(echoes, kind):

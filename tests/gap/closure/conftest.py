@@ -7,8 +7,8 @@ from mlscorr.effects import make_effect
 from mlscorr.gap.residuals import Rows
 from mlscorr.io.surveys import read_survey
 from mlscorr.simulate import Scenario, simulate
-from tests.beds.gap_closure import Bed
 from tests.beds.gap_surveys import beams_of, read_once, rows_of, write_reference
+from tests.gap.closures import Bed
 
 
 @pytest.fixture(scope="session")

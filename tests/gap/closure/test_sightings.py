@@ -9,9 +9,7 @@ from mlscorr.gap.closure._settings import SETTINGS
 from mlscorr.gap.closure._sightings import SightedTarget, Sighting, board_of, sightings_of
 from mlscorr.simulate.scan import FORMS, RecordedPulses
 from mlscorr.survey import PointCloud
-from mlscorr.targets import FittedTarget
-from mlscorr.targets._outline import Outline
-from mlscorr.targets.fit import TargetView
+from mlscorr.targets import FittedTarget, Outline, TargetView
 
 PLACE = np.array([532_000.0, 3_374_000.0, 42.0])  # m, UTM
 START = 413_200.0  # s

@@ -6,7 +6,7 @@ import pytest
 from mlscorr.gap.closure import Surroundings
 from mlscorr.gap.closure._sightings import sightings_of
 from mlscorr.io.clouds import read_chunks
-from mlscorr.simulate.scan.replay import recorded_platform
+from mlscorr.simulate.scan import recorded_platform
 
 
 def pulses_about(surroundings, survey, rows, finding):

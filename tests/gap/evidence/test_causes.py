@@ -5,7 +5,7 @@ import pytest
 
 from mlscorr.effects import make_effect
 from mlscorr.gap.evidence import infer_causes
-from tests.beds.gap_inference import surveyed
+from tests.gap.inference import surveyed
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from mlscorr.effects import make_effect
 from mlscorr.gap.evidence import SETTINGS, infer_causes, weigh_labels
 from mlscorr.gap.evidence.evidence import weigh_blocks
 from mlscorr.gap.signatures import signatures
-from tests.beds.gap_inference import surveyed
+from tests.gap.inference import surveyed
 
 
 @pytest.mark.long

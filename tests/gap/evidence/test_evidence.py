@@ -17,7 +17,7 @@ from mlscorr.gap.evidence.evidence import block_gain, suited_models, weigh_block
 from mlscorr.gap.evidence.observations import relevant_models
 from mlscorr.gap.residuals import background
 from mlscorr.gap.signatures import signatures
-from tests.beds.gap_inference import surveyed
+from tests.gap.inference import surveyed
 
 
 def test_evidence_is_the_likelihood_with_the_amplitudes_integrated():

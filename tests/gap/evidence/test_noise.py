@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mlscorr.effects import make_effect
-from tests.beds.gap_inference import named, surveyed
+from tests.gap.inference import named, surveyed
 
 
 @pytest.mark.long

@@ -8,7 +8,7 @@ import pytest
 from mlscorr.gap.evidence import ErrorModel, Observations
 from mlscorr.gap.evidence._error_models import STATED
 from mlscorr.gap.residuals import background
-from tests.beds.gap_inference import dense
+from tests.gap.inference import dense
 
 
 @pytest.mark.parametrize("bed", ["with_surface", "with_planes"])

@@ -11,7 +11,7 @@ from mlscorr.gap.evidence.parameters import (
     most_probable_size,
     window_parameters,
 )
-from tests.beds.gap_inference import dense
+from tests.gap.inference import dense
 
 
 def test_amplitudes_are_those_of_least_squares(with_surface):

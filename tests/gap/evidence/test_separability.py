@@ -8,7 +8,7 @@ from mlscorr.gap.evidence import SETTINGS, Observations, compare_signatures
 from mlscorr.gap.evidence._error_models import STATED
 from mlscorr.gap.plan import next_data
 from mlscorr.gap.signatures import signatures
-from tests.beds.gap_inference import dense
+from tests.gap.inference import dense
 
 
 def test_detectable_biases_are_those_of_baarda(with_surface):

@@ -1,16 +1,17 @@
 """Numbers that follow from others."""
 
 import pytest
+from scipy.stats import norm
 
 from mlscorr.gap.evidence import SETTINGS
 from mlscorr.gap.evidence.settings import Settings
 
 
 def test_quantile_and_band_are_those_of_the_confidence():
-    "1.96 sigmas and percentiles 2.5 and 97.5 hold 95 % of a normal distribution"
-    assert SETTINGS.quantile == pytest.approx(1.96, abs=1e-4)
-    assert SETTINGS.band == pytest.approx((2.5, 97.5))
-    assert Settings(confidence=0.5).band == pytest.approx((25.0, 75.0))
+    "A half of a normal distribution lies within 0.6745 sigmas, between percentiles 25 and 75"
+    half = Settings(confidence=0.5)
+    assert half.quantile == pytest.approx(norm.ppf(0.75), abs=1e-9)
+    assert half.band == pytest.approx((25.0, 75.0))
 
 
 def test_priors_are_shares():

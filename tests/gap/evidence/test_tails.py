@@ -8,7 +8,7 @@ import pytest
 from mlscorr.effects import make_effect
 from mlscorr.gap.evidence import Observations, without_tails
 from mlscorr.gap.evidence.tails import fit_mixture
-from tests.beds.gap_inference import named, surveyed
+from tests.gap.inference import named, surveyed
 
 
 def test_the_likelihood_with_odd_values_is_that_of_the_mixture():

@@ -8,7 +8,7 @@ import pytest
 from mlscorr.effects import make_effect
 from mlscorr.gap.evidence import Observations, infer_causes
 from mlscorr.gap.signatures import displacements
-from tests.beds.gap_inference import surveyed
+from tests.gap.inference import surveyed
 
 
 @pytest.mark.long

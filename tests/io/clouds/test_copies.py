@@ -4,7 +4,7 @@ import laspy
 import numpy as np
 import pytest
 
-from mlscorr.io.clouds import copies, find_copies
+from mlscorr.io.clouds import find_copies
 from tests.beds.copc_files import write_copc
 from tests.beds.foreign_clouds import write_e57
 
@@ -98,9 +98,11 @@ def test_points_of_another_pass_are_none(change, tmp_path):
     assert find_copies(paths) == {}
 
 
-def test_clouds_whose_headers_differ_are_not_read(tmp_path, monkeypatch):
-    "Number and bounds tell: times are read of none, so that a thousand tiles cost their headers"
+def test_clouds_whose_headers_differ_are_not_read(tmp_path):
+    "Number and bounds tell, of files that hold no point behind their header: a thousand are quick"
     paths = [write_las(tmp_path / f"{k}.las", away=float(k)) for k in range(3)]
-    monkeypatch.setattr(copies, "records_at", None)
-    monkeypatch.setattr(copies, "read_records", None)
+    for path in paths:
+        with laspy.open(path) as reader:
+            start = reader.header.offset_to_point_data
+        path.write_bytes(path.read_bytes()[:start])
     assert find_copies(paths) == {}

@@ -53,6 +53,12 @@ def test_a_gap_below_its_band_is_within_chance(value, within):
     assert is_within(value, [-1.0, 3.5]) is within
 
 
+def test_only_returns_below_their_band_are_more_than_chance():
+    "10 % of the returns lost where chance loses 1 %: a gap; a position 5 mm below its band is none"
+    assert not is_within(-10.0, [-1.0, 1.0], "returns")
+    assert is_within(-5.0, [-1.0, 1.0], "position")
+
+
 def test_what_was_not_held_out_is_not_called_so():
     "A cause of one moment is measured where it was found: words and figure say so"
     document = gap_document("position_bump", 0.96)

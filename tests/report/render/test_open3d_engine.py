@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from mlscorr.pipeline.installation import _rendering
+from mlscorr.pipeline import doctor
 from mlscorr.report.render import PictureOptions, draw
 from mlscorr.report.render import _open3d_engine as open3d_engine
 from mlscorr.report.render import _sheet as sheet
@@ -38,8 +38,9 @@ def test_a_broken_driver_costs_a_warning_and_no_picture(
 @pytest.mark.long
 def test_open3d_draws_what_the_z_buffer_draws(survey, estimated, drawn):
     "Both engines put points of the same colours on the same pixels, but for their rims"
-    if not (finding := _rendering()).ok:
-        pytest.skip(f"Open3D draws no off-screen picture here: {finding.found}")
+    (drawing,) = (part for part in doctor().parts if part.name == "off-screen picture")
+    if not drawing.ok:
+        pytest.skip(f"Open3D draws no off-screen picture here: {drawing.state}")
     (picture,) = draw(survey, *estimated, PictureOptions(SIZE), ["overview"], "open3d")
     painted, drawn_here = ((p != 255).any(axis=2) for p in (picture.before, drawn[0].before))
     assert (painted & drawn_here).sum() > 0.8 * (painted | drawn_here).sum()

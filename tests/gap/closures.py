@@ -12,7 +12,7 @@ from mlscorr.gap.closure.folds import make_folds, predict_whole
 from mlscorr.gap.evidence import Observations, cause_of, weigh_labels
 from mlscorr.gap.residuals import background
 from mlscorr.gap.signatures import expected, signatures
-from tests.beds.gap_inference import surveyed
+from tests.gap.inference import surveyed
 
 
 def noise_of_positions(g, effect, rng):

@@ -50,8 +50,14 @@ class Street:
         self.tie_seen = np.stack(seen, axis=1).reshape(2 * t, 1, 6)
         self.tie_noise = Noise(rng.uniform(0.005, 0.01, (t, 1, 1)) ** 2)
         self.asked = np.append(START + rng.uniform(-20, LENGTH + 20, 25), self.tie_time[:2])
-        whitening = np.linalg.cholesky(self.total)
-        self.misclosure = whitening @ rng.normal(size=len(self.total))
+        self.draw_misclosures(rng)
+
+    def draw_misclosures(self, rng=None):
+        "Misclosures of the covariance of all rows; anew, once times are other ones"
+        for known in ("total", "_views"):
+            self.__dict__.pop(known, None)
+        root = np.linalg.cholesky(self.total)
+        self.misclosure = root @ (rng or np.random.default_rng(1)).normal(size=len(root))
 
     def signals(self, gps_time, seen):
         "Drift, jitter and attitude, as they enter rows (n, r, 6)"

@@ -6,7 +6,6 @@ import numpy as np
 from scipy.linalg import block_diag, expm, solve_continuous_lyapunov
 
 from mlscorr.collocation import FAMILIES, INTEGRATED, Covariance, Signal
-from mlscorr.collocation._recursion import Recursion, filter_covariance
 from mlscorr.collocation._states import Layout
 
 START = 413_200.0  # s of week
@@ -105,11 +104,3 @@ class Bed:
         "V (n r, n r)"
         h = self.observing
         return h @ self.joint(self.gps_time) @ h.T + block_diag(*self.noise)
-
-    def filtered(self):
-        "Recursion, and covariances of the filtered states"
-        size = self.layout.size
-        transitions, gains, whiteners, covariances = filter_covariance(
-            self.layout, size, self.steps, self.mixing, self.noise
-        )
-        return Recursion(self.layout, transitions, self.mixing, gains, whiteners), covariances
