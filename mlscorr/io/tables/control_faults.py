@@ -149,7 +149,7 @@ def row_doubts(path: str | Path, rows: Sequence[dict[str, Any]]) -> Iterator[str
 
 def _known(words):
     """Our words, each with those of others."""
-    listed = [f"{our} ({', '.join(others.split())})" for our, others in words.items() if others]
+    listed = [f"{our} ({', '.join(others)})" for our, others in words.items() if others]
     return ", ".join([*listed, *(our for our, others in words.items() if not others)])
 
 

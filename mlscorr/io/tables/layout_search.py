@@ -24,7 +24,7 @@ NUMBER = re.compile(r"[+-]?\d+([.,]\d*)?(e[+-]?\d+)?", re.IGNORECASE)
 
 def find_layout(
     path: str | Path,
-    names: Mapping[str, str],
+    names: Mapping[str, Collection[str]],
     lacking: Callable[[Collection[str]], list[str]],
     chosen: Mapping[str, str | int] | None = None,
     unnamed: Callable[[Sequence[str]], Mapping[str, int]] = lambda _: {},
@@ -252,7 +252,7 @@ def _with_numbers(layout, units, rows):
     return replace(layout, factors=factors, decimal="," if commas else ".")
 
 
-def likely_header(path: str | Path, names: Mapping[str, str]) -> list[str]:
+def likely_header(path: str | Path, names: Mapping[str, Collection[str]]) -> list[str]:
     """The row among the first ones that holds the most names of columns; the longest without any.
 
     Parameters

@@ -94,7 +94,7 @@ def read_layout(
     path: str | Path,
     required: Sequence[str],
     groups: Sequence[Sequence[str]],
-    names: Mapping[str, str],
+    names: Mapping[str, Collection[str]],
     lacking: Callable[[Collection[str]], list[str]],
     chosen: Mapping[str, str | int] | None = None,
     unnamed: Callable[[Sequence[str]], Mapping[str, int]] = lambda _: {},
@@ -214,7 +214,7 @@ def check_increasing(path: str | Path, gps_time: np.ndarray, row: str) -> None:
 
 def _near_columns(others, missing, names):
     """Our names with the column of others whose name is spelt like each."""
-    known = {name: our for our, words in names.items() for name in (plain(our), *words.split())}
+    known = {name: our for our, words in names.items() for name in (plain(our), *words)}
     near = {known.get(nearest(plain(cell), known) or ""): cell for cell in others}
     near |= {name: cell for name in missing if (cell := nearest(name, others))}
     if in_utc := [cell for cell in others if "utc" in cell.casefold()]:
@@ -237,7 +237,7 @@ def missing_sentence(
     header: Sequence[str],
     missing: Sequence[str],
     used: Collection[str],
-    names: Mapping[str, str],
+    names: Mapping[str, Collection[str]],
     seeming: Mapping[str, str] | None = None,
 ) -> str:
     """A sentence on columns that are missing, and on the one that may be meant, if one is like it.
