@@ -48,7 +48,14 @@ from mlscorr.io.store.storage import (
     resolved,
 )
 from mlscorr.io.store.task_store import TaskStore, digest
-from mlscorr.io.store.text_files import ENCODING, nearest, shown, warn_of_cut
+from mlscorr.io.store.text_files import (
+    ENCODING,
+    ENCODINGS,
+    encoding_of,
+    nearest,
+    shown,
+    warn_of_cut,
+)
 from mlscorr.io.store.toml_file import (
     Column,
     Coordinate,

@@ -1,14 +1,76 @@
 """Text files: their encoding, their ends, and what of them a message can show."""
 
+import codecs
 import os
+import re
 import warnings
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from difflib import get_close_matches
 from pathlib import Path
 
+from mlscorr.io.settings import SETTINGS
 from mlscorr.io.store.opening import open_file
 
 ENCODING = "utf-8-sig"  # UTF-8, with or without a byte order mark
+ENCODINGS = {ENCODING: "UTF-8", "utf-16": "UTF-16", "gb18030": "GB 18030", "cp1252": "Windows-1252"}
+
+
+def encoding_of(path: str | Path) -> str | None:
+    """Return the encoding of a text file, one of ENCODINGS, by all of its bytes.
+
+    UTF-16 has a byte order mark, and valid UTF-8 is UTF-8. Read as GB 18030, most letters beyond
+    ASCII of a Chinese file are in GB 2312, those of a file in Windows-1252 are rare ones or none.
+    charset-normalizer mistakes both in tables of numbers (tests/io/store/test_text_files.py).
+
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    str or None
+        None for a file that is no text in any of them.
+    """
+    with open_file(path) as file:
+        has_mark = file.read(2) in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+    if has_mark:
+        return "utf-16" if _is_text(path, "utf-16") else None
+    if _is_text(path, ENCODING):
+        return ENCODING
+    if _is_chinese(path):
+        return "gb18030"
+    return "cp1252" if _is_text(path, "cp1252") else None
+
+
+def _blocks(path, encoding) -> Iterator[str]:
+    """The text of a file, some at a time."""
+    with open_file(path, encoding) as file:
+        while block := file.read(SETTINGS.copied_bytes):
+            yield block
+
+
+def _is_text(path, encoding):
+    """Whether all bytes of a file are text in an encoding."""
+    try:
+        for _ in _blocks(path, encoding):
+            pass
+    except UnicodeError:
+        return False
+    return True
+
+
+def _is_chinese(path):
+    """Whether a file is text in GB 18030, most of whose letters beyond ASCII are in GB 2312."""
+    letters = 0
+    common = 0
+    try:
+        for block in _blocks(path, "gb18030"):
+            beyond = re.sub(r"[\x00-\x7f]+", "", block)
+            letters += len(beyond)
+            common += len(beyond.encode("gb2312", errors="ignore")) // 2  # bytes a letter
+    except UnicodeError:
+        return False
+    return 2 * common > letters
 
 
 def nearest(name: str, known: Collection[str]) -> str | None:

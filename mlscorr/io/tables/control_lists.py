@@ -12,17 +12,16 @@ import numpy as np
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.store import OpenPlace, OpenQuestion, shown
 from mlscorr.io.tables.column_names import CONTROL_NAMES, WORDS, OfficeWord, meant, same_word
-from mlscorr.io.tables.layout_search import NUMBER
-from mlscorr.io.tables.layouts import TableLayout
+from mlscorr.io.tables.layouts import NUMBER, TableLayout
+from mlscorr.io.tables.missing_columns import missing_sentence
 from mlscorr.io.tables.nearness import distance_of
 from mlscorr.io.tables.table_rows import read_rows
 from mlscorr.io.tables.table_sections import ControlSection
-from mlscorr.io.tables.tables import missing_sentence
 from mlscorr.survey import AXES, SurveyFileError, Trajectory
 
 SIGMAS = ("sigma_horizontal", "sigma_vertical")
 NORMAL = ("normal_e", "normal_n", "normal_h")
-HINTS = {("easting", "latitude"): " Latitude and longitude must be projected first."}
+HINTS = {("easting", "latitude"): (" Latitude and longitude must be projected first.", ())}
 EXAMPLES = {
     **dict.fromkeys(SIGMAS, "sigma = [0.003, 0.004] (horizontal, vertical)"),
     **{"kind": 'kind = "circle"', "size": "size = 0.6"},

@@ -4,6 +4,7 @@ import csv
 import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -182,3 +183,51 @@ def _first_bad(layout, converters):
                 way_out = " It seems to be a date or a time of day: give seconds."
                 return f"{line} has '{shown(cell)}' {place}{way_out * bool(DATE.match(cell))}"
     return ""
+
+
+def check_finite(path: str | Path, table: np.ndarray, row: str) -> None:
+    """Refuse a table with values that are not numbers.
+
+    Parameters
+    ----------
+    path : path
+        For messages.
+    table : (n, k) array
+    row : str
+        What a row of it is called.
+
+    Raises
+    ------
+    ValueError
+        Counts them and names the first.
+    """
+    bad = ~np.isfinite(table).all(axis=1)
+    if bad.any():
+        raise ValueError(
+            f"{bad.sum()} of {len(table)} {row}s of {path} hold values that are not numbers "
+            f"(first: {row} {np.argmax(bad) + 1})."
+        )
+
+
+def check_increasing(path: str | Path, gps_time: np.ndarray, row: str) -> None:
+    """Refuse times that don't increase.
+
+    Parameters
+    ----------
+    path : path
+        For messages.
+    gps_time : (n,) array
+    row : str
+        What holds a time.
+
+    Raises
+    ------
+    ValueError
+        Counts the steps back and names the first.
+    """
+    back = np.diff(gps_time) <= 0
+    if back.any():
+        raise ValueError(
+            f"The times of {path} must increase: {back.sum()} {row}s do not come after the one "
+            f"before (first: {row} {np.argmax(back) + 2})."
+        )
