@@ -52,6 +52,7 @@ from mlscorr.io.store.text_files import (
     ENCODING,
     ENCODINGS,
     encoding_of,
+    listed,
     nearest,
     shown,
     warn_of_cut,

@@ -2,9 +2,9 @@
 
 import codecs
 import os
-import re
 import warnings
-from collections.abc import Collection, Iterator
+from collections import Counter
+from collections.abc import Collection, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -33,44 +33,30 @@ def encoding_of(path: str | Path) -> str | None:
     """
     with open_file(path) as file:
         has_mark = file.read(2) in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
-    if has_mark:
-        return "utf-16" if _is_text(path, "utf-16") else None
-    if _is_text(path, ENCODING):
-        return ENCODING
-    if _is_chinese(path):
-        return "gb18030"
-    return "cp1252" if _is_text(path, "cp1252") else None
+    candidates = ("utf-16",) if has_mark else (ENCODING, "gb18030", "cp1252")
+    for encoding in candidates:
+        letters = _letters_beyond_ascii(path, encoding)
+        if letters is None:
+            continue
+        common = sum(
+            number for letter, number in letters.items() if letter.encode("gb2312", "ignore")
+        )
+        if encoding != "gb18030" or 2 * common > letters.total():
+            return encoding
+    return None
 
 
-def _blocks(path, encoding) -> Iterator[str]:
-    """The text of a file, some at a time."""
-    with open_file(path, encoding) as file:
-        while block := file.read(SETTINGS.copied_bytes):
-            yield block
-
-
-def _is_text(path, encoding):
-    """Whether all bytes of a file are text in an encoding."""
+def _letters_beyond_ascii(path, encoding):
+    """Numbers of the letters beyond ASCII of a file; None where it is no text in an encoding."""
+    letters: Counter[str] = Counter()
     try:
-        for _ in _blocks(path, encoding):
-            pass
+        with open_file(path, encoding) as file:
+            while block := file.read(SETTINGS.copied_bytes):
+                if not block.isascii():
+                    letters.update(letter for letter in block if not letter.isascii())
     except UnicodeError:
-        return False
-    return True
-
-
-def _is_chinese(path):
-    """Whether a file is text in GB 18030, most of whose letters beyond ASCII are in GB 2312."""
-    letters = 0
-    common = 0
-    try:
-        for block in _blocks(path, "gb18030"):
-            beyond = re.sub(r"[\x00-\x7f]+", "", block)
-            letters += len(beyond)
-            common += len(beyond.encode("gb2312", errors="ignore")) // 2  # bytes a letter
-    except UnicodeError:
-        return False
-    return 2 * common > letters
+        return None
+    return letters
 
 
 def nearest(name: str, known: Collection[str]) -> str | None:
@@ -108,6 +94,26 @@ def shown(text: str) -> str:
     """
     short = text if len(text) <= 60 else f"{text[:57]}..."
     return "".join(c if c.isprintable() else repr(c)[1:-1] for c in short)
+
+
+def listed(texts: Sequence[str], limit: int) -> str:
+    """The first of some texts of a file, as a message can show them, and the number of the others.
+
+    Parameters
+    ----------
+    texts : sequence of str
+    limit : int
+        How many are shown.
+
+    Examples
+    --------
+    >>> listed(["E", "N", "H"], 2)
+    'E, N, and 1 more'
+    """
+    words = [shown(text) for text in texts[:limit]]
+    if len(texts) > limit:
+        words.append(f"and {len(texts) - limit} more")
+    return ", ".join(words)
 
 
 def warn_of_cut(path: str | Path) -> None:

@@ -16,7 +16,6 @@ from mlscorr.io.tables.column_names import (
     TRAJECTORY_NAMES,
     UNITS,
     find_meanings,
-    listed,
     plain,
 )
 from mlscorr.io.tables.control import NOTHING_SURVEYED, ControlList, holds_points, read_control

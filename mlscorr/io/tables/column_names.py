@@ -67,21 +67,6 @@ def section_of(names: Collection[str]) -> str:
     return "trajectory"
 
 
-def listed(cells: Sequence[str]) -> str:
-    """The cells of a header, as a message can show them: as many as there are names that we know.
-
-    Parameters
-    ----------
-    cells : sequence of str
-    """
-    limit = len(CONTROL_NAMES | TRAJECTORY_NAMES)
-    if len(cells) > limit:
-        more = [f"and {len(cells) - limit} more"]
-    else:
-        more = []
-    return ", ".join([*map(shown, cells[:limit]), *more])
-
-
 class OfficeWord(NamedTuple):
     """Meaning of an office's own word for its points.
 

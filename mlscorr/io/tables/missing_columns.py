@@ -3,8 +3,9 @@
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
-from mlscorr.io.store import OpenPlace, OpenQuestion, nearest, shown
-from mlscorr.io.tables.column_names import listed, plain, section_of
+from mlscorr.io.settings import SETTINGS
+from mlscorr.io.store import OpenPlace, OpenQuestion, listed, nearest, shown
+from mlscorr.io.tables.column_names import plain, section_of
 from mlscorr.io.tables.layouts import NUMBER
 from mlscorr.survey import SurveyFileError
 
@@ -122,7 +123,7 @@ def missing_sentence(
         )
     if "gps_time" in missing and "utc" in near.get("gps_time", "").casefold():
         hint += " Times in UTC need trajectory.time_constant, too: 18 s since 2017."
-    has = listed(header) or "no header"
+    has = listed(header, SETTINGS.named_columns) or "no header"
     return f"{path} has no column {', '.join(missing)}; it has {has}.{hint}"
 
 
