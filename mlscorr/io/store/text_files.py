@@ -13,13 +13,14 @@ from mlscorr.io.store.opening import open_file
 
 ENCODING = "utf-8-sig"  # UTF-8, with or without a byte order mark
 ENCODINGS = {ENCODING: "UTF-8", "utf-16": "UTF-16", "gb18030": "GB 18030", "cp1252": "Windows-1252"}
+RARE_LETTERS = b"\xd8"  # lead byte from which on GB 2312 has its second level, by radical
 
 
 def encoding_of(path: str | Path) -> str | None:
     """Return the encoding of a text file, one of ENCODINGS, by all of its bytes.
 
     UTF-16 has a byte order mark, and valid UTF-8 is UTF-8. Read as GB 18030, most letters beyond
-    ASCII of a Chinese file are in GB 2312, those of a file in Windows-1252 are rare ones or none.
+    ASCII of a Chinese file are common ones, those of a file in Windows-1252 are rare ones or none.
     charset-normalizer mistakes both in tables of numbers (tests/io/store/test_text_files.py).
 
     Parameters
@@ -36,13 +37,9 @@ def encoding_of(path: str | Path) -> str | None:
     candidates = ("utf-16",) if has_mark else (ENCODING, "gb18030", "cp1252")
     for encoding in candidates:
         letters = _letters_beyond_ascii(path, encoding)
-        if letters is None:
+        if letters is None or (encoding == "gb18030" and not _are_chinese(letters)):
             continue
-        common = sum(
-            number for letter, number in letters.items() if letter.encode("gb2312", "ignore")
-        )
-        if encoding != "gb18030" or 2 * common > letters.total():
-            return encoding
+        return encoding
     return None
 
 
@@ -57,6 +54,13 @@ def _letters_beyond_ascii(path, encoding):
     except UnicodeError:
         return None
     return letters
+
+
+def _are_chinese(letters):
+    """Whether most of some letters, given by their numbers, are common ones in Chinese."""
+    coded = {letter: letter.encode("gb2312", errors="ignore") for letter in letters}
+    common = sum(letters[letter] for letter in letters if b"" < coded[letter] < RARE_LETTERS)
+    return 2 * common > letters.total()
 
 
 def nearest(name: str, known: Collection[str]) -> str | None:

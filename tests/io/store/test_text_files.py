@@ -22,11 +22,13 @@ def written(folder, text, encoding):
         ("Punktnr.;Rechtswert;Hochwert;Höhe", "cp1252"),  # charset-normalizer 3.5: GB 18030
         ("PtID;E;N;H\nTür;532012,49;3373991,48;44,48", "cp1252"),  # GB 18030 there, too
         ("PtID;E;N;H\nBrücke;532012,49;3373991,48;44,48", "cp1252"),
+        ("Punkt;E;N;H;Größe\nP1;532012,49;3373991,48;44,48;0,6", "cp1252"),  # two bytes, as 鲞
         ("Punkt;E;N;H;Größe\nStraße 1;532012,49;3373991,48;44,48;0,6\nTür;1;2;3;4", "cp1252"),
         ("N°;Est;Nord;Altitude\nClé;532012,49;3373991,48;44,48", "cp1252"),
         ("Punto;Este;Norte;Elevación;Tamaño", "cp1252"),
         ("PtID;E;N;H\n桥;532012,49;3373991,48;44,48", "gb18030"),
         ("点号,东坐标(m),北坐标(m),高程(m)\n堉镕,532012.49,3373991.48,44.48", "gb18030"),
+        ("name（m）\n隧1,路2", "gb18030"),
         ("点号,高程", "utf-8"),
         ("Höhe", "utf-8"),
         ("H", "ascii"),

@@ -171,6 +171,12 @@ def test_german_columns_of_kind_size_and_role_are_known(drive, tmp_path):
     assert points.check.kind == ("square",) and points.check.size.tolist() == [0.5]
 
 
+def test_a_column_of_sizes_in_letters_of_windows_goes_before_what_is_said_of_all(drive, tmp_path):
+    "Its two letters beyond ASCII are one in Chinese, by which the column was lost"
+    content = "Punkt;E;N;H;Größe\n" + P1.replace("\n", ";0,5\n")
+    assert read(tmp_path, content, drive, "cp1252").control.size.tolist() == [0.5]
+
+
 def test_words_of_the_field_are_roles_and_kinds(drive, tmp_path):
     "GCP and Passpunkt are control, Kontrollpunkt and ICP are check, Kreis and Quadrat kinds"
     words = [
