@@ -40,6 +40,7 @@ class Settings:
 
     # ---- tables
     longest_line: int = 10_000  # characters; no table has columns for that
+    named_columns: int = 32  # of a header in a message: as many as columns.toml has columns
     sampled_lines: int = 200  # in which a header stands, below what a program says of itself
 
     # ---- trajectories

@@ -48,7 +48,15 @@ from mlscorr.io.store.storage import (
     resolved,
 )
 from mlscorr.io.store.task_store import TaskStore, digest
-from mlscorr.io.store.text_files import ENCODING, nearest, shown, warn_of_cut
+from mlscorr.io.store.text_files import (
+    ENCODING,
+    ENCODINGS,
+    encoding_of,
+    listed,
+    nearest,
+    shown,
+    warn_of_cut,
+)
 from mlscorr.io.store.toml_file import (
     Column,
     Coordinate,

@@ -9,7 +9,7 @@ import numpy as np
 
 from mlscorr.io.clouds import announced_faces, read_layout
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.store import folders_below
+from mlscorr.io.store import folders_below, listed
 from mlscorr.io.tables import (
     CONTROL_NAMES,
     NUMBER,
@@ -18,7 +18,6 @@ from mlscorr.io.tables import (
     find_meanings,
     lacking,
     likely_header,
-    listed,
     unnamed_columns,
 )
 from mlscorr.io.trajectories import (
@@ -161,7 +160,7 @@ def _table(path) -> tuple[Role, str]:
     except ValueError as error:  # has the columns, and is not clear
         return "control", str(error)
     if len(header) > 1 and (len(driven | surveyed) > 1 or path.suffix.lower() == ".csv"):
-        return "table", f"its columns are {listed(header)}"
+        return "table", f"its columns are {listed(header, SETTINGS.named_columns)}"
     return "none", "no table of places"
 
 

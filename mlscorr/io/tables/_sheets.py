@@ -37,18 +37,18 @@ def read_sheets(path: str | Path) -> list[tuple[str, list[tuple[int, list[str]]]
                 f"{path} is no workbook of Excel, or it is damaged: save it anew as .xlsx or as "
                 "comma-separated values."
             ) from None
+        sheets = []
         try:
-            return [
-                (sheet.title, [row for row in _rows(sheet) if any(row[1])])
-                for sheet in book.worksheets
-            ]
+            for sheet in book.worksheets:
+                rows = []
+                for number, values in enumerate(sheet.iter_rows(values_only=True), start=1):
+                    cells = [_text(value) for value in values]
+                    if any(cells):
+                        rows.append((number, cells))
+                sheets.append((sheet.title, rows))
         finally:
             book.close()
-
-
-def _rows(sheet):
-    for number, values in enumerate(sheet.iter_rows(values_only=True), start=1):
-        yield number, [_text(value) for value in values]
+    return sheets
 
 
 def _text(value):

@@ -1,96 +1,22 @@
-"""Names and units of columns as surveyors, total stations, GNSS receivers and POS software write
-them, in English, German, French, Spanish and Chinese.
+"""Names and units of columns, and words in their cells, as others write them.
 
-Sources: point exports of Leica Infinity, Trimble Access and Emlid Flow; coordinate files of German
-surveying offices (Punkt, Rechtswert, Hochwert, Hoehe); text exports of NovAtel Inertial Explorer
-(GPSTime, H-Ell, SDEast, HdngSD). X and Y are no easting and northing: in German, Chinese and many
-other surveys X points north.
+All known words stand in columns.toml beside this module, by language, for a surveyor to read and
+extend. Here they are compared with those of a table.
 """
 
 from __future__ import annotations
 
 import re
+import tomllib
 import unicodedata
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from importlib.resources import files
 from typing import NamedTuple
 
 from mlscorr.io.store import shown
 
 ANGLES = ("roll", "pitch", "heading")
-PLACE_NAMES = {
-    "easting": "e east ecoord ecoordinate rechtswert rechts ost ostwert este est "
-    "东坐标 东 东向 东距 横坐标 e坐标",
-    "northing": "n north ncoord ncoordinate hochwert hoch nord nordwert norte "
-    "北坐标 北 北向 北距 纵坐标 n坐标",
-    "x": "x xcoord xcoordinate coordx xkoordinate xwert coordenadax x坐标",
-    "y": "y ycoord ycoordinate coordy ykoordinate ywert coordenaday y坐标",
-    "latitude": "lat breite latitud 纬度",
-    "longitude": "lon long lng länge longitud 经度",
-    "height": "h z elev elevation alt altitude hell ellipsoidalheight ellipsoidheight hortho "
-    "orthometricheight orthoheight orthoht ellht ellipht hmsl höhe hoehe hnn hnhn rl zcoord "
-    "zcoordinate coordz zkoordinate zwert altura cota elevación elevacion coordenadaz "
-    "高程 高度 高 大地高 正常高 海拔 h坐标 z坐标",
-}
-CONTROL_NAMES = PLACE_NAMES | {
-    "name": "id no nr n° num number point pointid pointname pointno pointnr pointnumber pt ptid "
-    "ptname ptno ptnr pnt punkt punktnr punktnummer punktname punktid pkt pktnr pktname "
-    "pnr bezeichnung nummer nom numéro numero matricule punto nombre 点号 点名 点 编号 名称",
-    "sigma": "σ std stdev sd accuracy genauigkeit standardabweichung écarttype ecarttype "
-    "precision précision precisión 中误差 精度",
-    "sigma_horizontal": "sigmahz sigmaxy sigmaen sigmalage cq2d 2dcq hrms hprec hacc lateralrms "
-    "horizontalprecision horizontalaccuracy lagegenauigkeit 平面精度 平面中误差",
-    "sigma_vertical": "sigmaz sigmahöhe cq1d 1dcq vrms vprec vacc elevationrms verticalprecision "
-    "verticalaccuracy höhengenauigkeit 高程精度 高程中误差",
-    "kind": "shape targetkind targettype art zielart forme forma 形状 标靶类型",
-    "size": "diameter grösse groesse durchmesser kantenlänge taille diamètre tamaño diámetro "
-    "尺寸 大小 直径 边长",
-    "role": "rolle rôle rol 角色",
-    **dict.fromkeys(("normal_e", "normal_n", "normal_h"), ""),
-}
-WORDS = {  # of the cells in a column of words: ours to those of others, plain
-    "role": {
-        "control": "controlpoint groundcontrolpoint gcp passpunkt 控制点",
-        "check": "checkpoint independentcheckpoint icp chk kontrollpunkt prüfpunkt pruefpunkt "
-        "检查点",
-    },
-    "kind": {
-        "circle": "disc disk kreis kreisscheibe scheibe",
-        "square": "quadrat",
-        "hole": "loch",
-        "checkerboard": "chessboard schachbrett",
-        "board": "",
-    },
-}
-ROBOTS_PLACES = ("p", "t", "pos", "position", "poseposition", "prsr")  # of TUM, ROS and EuRoC
-ROBOTS_QUATERNIONS = ("quat", "quaternion", "orientation", "poseorientation", "qrs")
-TRAJECTORY_NAMES = PLACE_NAMES | {
-    **{
-        name: " ".join([PLACE_NAMES[name], *(word + axis for word in ROBOTS_PLACES)])
-        for name, axis in (("x", "x"), ("y", "y"), ("height", "z"))
-    },
-    **{f"q{axis}": " ".join(word + axis for word in ROBOTS_QUATERNIONS) for axis in "xyzw"},
-    "gps_time": "time timestamp t sow tow gpssow gpstow secondsofweek gpsseconds zeit gpszeit "
-    "temps tiempo 时间 gps时间 周秒",
-    "roll": "rollwinkel roulis alabeo 横滚 横滚角 翻滚角",
-    "pitch": "nick nickwinkel tangage cabeceo 俯仰 俯仰角",
-    "heading": "hdg hdng azimuth azimut cap rumbo kurs 航向 航向角",
-    "yaw": "gier gierwinkel lacet guiñada 偏航 偏航角",
-    "sigma_easting": "sdeast eastsd sigmae sde stdeast",
-    "sigma_northing": "sdnorth northsd sigman sdn stdnorth",
-    "sigma_height": "sdheight heightsd sigmah sdh stdheight sdup",
-    "sigma_roll": "rollsd sdroll stdroll",
-    "sigma_pitch": "pitchsd sdpitch stdpitch",
-    "sigma_heading": "hdngsd headingsd sdheading stdheading",
-}
 BRACKETS = re.compile(r"[\[(<]\s*([^\])>]*?)\s*[\])>]\s*$")
-UNITS = {  # to m, deg and s
-    **dict.fromkeys(("m", "meter", "metre", "meters", "metres", "mètres", "metros", "米"), 1.0),
-    **dict.fromkeys(("s", "sec", "seconds", "秒", "deg", "degree", "degrees", "°", "度"), 1.0),
-    **{"cm": 0.01, "mm": 0.001, "rad": 57.29577951308232, "gon": 0.9},
-    **{"arcmin": 1 / 60, "arcsec": 1 / 3600},
-    **{"ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ns": 1e-9},
-}
-FOREIGN_UNITS = re.compile(r"(us|s|us-)?(ft|feet|foot)(us)?|in|inch|inches|yd|km|dms|hms")
 
 
 def plain(name: str) -> str:
@@ -109,32 +35,36 @@ def plain(name: str) -> str:
     return re.sub(r"[\s_.\-/:,'\"]+", "", words)
 
 
-def section_of(names: Mapping[str, str]) -> str:
+def _plain_words(*tables):
+    """Our words with those of others, plain; a word that several tables have gets all of theirs."""
+    joined: dict[str, tuple[str, ...]] = {}
+    for table in tables:
+        for our, others in table.items():
+            joined[our] = (*joined.get(our, ()), *map(plain, others))
+    return joined
+
+
+_KNOWN = tomllib.loads(files(__package__).joinpath("columns.toml").read_text(encoding="utf-8"))
+CONTROL_NAMES = _plain_words(_KNOWN["place"], _KNOWN["control"])
+TRAJECTORY_NAMES = _plain_words(_KNOWN["place"], _KNOWN["trajectory"])
+WORDS = {column: _plain_words(words) for column, words in _KNOWN["words"].items()}  # of cells
+UNITS = {  # to m, deg and s
+    name: unit["size"] for our, unit in _KNOWN["units"].items() for name in (our, *unit["names"])
+}
+REFUSED_UNITS = {name.casefold() for name in _KNOWN["refused"]["units"]}
+
+
+def section_of(names: Collection[str]) -> str:
     """The section of survey.toml that is about a table with these names of columns.
 
     Parameters
     ----------
-    names : mapping
+    names : collection of str
         CONTROL_NAMES or TRAJECTORY_NAMES.
     """
     if "name" in names:
         return "control"
     return "trajectory"
-
-
-def listed(cells: Sequence[str]) -> str:
-    """The cells of a header, as a message can show them: as many as there are names that we know.
-
-    Parameters
-    ----------
-    cells : sequence of str
-    """
-    limit = len(CONTROL_NAMES | TRAJECTORY_NAMES)
-    if len(cells) > limit:
-        more = [f"and {len(cells) - limit} more"]
-    else:
-        more = []
-    return ", ".join([*map(shown, cells[:limit]), *more])
 
 
 class OfficeWord(NamedTuple):
@@ -217,7 +147,7 @@ def meant(column: str, cell: str, words: Mapping[str, OfficeWord] | None = None)
     own = (words or {}).get(same_word(cell))
     if own is not None and own.column == column:
         return own.value
-    known = (our for our, others in WORDS[column].items() if plain(cell) in (our, *others.split()))
+    known = (our for our, others in WORDS[column].items() if plain(cell) in (our, *others))
     return next(known, cell.casefold())
 
 
@@ -247,11 +177,13 @@ def is_foreign(unit: str) -> bool:
     ----------
     unit : str
     """
-    return any(map(FOREIGN_UNITS.fullmatch, unit.split()))
+    return not REFUSED_UNITS.isdisjoint(unit.split())
 
 
 def find_meanings(
-    cells: Sequence[str], names: Mapping[str, str], chosen: Mapping[str, str | int] | None = None
+    cells: Sequence[str],
+    names: Mapping[str, Collection[str]],
+    chosen: Mapping[str, str | int] | None = None,
 ) -> dict[str, list[int]]:
     """Positions of the columns that each of our names may mean.
 
@@ -262,7 +194,7 @@ def find_meanings(
     cells : sequence of str
         A header.
     names : mapping
-        Our name to the names of others, plain and separated by blanks.
+        Our name to the plain names of others.
     chosen : mapping, optional
         Our name to the one in the header.
 
@@ -282,7 +214,7 @@ def find_meanings(
     for name, others in names.items():
         column = (chosen or {}).get(name)
         among = known
-        words = others.split()
+        words = others
         if column is not None:
             among = exact
             words = [str(column).strip().casefold()]

@@ -26,9 +26,9 @@ from mlscorr.io.tables.control_lists import (
     with_check_points,
     word_places,
 )
+from mlscorr.io.tables.layout_search import read_layout
 from mlscorr.io.tables.table_rows import read_rows
 from mlscorr.io.tables.table_sections import ControlSection
-from mlscorr.io.tables.tables import read_layout
 from mlscorr.survey import AXES, ControlPoints, Trajectory
 
 COLUMNS = ("name", *AXES, *SIGMAS, "kind", "size", "role")

@@ -149,8 +149,9 @@ def row_doubts(path: str | Path, rows: Sequence[dict[str, Any]]) -> Iterator[str
 
 def _known(words):
     """Our words, each with those of others."""
-    listed = [f"{our} ({', '.join(others.split())})" for our, others in words.items() if others]
-    return ", ".join([*listed, *(our for our, others in words.items() if not others)])
+    translated = [f"{our} ({', '.join(others)})" for our, others in words.items() if others]
+    untranslated = [our for our, others in words.items() if not others]
+    return ", ".join([*translated, *untranslated])
 
 
 def _likely_unit(size):

@@ -10,19 +10,18 @@ from typing import Any
 import numpy as np
 
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.store import OpenPlace, OpenQuestion, shown
+from mlscorr.io.store import OpenPlace, OpenQuestion, listed, shown
 from mlscorr.io.tables.column_names import CONTROL_NAMES, WORDS, OfficeWord, meant, same_word
-from mlscorr.io.tables.layout_search import NUMBER
-from mlscorr.io.tables.layouts import TableLayout
+from mlscorr.io.tables.layouts import NUMBER, TableLayout
+from mlscorr.io.tables.missing_columns import missing_sentence
 from mlscorr.io.tables.nearness import distance_of
 from mlscorr.io.tables.table_rows import read_rows
 from mlscorr.io.tables.table_sections import ControlSection
-from mlscorr.io.tables.tables import missing_sentence
 from mlscorr.survey import AXES, SurveyFileError, Trajectory
 
 SIGMAS = ("sigma_horizontal", "sigma_vertical")
 NORMAL = ("normal_e", "normal_n", "normal_h")
-HINTS = {("easting", "latitude"): " Latitude and longitude must be projected first."}
+HINTS = {("easting", "latitude"): (" Latitude and longitude must be projected first.", ())}
 EXAMPLES = {
     **dict.fromkeys(SIGMAS, "sigma = [0.003, 0.004] (horizontal, vertical)"),
     **{"kind": 'kind = "circle"', "size": "size = 0.6"},
@@ -146,9 +145,10 @@ def _unstated(layout, rows, missing, meanings):
     if "kind" in missing and "kind" not in seeming and (column := _likely_kinds(layout, rows)):
         seeming["kind"] = header[column]
         words = {same_word(cell): cell for cell in _cells(rows, column)}
+        first_words = listed(list(words.values()), SETTINGS.named_faults)
         sentence += (
-            f" The column {shown(header[column])} holds {_first_words(list(words.values()))}: name "
-            "it as columns.kind, and give each word its meaning under [control] words."
+            f" The column {shown(header[column])} holds {first_words}: name it as columns.kind, "
+            "and give each word its meaning under [control] words."
         )
         places = word_places({("kind", cell): None for cell in words.values()})
     elif "kind" in layout.columns:  # whose words are not known either
@@ -176,16 +176,6 @@ def _likely_kinds(layout, rows):
     if len(candidates) == 1:
         return candidates[0]
     return None
-
-
-def _first_words(words):
-    """The first of some words, as a message can show them."""
-    limit = SETTINGS.named_faults
-    if len(words) > limit:
-        more = [f"and {len(words) - limit} more"]
-    else:
-        more = []
-    return ", ".join([*map(shown, words[:limit]), *more])
 
 
 def unknown_words(

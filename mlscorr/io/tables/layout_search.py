@@ -1,34 +1,160 @@
-"""The layout of tables as others write them.
+"""The layout of a table: our own columns, or those of others, found by their names.
 
 Nothing is guessed in silence: what was understood is a sentence of its own, and what can be
-understood in two ways is refused.
+understood in two ways is refused. The separator is the one that parts a row into all names that are
+needed; csv.Sniffer takes decimal commas for separators, and finds none below lines of comments.
 """
 
 import re
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.store import OpenPlace, OpenQuestion, as_path, open_file, shown
-from mlscorr.io.tables import layouts
+from mlscorr.io.store import (
+    ENCODING,
+    OpenPlace,
+    OpenQuestion,
+    as_path,
+    encoding_of,
+    open_file,
+    shown,
+)
 from mlscorr.io.tables._sheets import SUFFIX, read_sheets
 from mlscorr.io.tables.column_names import UNITS, find_meanings, is_foreign, section_of, unit_of
+from mlscorr.io.tables.layouts import (
+    COMMENT_MARKS,
+    NUMBER,
+    SEPARATORS,
+    TableLayout,
+    is_comment,
+    not_text,
+    split,
+)
+from mlscorr.io.tables.missing_columns import check_chosen, missing_columns
 from mlscorr.survey import SurveyFileError
 
 WORDS = ("name", "kind", "role")  # columns that hold no numbers
 BRACKETED = re.compile(r"[(\[].*[)\]]")
 THOUSANDS = re.compile(r"[+-]?\d{1,3}(['’\s]\d{3})+([.,]\d*)?")
-NUMBER = re.compile(r"[+-]?\d+([.,]\d*)?(e[+-]?\d+)?", re.IGNORECASE)
+
+
+def read_layout(
+    path: str | Path,
+    required: Sequence[str],
+    groups: Sequence[Sequence[str]],
+    names: Mapping[str, Collection[str]],
+    lacking: Callable[[Collection[str]], list[str]],
+    chosen: Mapping[str, str | int] | None = None,
+    unnamed: Callable[[Sequence[str]], Mapping[str, int]] = lambda _: {},
+    hints: Mapping[tuple[str, str], tuple[str, Sequence[OpenPlace]]] | None = None,
+) -> TableLayout:
+    """The layout of a table in our own columns, or of one as others write them.
+
+    Parameters
+    ----------
+    path : path
+    required : sequence of str
+        A table in UTF-8 with all of these in a first line with commas is our own.
+    groups : sequence of sequences of str
+        Columns of our own that only make sense together.
+    names, lacking, chosen, unnamed
+        See find_layout.
+    hints : mapping, optional
+        See missing_columns.
+
+    Returns
+    -------
+    TableLayout
+
+    Raises
+    ------
+    ValueError
+        For a table whose columns are missing or can be understood in two ways, and for no text.
+    """
+    path = as_path(path)
+    refusal = None
+    if path.suffix.lower() != SUFFIX:
+        try:
+            header, lines = read_header(path)
+        except ValueError as error:
+            header = []
+            refusal = error
+        is_own = not chosen and set(required) <= set(header)
+        if is_own and encoding_of(path) == ENCODING:
+            columns = _own_columns(path, header, required, groups)
+            return TableLayout(path, tuple(header), lines, columns, is_own=True)
+    layout = find_layout(path, names, lacking, chosen, unnamed)
+    if layout is not None:
+        return layout
+    header = likely_header(path, names)
+    meanings = find_meanings(header, names, chosen)
+    missing = lacking(meanings)
+    check_chosen(path, missing, chosen or {})
+    if refusal and not meanings:  # names that are known are those of a table
+        raise refusal
+    raise missing_columns(path, header, missing, meanings, names, hints)
+
+
+def read_header(path: str | Path) -> tuple[list[str], int]:
+    """Column names of a CSV file in lower case, and the number of lines down to the header.
+
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    header : list of str
+    lines : int
+
+    Raises
+    ------
+    ValueError
+        When the file holds nothing but blank lines or is not text.
+    """
+    path = as_path(path)
+    longest = SETTINGS.longest_line
+    try:
+        with open_file(path, ENCODING) as file:
+            for number, line in enumerate(iter(lambda: file.readline(longest), ""), start=1):
+                if len(line) == longest:
+                    raise ValueError(
+                        f"Line {number} of {path} has {longest} characters or more, where the "
+                        "names of columns belong: it is no table of comma-separated values."
+                    )
+                if line.strip():
+                    return [cell.strip().strip('"').casefold() for cell in line.split(",")], number
+    except UnicodeDecodeError:
+        raise ValueError(not_text(path)) from None
+    raise ValueError(f"{path} is empty.")
+
+
+def _own_columns(path, header, required, groups):
+    """Position of every required column, and of the optional groups that are there."""
+    names = list(required)
+    for group in groups:
+        present = [name for name in group if name in header]
+        if present and len(present) < len(group):
+            absent = [name for name in group if name not in header]
+            raise ValueError(
+                f"{path} has {', '.join(present)} but not {', '.join(absent)}: "
+                f"give all of {', '.join(group)}, or none."
+            )
+        names += present
+    doubled = [name for name in names if header.count(name) > 1]
+    if doubled:
+        raise ValueError(f"{path} has the column {doubled[0]} {header.count(doubled[0])} times.")
+    return {name: header.index(name) for name in names}
 
 
 def find_layout(
     path: str | Path,
-    names: Mapping[str, str],
+    names: Mapping[str, Collection[str]],
     lacking: Callable[[Collection[str]], list[str]],
     chosen: Mapping[str, str | int] | None = None,
     unnamed: Callable[[Sequence[str]], Mapping[str, int]] = lambda _: {},
-) -> layouts.TableLayout | None:
+) -> TableLayout | None:
     """The layout of a table of others.
 
     Parameters
@@ -65,25 +191,20 @@ def find_layout(
                 "number all that are needed, or none."
             )
         unnamed = _numbered(positions)
-    for encoding in (None,) if path.suffix.lower() == SUFFIX else _encodings(path):
-        layouts = []
-        for start, rows in _candidates(path, encoding):
-            layout = _layout_of(replace(start, path=path), rows, names, lacking, chosen)
-            layout = layout or _unnamed_layout(start, rows, is_numbered, unnamed)
-            if layout is not None:
-                layouts.append(layout)
-                if layout.sheet is None:
-                    break  # the surest separator
-        if len({layout.sheet for layout in layouts}) > 1:
-            sheets = ", ".join(shown(layout.sheet) for layout in layouts)
-            raise ValueError(
-                f"{path} has a table in {len(layouts)} sheets ({sheets}): keep one of them."
-            )
-        for layout in layouts[:1]:
-            has_evidence = not "".join(layout.header).isascii() or _are_pairs(path)
-            if encoding != "gb18030" or has_evidence:
-                return layout
-    return None
+    sheets = []
+    for start, rows in _parted_tables(path):
+        layout = _named_layout(start, rows, names, lacking, chosen)
+        layout = layout or _unnamed_layout(start, rows, is_numbered, unnamed)
+        if layout is not None and layout.sheet is None:
+            return layout
+        if layout is not None:
+            sheets.append(layout)
+    if len(sheets) > 1:
+        titles = ", ".join(shown(layout.sheet) for layout in sheets)
+        raise ValueError(
+            f"{path} has a table in {len(sheets)} sheets ({titles}): keep one of them."
+        )
+    return next(iter(sheets), None)
 
 
 def _numbered(positions):
@@ -99,33 +220,33 @@ def _numbered(positions):
     return columns
 
 
-def _encodings(path):
-    with open_file(path) as file:
-        if file.read(2) in (b"\xff\xfe", b"\xfe\xff"):
-            return ("utf-16",)
-        return tuple(name for name in layouts.ENCODINGS if name != "utf-16")
-
-
-def _are_pairs(path):
-    """Whether letters beyond ASCII come in pairs of bytes, as Chinese ones do and umlauts don't."""
-    with open_file(path) as file:
-        start = file.read(SETTINGS.copied_bytes)
-    return all(len(run) % 2 == 0 for run in re.findall(rb"[\x80-\xff]+", start))
-
-
-def _candidates(path, encoding):
-    """Pairs of a TableLayout without columns, and the first rows parted in its way."""
-    if encoding is None:
+def _parted_tables(path) -> Iterator[tuple[TableLayout, list[tuple[int, list[str]]]]]:
+    """Layouts without columns, the surest first, each with the first rows parted in its way."""
+    if path.suffix.lower() == SUFFIX:
         for sheet, rows in read_sheets(path):
-            yield layouts.TableLayout(path, (), 0, {}, sheet=sheet), rows[: SETTINGS.sampled_lines]
+            yield TableLayout(path, (), 0, {}, sheet=sheet), rows[: SETTINGS.sampled_lines]
         return
-    lines = layouts.head(path, encoding)
-    for separator in layouts.SEPARATORS if lines else ():
-        layout = layouts.TableLayout(path, (), 0, {}, separator, encoding=encoding)
-        yield layout, [(number, layouts.split(line, separator)) for number, line in lines]
+    encoding = encoding_of(path)
+    lines = _first_lines(path, encoding) if encoding else []
+    for separator in SEPARATORS if lines else ():
+        layout = TableLayout(path, (), 0, {}, separator, encoding=encoding)
+        yield layout, [(number, split(line, separator)) for number, line in lines]
 
 
-def _layout_of(start, rows, names, lacking, chosen):
+def _first_lines(path, encoding):
+    """Pairs of a number from 1 and a line that is not blank, up to one too long for a table."""
+    lines = []
+    with open_file(path, encoding) as file:
+        for number in range(1, SETTINGS.sampled_lines + 1):
+            line = file.readline(SETTINGS.longest_line)
+            if not line or len(line) == SETTINGS.longest_line:
+                break
+            if line.strip(" \t\r\n-=_"):
+                lines.append((number, line))
+    return lines
+
+
+def _named_layout(start, rows, names, lacking, chosen):
     """The layout by the first row that names all that is needed; None without one."""
     for place, (number, raw) in enumerate(rows):
         cells = _uncommented(raw)
@@ -135,7 +256,7 @@ def _layout_of(start, rows, names, lacking, chosen):
         check_chosen(start.path, set(chosen) - set(meanings), chosen)
         columns = {name: positions[0] for name, positions in meanings.items()}
         layout = replace(start, header=tuple(cells), lines=number, columns=columns)
-        below = [row for row in rows[place + 1 :] if not layouts.is_comment(row[1])]
+        below = [row for row in rows[place + 1 :] if not is_comment(row[1])]
         units = [unit_of(cell) for cell in cells]
         if below and _holds_units(below[0][1], columns):
             layout = replace(layout, lines=below[0][0])
@@ -143,15 +264,15 @@ def _layout_of(start, rows, names, lacking, chosen):
             units = texts if len(texts) == len(cells) else []  # else of groups of columns, in words
         layout, parted = _parted(layout, [row for _, row in below])
         _check_doubled(layout, meanings, parted, section_of(names))
-        return _with_numbers(layout, units, parted)
+        return _with_units_and_decimals(layout, units, parted)
     return None
 
 
 def _parted(layout, rows):
     """The layout and its rows where these are parted otherwise than the names, as in POSPac's."""
     is_whole = not rows or len(rows[0]) > 1
-    for separator in () if is_whole else layouts.SEPARATORS:
-        parted = [layouts.split(row[0], separator) for row in rows]
+    for separator in () if is_whole else SEPARATORS:
+        parted = [split(row[0], separator) for row in rows]
         if len(parted[0]) == len(layout.header):
             return replace(layout, separator=separator), parted
     return layout, rows
@@ -162,56 +283,38 @@ def _check_doubled(layout, meanings, rows, section):
     for name, positions in meanings.items():
         doubled = [shown(layout.header[i]) for i in positions]
         cells = [{row[i] for i in positions if i < len(row)} for row in rows]
-        if len(set(doubled)) > 1 or (len(doubled) > 1 and max(map(len, cells), default=2) > 1):
+        has_one_value = bool(rows) and all(len(values) <= 1 for values in cells)
+        if len(doubled) == 1 or (len(set(doubled)) == 1 and has_one_value):
+            continue
+        places = []
+        if len(set(doubled)) == len(doubled):
+            key = (section, "columns", name)
+            places.append(OpenPlace(key, tuple(doubled), f"column of the {name}"))
             way_out = f'choose, as {name} = "{doubled[0]}"'
-            if len(set(doubled)) < len(doubled):
-                way_out = f"number all that are needed, as {name} = {positions[0] + 1},"
-            is_named = len(set(doubled)) == len(doubled)
-            place = OpenPlace((section, "columns", name), tuple(doubled), f"column of the {name}")
-            raise OpenQuestion(
-                f"{layout.path} has {len(doubled)} columns that may be the {name} "
-                f"({', '.join(doubled)}): {way_out} under [{section}.columns] in survey.toml.",
-                [place] if is_named else [],
-            )
-
-
-def check_chosen(path: Path, missing: Collection[str], chosen: Mapping[str, str | int]) -> None:
-    """Refuse columns that survey.toml names and the table does not have.
-
-    Parameters
-    ----------
-    path : Path
-    missing : collection of str
-        Our names.
-    chosen : mapping
-        See find_layout.
-
-    Raises
-    ------
-    ValueError
-        Names the first.
-    """
-    for name in sorted(set(missing) & set(chosen)):
-        raise SurveyFileError(
-            f"{path} has no column '{chosen[name]}', which survey.toml names the {name}."
+        else:
+            way_out = f"number all that are needed, as {name} = {positions[0] + 1},"
+        raise OpenQuestion(
+            f"{layout.path} has {len(doubled)} columns that may be the {name} "
+            f"({', '.join(doubled)}): {way_out} under [{section}.columns] in survey.toml.",
+            places,
         )
 
 
 def _unnamed_layout(start, rows, is_numbered, unnamed):
     """The layout of a table without a header: its first row, or the first with what was chosen."""
-    rows = [row for row in rows if not (row[1] and row[1][0].startswith(layouts.COMMENT_MARKS))]
+    rows = [row for row in rows if not (row[1] and row[1][0].startswith(COMMENT_MARKS))]
     for place, (number, cells) in enumerate(rows if is_numbered else rows[:1]):
         columns = unnamed(cells)
         if columns:
             layout = replace(start, lines=number - 1, columns=dict(columns))
-            return _with_numbers(layout, [], [row for _, row in rows[place:]])
+            return _with_units_and_decimals(layout, [], [row for _, row in rows[place:]])
     return None
 
 
 def _uncommented(cells):
     """Cells of a header that may stand behind a comment mark."""
-    if cells and cells[0].startswith(layouts.COMMENT_MARKS):
-        first = cells[0].lstrip("".join(layouts.COMMENT_MARKS)).strip()
+    if cells and cells[0].startswith(COMMENT_MARKS):
+        first = cells[0].lstrip("".join(COMMENT_MARKS)).strip()
         if first:
             return [first, *cells[1:]]
         return cells[1:]
@@ -225,7 +328,7 @@ def _holds_units(cells, columns):
     return any(texts) and (are_units or bool(BRACKETED.fullmatch(" ".join(cells).strip())))
 
 
-def _with_numbers(layout, units, rows):
+def _with_units_and_decimals(layout, units, rows):
     """The layout with its decimal sign and the factors of its units."""
     path = layout.path
     factors = {}
@@ -252,7 +355,7 @@ def _with_numbers(layout, units, rows):
     return replace(layout, factors=factors, decimal="," if commas else ".")
 
 
-def likely_header(path: str | Path, names: Mapping[str, str]) -> list[str]:
+def likely_header(path: str | Path, names: Mapping[str, Collection[str]]) -> list[str]:
     """The row among the first ones that holds the most names of columns; the longest without any.
 
     Parameters
@@ -265,11 +368,6 @@ def likely_header(path: str | Path, names: Mapping[str, str]) -> list[str]:
     -------
     list of str
     """
-    path = as_path(path)
-    if path.suffix.lower() == SUFFIX:
-        encodings = (None,)
-    else:
-        encodings = _encodings(path)
-    tables = [rows for encoding in encodings for _, rows in _candidates(path, encoding)]
+    tables = [rows for _, rows in _parted_tables(as_path(path))]
     rows = [_uncommented(cells) for table in tables for _, cells in table]
     return max(rows, key=lambda cells: (len(find_meanings(cells, names)), len(cells)), default=[])

@@ -1,17 +1,17 @@
 """How a table is laid out: letters, separator, decimal sign, header, and what its columns mean."""
 
 import csv
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from mlscorr.io.settings import SETTINGS
-from mlscorr.io.store import ENCODING, open_file, shown
+from mlscorr.io.store import ENCODING, ENCODINGS, shown
 from mlscorr.io.tables.column_names import plain
 
 SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}  # the surest first
+NUMBER = re.compile(r"[+-]?\d+([.,]\d*)?(e[+-]?\d+)?", re.IGNORECASE)
 COMMENT_MARKS = ("#", "%", "!", "//")
-ENCODINGS = {ENCODING: "UTF-8", "utf-16": "UTF-16", "gb18030": "GB 18030", "cp1252": "Windows-1252"}
 
 
 @dataclass(frozen=True)
@@ -110,36 +110,6 @@ class TableLayout:
         if any(mark in cell for mark in ("_" if self.decimal == "." else "_.")):
             raise ValueError(cell)
         return float(cell.replace(self.decimal, "."))
-
-
-def head(path: Path, encoding: str = ENCODING) -> list[tuple[int, str]]:
-    """The first lines of a text file that are not blank, with their numbers from 1.
-
-    Parameters
-    ----------
-    path : Path
-    encoding : str
-
-    Returns
-    -------
-    list of (int, str)
-        Empty where the file is no text in this encoding; up to a line too long for a table.
-    """
-    lines = []
-    longest = SETTINGS.longest_line
-    try:
-        with open_file(path, encoding) as file:
-            for number in range(1, SETTINGS.sampled_lines + 1):
-                line = file.readline(longest)
-                if not line or len(line) == longest:
-                    break
-                if line.strip(" \t\r\n-=_"):
-                    lines.append((number, line))
-            while 0 < len(line) < longest and file.read(SETTINGS.copied_bytes):
-                pass  # a letter beyond ASCII may come late
-    except UnicodeError:
-        return []
-    return lines
 
 
 def split(line: str, separator: str) -> list[str]:

@@ -4,6 +4,7 @@ import csv
 import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -35,27 +36,32 @@ def read_rows(layout: TableLayout, exact: bool = False) -> Iterator[tuple[str, l
     ValueError
         For a row that is too short or too long, and a file that is not text.
     """
+    is_parted_by_blanks = layout.separator == " " and not layout.sheet
+    if not layout.is_own:
+        exact = is_parted_by_blanks
     width = len(layout.header)
-    last = max(layout.columns.values())
+    least = max(layout.columns.values()) + 1
     for number, cells in _all_rows(layout):
-        is_row = layout.is_own or not (is_comment(cells) or "".join(cells).strip("-=_") == "")
-        if not any(cells) or not is_row:
+        if not any(cells):
             continue
         if not layout.is_own:
-            is_parted_by_blanks = layout.separator == " " and not layout.sheet
-            width = width or (len(cells) if is_parted_by_blanks else 0)
-            exact = is_parted_by_blanks
+            is_rule = not "".join(cells).strip("-=_")
+            if is_rule or is_comment(cells):
+                continue
+            if is_parted_by_blanks and not width:
+                width = len(cells)  # of the first row, below no header
             while width and len(cells) > width and not cells[-1]:
                 del cells[-1]
         line = f"Line {number} of {layout.path}"
-        if layout.separator != " " and (exact or not layout.is_own) and 0 < width < len(cells):
+        is_strict = exact or not layout.is_own
+        if is_strict and layout.separator != " " and 0 < width < len(cells):
             raise ValueError(_too_wide(line, len(cells), width))
-        if len(cells) <= last or (exact and len(cells) != width):
+        if len(cells) < least or (exact and len(cells) != width):
             cause = "the file may be cut off, a separator may be missing, or a name may hold one"
             if "latitude" in layout.columns and len(cells) > width:
                 cause = "angles may be in degrees, minutes and seconds: export decimal degrees"
             raise ValueError(
-                f"{line} has {len(cells)} columns where {width or last + 1} belong: {cause} "
+                f"{line} has {len(cells)} columns where {width or least} belong: {cause} "
                 f"(columns are parted by {SEPARATORS[layout.separator]})."
             )
         yield line, cells
@@ -182,3 +188,51 @@ def _first_bad(layout, converters):
                 way_out = " It seems to be a date or a time of day: give seconds."
                 return f"{line} has '{shown(cell)}' {place}{way_out * bool(DATE.match(cell))}"
     return ""
+
+
+def check_finite(path: str | Path, table: np.ndarray, row: str) -> None:
+    """Refuse a table with values that are not numbers.
+
+    Parameters
+    ----------
+    path : path
+        For messages.
+    table : (n, k) array
+    row : str
+        What a row of it is called.
+
+    Raises
+    ------
+    ValueError
+        Counts them and names the first.
+    """
+    bad = ~np.isfinite(table).all(axis=1)
+    if bad.any():
+        raise ValueError(
+            f"{bad.sum()} of {len(table)} {row}s of {path} hold values that are not numbers "
+            f"(first: {row} {np.argmax(bad) + 1})."
+        )
+
+
+def check_increasing(path: str | Path, gps_time: np.ndarray, row: str) -> None:
+    """Refuse times that don't increase.
+
+    Parameters
+    ----------
+    path : path
+        For messages.
+    gps_time : (n,) array
+    row : str
+        What holds a time.
+
+    Raises
+    ------
+    ValueError
+        Counts the steps back and names the first.
+    """
+    back = np.diff(gps_time) <= 0
+    if back.any():
+        raise ValueError(
+            f"The times of {path} must increase: {back.sum()} {row}s do not come after the one "
+            f"before (first: {row} {np.argmax(back) + 2})."
+        )

@@ -51,16 +51,19 @@ EARLIEST = 1e8  # s since 1970: 1973
 LATEST = 1e11  # s since 1970: 5138; a thousand times more, so that sizes of units don't overlap
 TRUE_NORTH_USUAL = {"hell", "hdngsd", "eastsd"}  # columns of Inertial Explorer and POSPac alone
 HINTS = {
-    ("easting", "x"): " Say under [trajectory.columns] in survey.toml which of X and Y is easting, "
-    "or longitude where they are angles.",
+    ("easting", "x"): (
+        " Say under [trajectory.columns] in survey.toml which of X and Y is easting, or longitude "
+        "where they are angles.",
+        (),
+    ),
     ("heading", "yaw"): (
         " Its yaw is a heading by convention only: say under [trajectory] in survey.toml how "
-        f'it counts, as heading = "{FROM_EAST}" or "{GRID}".'
-    ),
-}
-HINT_PLACES = {
-    ("heading", "yaw"): OpenPlace(
-        ("trajectory", "heading"), (FROM_EAST, GRID), "direction in which the yaw counts"
+        f'it counts, as heading = "{FROM_EAST}" or "{GRID}".',
+        (
+            OpenPlace(
+                ("trajectory", "heading"), (FROM_EAST, GRID), "direction in which the yaw counts"
+            ),
+        ),
     ),
 }
 
@@ -115,7 +118,6 @@ def read_table(
             chosen,
             tum_columns,
             HINTS,
-            HINT_PLACES,
         )
     except ValueError as error:
         if isinstance(error, SurveyFileError) or not (other := position_file(path)):
