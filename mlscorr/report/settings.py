@@ -46,7 +46,7 @@ class Settings:
     wall_height: float = 1.5  # m, of the least wall
     wall_flatness: float = 0.05  # m, the largest standard deviation of its points from a plane
     facades: int = 20  # of ties, where passes lie the farthest apart: some of them are well covered
-    plane_points: int = 15  # that tell how a wall or a target is turned
+    normal_points: int = 15  # that tell how a wall or a target is turned
 
 
 SETTINGS = Settings()

@@ -50,7 +50,7 @@ class Settings:
     aligning_sigma: tuple = (0.02, 0.05, np.radians(0.3), np.radians(1.0))
 
     # Scanners
-    grazing: float = 0.01  # cosine of incidence below which nothing returns
+    no_return_cosine: float = 0.01  # cosine of incidence below which nothing returns
     fading: float = 10.0  # m where the strength has fallen to a half; the near field is flat
     pulse_length: float = 0.6  # m of range within which echoes merge: c / 2 times the usual 4 ns
     speckle: float = 0.08  # relative, one sigma: some 150 speckles a footprint, averaged

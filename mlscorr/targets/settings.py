@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from mlscorr.survey import COORDINATE_ROUNDING
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -26,21 +28,21 @@ class Settings:
     smallest_length: float = 0.7  # size; along what is visible of a target
     smallest_width: float = 0.33  # size; across it: a target may be hidden by a post
     bloom: float = 1.35  # size; of a disc that saturates the receiver
-    patches: int = 10  # patches; road, walls, and then plates; and gaps in a patch
-    grazing: float = 0.1  # sine; of a beam to a plane that it can be said to cross
+    plane_patches: int = 10  # patches; road, walls, and then plates; and gaps in a patch
+    least_crossing_sine: float = 0.1  # sine; of a beam to a plane that it can be said to cross
 
     # Outlines
     trials: int = 600  # outlines; in each round, half of them in a rough fit
     rough_rounds: int = 5  # rounds; tell if there is an outline; the exact one needs five times
-    smallest_share: float = 0.1  # trials; effective share, below which the likelihood is flattened
+    least_effective_share: float = 0.1  # trials; below it the likelihood is flattened
     proposal_width: float = 1.35  # sigma; of the posterior: the next trials
     hidden_share: float = 0.45  # size; from the seed to the centre: half of it may be hidden
     first_blur: float = 8.0  # size over blur; wide at first, so that no outline is lost
     rough_blur: float = 0.025  # size; of a rough fit
     wrong_side: float = 0.01  # beams; on the wrong side whatever their distance (mixed returns)
     divergence: float = 0.35e-3  # rad; four sigmas of a beam's width (RIEGL VQ-250 data sheet)
-    rounding: float = 0.0003  # m; one sigma of a coordinate at the usual LAS scale of 1 mm
-    speckle: float = 0.2  # intensity; relative spread where it is unknown
+    rounding: float = COORDINATE_ROUNDING  # m
+    intensity_spread: float = 0.2  # intensity; relative spread where it is unknown
     same_surface: float = 0.7  # dark over bright; from which on they may be one
     outside_middle: float = 0.65  # diameter; off a seed's middle, itself off by a seventh of it
     contradiction: float = 0.05  # beams; share of those that met nothing, well inside the outline

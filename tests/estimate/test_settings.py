@@ -27,7 +27,7 @@ def test_a_majority_is_left_by_the_breakdown():
 def test_steps_of_derivatives_suit_their_spread():
     "A gradient's step is small beside a curvature's, which is small beside every prior"
     narrowest = np.log(min(SETTINGS.precise_factor, SETTINGS.time_factor, SETTINGS.scale_factor))
-    assert 10 * SETTINGS.step < SETTINGS.wide_step < narrowest / 2
+    assert 10 * SETTINGS.gradient_step < SETTINGS.curvature_step < narrowest / 2
 
 
 def test_gross_sizes_span_misread_targets_to_wrong_setups():

@@ -20,7 +20,7 @@ def test_scales_of_sigma_are_symmetric_about_what_is_stated():
 
 def test_probabilities_are_in_their_order():
     "A rival is named long before a match is refused, and what is dropped is no rival"
-    dropped = np.exp(SETTINGS.smallest_weight)
+    dropped = np.exp(SETTINGS.least_log_weight)
     assert dropped < 1e-6 < SETTINGS.smallest_rival
     assert SETTINGS.smallest_rival < 1 - SETTINGS.smallest_probability
     assert SETTINGS.smallest_sound < SETTINGS.smallest_probability < 1

@@ -21,7 +21,7 @@ def test_a_step_is_larger_than_two_fixes_differ():
 
 def test_times_are_in_their_order():
     "A fall-back lasts less than a second, ambiguities seconds, an outage a minute"
-    assert SETTINGS.step_duration < 1.0 < SETTINGS.fix_time < SETTINGS.outage
+    assert SETTINGS.step_duration < 1.0 < SETTINGS.reacquisition_time < SETTINGS.outage
 
 
 def test_shares_are_shares():

@@ -8,7 +8,7 @@ from mlscorr.gap.contrast._settings import SETTINGS
 
 def test_a_bootstrap_tells_a_sigma_to_four_percent():
     "Relative sigma of a sigma from n replicas: 1 / root 2 n"
-    assert 1 / np.sqrt(2 * SETTINGS.replicas) == pytest.approx(0.04, abs=0.005)
+    assert 1 / np.sqrt(2 * SETTINGS.bootstrap_replicas) == pytest.approx(0.04, abs=0.005)
 
 
 def test_bins_ascend():

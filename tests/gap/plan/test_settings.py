@@ -9,7 +9,7 @@ from mlscorr.simulate import SETTINGS as SIMULATION
 
 def test_planned_passes_are_as_far_apart_as_compared_ones():
     "Two visits are compared from 10 s on; a planned pause is longer"
-    assert SETTINGS.pause > OBSERVE.pair_pause
+    assert SETTINGS.pass_interval > OBSERVE.pause
 
 
 def test_planned_patches_are_like_those_of_a_street():
@@ -20,7 +20,7 @@ def test_planned_patches_are_like_those_of_a_street():
 
 def test_a_target_at_the_farthest_has_points():
     "At 40 m beams of 0.1 deg are 7 cm apart: eight across a disc of 0.6 m"
-    apart = SETTINGS.farthest * np.radians(0.1)
+    apart = SETTINGS.farthest_target * np.radians(0.1)
     assert 0.6 / apart > 8
     assert 0.0 < SETTINGS.centre_sigma < OBSERVE.odd_distance
 

@@ -41,10 +41,10 @@ def test_pauses_tell_losses_from_lines():
 
 def test_a_gate_lets_normal_errors_through():
     "Of 3D errors of 1 sigma per axis 1 in 1000 lies beyond 4 sigmas"
-    assert chi2.sf(SETTINGS.gate_sigmas**2, 3) == pytest.approx(1e-3, rel=0.2)
+    assert chi2.sf(SETTINGS.surface_gate_sigmas**2, 3) == pytest.approx(1e-3, rel=0.2)
 
 
 def test_two_visits_are_of_different_errors():
     "Pairs stand farther apart in time than the window over which the POS error is one shift"
-    assert SETTINGS.pair_pause > SETTINGS.window > SETTINGS.moment
+    assert SETTINGS.pause > SETTINGS.outlier_interval > SETTINGS.moment
     assert SETTINGS.pair_distance < SETTINGS.cell

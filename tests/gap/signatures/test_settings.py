@@ -17,7 +17,7 @@ def test_steps_stand_as_close_as_the_narrowest_events():
 @pytest.mark.parametrize("pulses, limit", [(1, 0.11), (OBSERVE.samples, 0.031)])
 def test_replicas_give_a_variance_to_a_tenth(pulses, limit):
     "200 draws of one pulse know a variance to 10 %, with 12 pulses to 3 %"
-    freedom = SETTINGS.replicas * pulses
+    freedom = SETTINGS.random_replicas * pulses
     assert np.sqrt(2.0 / freedom) < limit
     rng = np.random.default_rng(1)
     variances = rng.normal(size=(300, freedom)).var(axis=1)
