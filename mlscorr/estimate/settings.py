@@ -16,7 +16,7 @@ class Settings:
     median_epochs: int = 5  # epochs, whose median holds edges and drops what stands alone
     lone_jump: float = 3.0  # ratio to it that no filter makes from one epoch to the next and back
     setup_sigmas: float = 3.0  # two neighbours that differ by less may share a wrong setup
-    resolution: float = 1e-6  # m, rad: less than any file's rounding, and no noise at all
+    resolution: float = 1e-6  # m, rad: less than any file's rounding, and no noise at all; guard
 
     # Tests
     significance: float = 0.001  # Baarda's (1968), but over all targets or steps together
@@ -45,7 +45,7 @@ class Settings:
     knot_tolerance: float = 0.5
     coarse_tolerance: float = 4.0  # the same, to see which ties hold: by half of it, in a quarter
     tie_sample: int = 100  # least ties that choose parameters: a scale to a tenth
-    dense_rows: int = 500  # with ties: for more of them knots are faster than their covariances
+    dense_rows: int = 500  # with ties: for more, knots are faster than covariances; guard
     sufficient_ratio: float = 1.1  # of a median sigma: a difference that no check point shows
     tie_points: int = 12  # as points below, each with a solution of all ties
     tie_freedom: float = 4.0  # degrees of freedom of Student's t (Lange et al. 1989)
@@ -72,7 +72,7 @@ class Settings:
     heaviest: float = 5.0  # times the mean weight: one point in the tail can't stand for all
     least_parameter_weight: float = 1e-3  # of parameters whose prediction is worth the work
     prediction_epochs: int = 300  # for the parameters' spread, which changes as slowly as sigmas
-    smallest_sigma: float = 1e-12  # m, rad: for what the POS claims to know perfectly
+    smallest_sigma: float = 1e-12  # m, rad: for what the POS claims to know perfectly; guard
 
     # The mounting
     mounting_iterations: int = 10  # of Gauss-Newton; a boresight wrong by degrees needs four

@@ -22,7 +22,7 @@ class Settings:
     looked_length: float = 15.0  # m, of the way to either side of one: beams may look 45 deg ahead
     listed_files: int = 5  # files; more are written as a pattern
     # Lines a second
-    rated_points: int = 200_000  # points, half a second of a fast scanner
+    rated_points: int = 200_000  # points, half a second of a fast scanner; guard
     turning_time: float = 0.5  # s of points: tens of lines of any scanner
     turning_points: int = 4000  # points of these: enough for the mean of a direction
     turning_rates: tuple[float, float] = (4.0, 600.0)  # 1/s, slower and faster than any scanner

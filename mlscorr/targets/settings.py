@@ -15,12 +15,12 @@ class Settings:
 
     # Candidates and visits
     near_radius: float = 2.0  # m; within which a post holds a target, and plates are sought first
-    piece_points: int = 20_000  # points; bounds the time for one piece
+    piece_points: int = 20_000  # points; bounds the time for one piece; guard
     turn_step: float = 0.5  # m; a vehicle that moved less may stand and shake, not turn back
 
     # Clusters and seeds
     smallest_count: int = 20  # points; on fewer, plane and outline can't both be held
-    smallest_levels: int = 4  # intensities; fewer are a flag or a class, not an intensity
+    smallest_levels: int = 4  # intensities; fewer are a flag or a class, not an intensity; guard
     link_shares: tuple[float, float] = (0.2, 0.4)  # size; beside a bright post, and wide scan lines
     thickness: float = 0.03  # m; off a plane: less than a post's or a frame's depth
     plane_trials: int = 100  # triples; find a plane of a third of the points with 0.98
@@ -61,9 +61,9 @@ class Settings:
     rough_play: float = 0.1  # overlap or size; by which a rough fit may miss the limits
 
     # Search without control
-    largest_size: float = 1.5  # m; nobody carries a larger target
-    largest_carry: float = 0.25  # chunk; points that are looked at again with the next
-    largest_fits: int = 150  # regions; bounds time and memory of a chunk when all glitters
+    largest_size: float = 1.5  # m; nobody carries a larger target; guard
+    largest_carry: float = 0.25  # chunk; points that are looked at again with the next; guard
+    largest_fits: int = 150  # regions; bounds time and memory of a chunk when all glitters; guard
     rim: tuple[float, float] = (1.15, 1.6)  # half diagonal; where it ends, and is looked at
     smallest_likeness: float = 0.75  # Jaccard index; a ring has a dark quarter
     largest_ratio: float = 1.6  # width; length of a target of which a part is hidden

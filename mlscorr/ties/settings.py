@@ -12,7 +12,7 @@ class Settings:
     # Features
     cell: float = 1.0  # m: some hundred points of a scanner in a street, flat for most of them
     moment: float = 1.0  # s: the POS error is one value over it (a POS has a bandwidth of 1 Hz)
-    held_cells: int = 200_000  # cells in memory, 35 MB: some seconds of any scanner
+    held_cells: int = 200_000  # cells in memory, 35 MB: some seconds of any scanner; guard
     feature_points: int = 24  # of a feature: with 21 degrees of freedom a variance to a third
     roughest: float = 0.05  # m about a plane: asphalt and masonry have centimetres, shrubs more
     narrowest: float = 0.15  # m, one sigma along a side: half a cell (1 / sqrt(12) for a whole one)

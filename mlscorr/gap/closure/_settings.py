@@ -13,7 +13,7 @@ class Settings:
     around: float = 1.25  # sizes about a target's centre: a board's corner is 1.06 away
     search_margin: float = 0.3  # m more: by so much a target may move in a simulation
     edge: float = 1.05  # times a target's size: within that, what was recorded may be its edge
-    target_pulses: int = 40_000  # about a target, those nearest in time: the vehicle may stand
+    target_pulses: int = 40_000  # about a target, the nearest in time: vehicles stand; guard
     delivered: float = 0.7  # of all pauses, that are of one pulse: fewer tell of a thinned cloud
     line_pulses: int = 100  # that show how others follow them
     level: float = 0.01  # rad: elevations of one scan plane

@@ -11,8 +11,8 @@ class Settings:
     """
 
     # what is kept
-    kept: int = 40_000  # cells, and edges, in memory: 10 MB, and a ratio of a bin to a percent
-    distance_points: int = 20_000  # of whole cells, for distances between clouds
+    kept: int = 40_000  # cells, and edges: 10 MB, and a ratio of a bin to a percent; guard
+    distance_points: int = 20_000  # of whole cells, for distances between clouds; guard
     # depth edges along a scan line
     jump: float = 0.3  # m between the surfaces before and after: more than a curb
     plateau: int = 3  # pulses on each of them
