@@ -1,34 +1,55 @@
 """Which numbers of a room its benchmark feels: each setting is halved and doubled in turn.
 
-    python benchmarks/ablation.py [room or room.field ... [tolerance]]
+    python benchmarks/ablation.py [room or room.field ...] [--seeds 1 2] [--tolerance 0.01]
 
-A number that no figure feels should go, or follow from another one. A figure is felt where it
-moves by more than the tolerance (a hundredth by default) of its value, or where the benchmark
-refuses the number. Each room of ``ROOMS`` names its frozen ``SETTINGS`` and a function without
-arguments that returns figures by name, the same ones each time (small: it runs twice for every
-field). A field's unit is the first word of the comment on its line. Values that a module copies
-when it is imported aren't reached: it reads ``SETTINGS.field`` where it uses it.
+A number that no figure feels should go, or follow from another one. A number is felt where a
+figure moves by more than the tolerance (a hundredth by default) of its value, or where the
+benchmark refuses the number; those that guard against bad input or bound resources are felt by
+tests instead. Each room of ``ROOMS`` names its frozen ``SETTINGS`` and a function of seeds that
+returns figures by name (room_figures.py), the same ones each time: it runs twice for every field.
+A field's unit is the first word of the comment on its line. Values that a module copies when it is
+imported (defaults of arguments, settings of a higher room) aren't reached.
 """
 
 import argparse
 import inspect
 import math
 import re
+import warnings
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
+from functools import partial
+from importlib import import_module
 from time import perf_counter
 
-import matching_study
-import target_study
-
-import mlscorr.matching
-import mlscorr.targets
+import room_figures
 
 TOLERANCE = 0.01  # of a figure: what moves less is the luck of a small benchmark
-ROOMS = (  # name, SETTINGS, function that returns a dict of figures
-    ("matching", mlscorr.matching.SETTINGS, matching_study.figures),
-    ("targets", mlscorr.targets.SETTINGS, target_study.figures),
-)
+SEEDS = (1,)
+SHOWN = 3  # figures of a number, those that move most
+ROOMS = {  # name: module of the settings, function of seeds that returns a dict of figures
+    "baselines": ("baselines._settings", room_figures.baselines),
+    "blind": ("blind._settings", room_figures.blind),
+    "effects": ("effects._settings", room_figures.effects),
+    "estimate": ("estimate.settings", room_figures.estimate),
+    "evaluate": ("evaluate._settings", room_figures.evaluate),
+    "gap/closure": ("gap.closure._settings", room_figures.diagnosed),
+    "gap/contrast": ("gap.contrast._settings", room_figures.diagnosed),
+    "gap/evidence": ("gap.evidence.settings", room_figures.evidence),
+    "gap/plan": ("gap.plan._settings", room_figures.plan),
+    "gap/residuals": ("gap.residuals.settings", room_figures.diagnosed),
+    "gap/signatures": ("gap.signatures.settings", room_figures.diagnosed),
+    "io": ("io.settings", room_figures.io),
+    "matching": ("matching.settings", room_figures.matching),
+    "pipeline": ("pipeline.settings", room_figures.correction),
+    "pipeline/project": ("pipeline.project.settings", room_figures.project),
+    "pos": ("pos.settings", room_figures.pos),
+    "report": ("report.settings", room_figures.report),
+    "report/gap": ("report.gap._settings", room_figures.diagnosis_page),
+    "simulate": ("simulate.settings", room_figures.simulated),
+    "targets": ("targets.settings", room_figures.targets),
+    "ties": ("ties.settings", room_figures.ties),
+}
 
 
 @dataclass(frozen=True)
@@ -50,7 +71,7 @@ class Ablation:
     double: dict[str, float] | str
 
     def changes(self, figures, tolerance=TOLERANCE):
-        """Sentences of what moved at half and at double of the value: two lists.
+        """Relative changes of what moved at half and at double of the value: two lists of words.
 
         Parameters
         ----------
@@ -124,16 +145,17 @@ def report(name, settings, benchmark, names=(), tolerance=TOLERANCE):
     tolerance : float
         Of a figure, below which it did not move.
     """
+    benchmark()  # compiled loops are loaded, simulated surveys written
     start = perf_counter()
     figures = benchmark()
-    print(f"{name}: a run of {perf_counter() - start:.0f} s gives {_numbers(figures)}\n")
+    print(f"{name}: a run of {perf_counter() - start:.1f} s gives {_numbers(figures)}\n")
     print(f"{'field':32s} {'unit':8s} {'value':>14s}  figures at half and at double")
     for ablation in ablate(settings, benchmark, names):
         changes = ablation.changes(figures, tolerance)
         pairs = zip(("half:", "double:"), changes, strict=True)
         lines = [f"{factor} {'; '.join(moved)}" for factor, moved in pairs if moved]
         value = str(ablation.value)
-        for line in lines or ["no figure feels it"]:
+        for line in lines or ["not felt"]:
             print(f"{ablation.field:32s} {ablation.unit:8s} {value:>14s}  {line}", flush=True)
 
 
@@ -146,44 +168,57 @@ def _is_numeric(value):
 def _figures(settings, field, value, benchmark):
     with setting(settings, field, value):
         try:
-            return benchmark()
+            with warnings.catch_warnings(action="ignore"):
+                return benchmark()
         except (ValueError, IndexError, ArithmeticError) as error:
             return f"{type(error).__name__}: {error}"
 
 
 def _changes(figures, other, tolerance):
+    """Words on the figures that moved, those that moved most first."""
     if isinstance(other, str):
         return [other]
-    pairs = [(name, value, other.get(name, math.nan)) for name, value in figures.items()]
-    return [
-        f"{name} {value:.4g} -> {now:.4g}"
-        for name, value, now in pairs
-        if not math.isclose(value, now, rel_tol=tolerance, abs_tol=1e-12)
-        and not (math.isnan(value) and math.isnan(now))
-    ]
+    moved = []
+    for name, value in figures.items():
+        now = other.get(name, math.nan)
+        is_same = math.isclose(value, now, rel_tol=tolerance, abs_tol=1e-12)
+        if is_same or (math.isnan(value) and math.isnan(now)):
+            continue
+        change = (now - value) / abs(value) if value else math.copysign(math.inf, now - value)
+        moved.append((name, change))
+    moved.sort(key=lambda figure: -abs(figure[1]) if math.isfinite(figure[1]) else -math.inf)
+    words = [f"{name} {change:+.1%}" for name, change in moved[:SHOWN]]
+    if len(moved) > SHOWN:
+        words.append(f"{len(moved) - SHOWN} more")
+    return words
 
 
 def _numbers(figures):
     return ", ".join(f"{name} {value:.4g}" for name, value in figures.items())
 
 
-def main(words):
-    """Report on the rooms or fields named, or on all; a number at the end is the tolerance."""
-    if words and words[-1][0].isdigit():
-        tolerance = float(words.pop())
-    else:
-        tolerance = TOLERANCE
-    unknown = {word.split(".")[0] for word in words} - {room for room, *_ in ROOMS}
+def settings_of(room):
+    """The frozen SETTINGS of a room of ROOMS, as its modules import them."""
+    return import_module(f"mlscorr.{ROOMS[room][0]}").SETTINGS
+
+
+def main():
+    """Report on the rooms or fields named, or on all."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("names", nargs="*", metavar="room or room.field")
+    parser.add_argument("--seeds", nargs="+", type=int, default=SEEDS)
+    parser.add_argument("--tolerance", type=float, default=TOLERANCE, help="of a figure")
+    given = parser.parse_args()
+    unknown = {name.split(".")[0] for name in given.names} - set(ROOMS)
     if unknown:
-        rooms = ", ".join(room for room, *_ in ROOMS)
-        raise SystemExit(f"No room {', '.join(sorted(unknown))} here. Rooms: {rooms}.")
-    for room, settings, benchmark in ROOMS:
-        names = [word.partition(".")[2] for word in words if word.split(".")[0] == room]
-        if names or not words:
-            report(room, settings, benchmark, [name for name in names if name], tolerance)
+        parser.error(f"No room {', '.join(sorted(unknown))} here. Rooms: {', '.join(ROOMS)}.")
+    for room, (_, figures) in ROOMS.items():
+        names = [name.partition(".")[2] for name in given.names if name.split(".")[0] == room]
+        if names or not given.names:
+            benchmark = partial(figures, tuple(given.seeds))
+            chosen = [name for name in names if name]
+            report(room, settings_of(room), benchmark, chosen, given.tolerance)
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("words", nargs="*", metavar="room, room.field or tolerance")
-    main(parser.parse_args().words)
+    main()

@@ -5,7 +5,6 @@
 By default 2, 10 and 20 million points on two passes of a simulated street, repeated file after
 file for more than 2. Times alone mean nothing on a busy machine: processor time counts, and each
 search runs between two decodings by laspy of the same files in processes of their own. ICP starts
-import argparse
 from the two passes as recorded, on points of voxels of 0.2 m.
 """
 

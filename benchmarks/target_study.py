@@ -42,15 +42,15 @@ def look_at(look, size, condition, seed, known=True):
     return seen.on_target, error, error @ np.linalg.solve(best.covariance, error), false, best.score
 
 
-def figures():
+def figures(seeds=(50,)):
     """Figures of a small study: a view of each row, with the size known and unknown, and a street.
 
     Recall counts targets of 25 points and more; of the street, objects that the search finds
     without control, and the targets that are found near control.
     """
-    known = product(TARGETS, (0.6, 0.3), CONDITIONS, (50,), (True,))
+    known = product(TARGETS, (0.6, 0.3), CONDITIONS, seeds, (True,))
     unknown = product(
-        ("disc", "plate", "hole", "checkerboard"), (0.6,), CONDITIONS, (50,), (False,)
+        ("disc", "plate", "hole", "checkerboard"), (0.6,), CONDITIONS, seeds, (False,)
     )
     content = {}
     for label, rows in (("", known), ("unknown size, ", unknown)):

@@ -1,7 +1,10 @@
 from dataclasses import FrozenInstanceError, dataclass, is_dataclass
+from pathlib import Path
 
 import ablation
 import pytest
+
+import mlscorr
 
 
 @dataclass(frozen=True)
@@ -39,9 +42,9 @@ def test_each_number_is_halved_and_doubled():
 
 
 def test_what_moved_and_what_no_figure_feels():
-    "Only figures that moved by more than the tolerance are told, and an error's sentence"
+    "Relative changes of figures beyond the tolerance, and an error's sentence"
     rows = by_field()
-    assert rows["width"].changes(figures()) == [["area 15 -> 7.5"], ["area 15 -> 30"]]
+    assert rows["width"].changes(figures()) == [["area -50.0%"], ["area +100.0%"]]
     assert rows["width"].changes(figures(), tolerance=0.6)[0] == []
     assert rows["idle"].changes(figures()) == [[], []]
     assert rows["count"].changes(figures())[1] == ["ValueError: 10 lanes, at most 9"]
@@ -67,11 +70,14 @@ def test_the_table_says_where_nothing_moved(capsys):
     out = capsys.readouterr().out
     assert "area 15" in out.splitlines()[0]
     (idle,) = [line for line in out.splitlines() if line.startswith("idle")]
-    assert idle.endswith("no figure feels it")
+    assert idle.endswith("not felt")
 
 
 def test_rooms_that_are_registered_have_numbers_and_a_function():
-    "Each with the settings as its modules import them"
-    for _, settings, benchmark in ablation.ROOMS:
-        assert is_dataclass(settings)
-        assert callable(benchmark)
+    "Each class Settings of the package is one of a room, with figures of its own"
+    package = Path(mlscorr.__file__).parent
+    homes = {path.parent.relative_to(package).as_posix() for path in package.rglob("*settings.py")}
+    assert set(ablation.ROOMS) == homes
+    for room, (_, figures) in ablation.ROOMS.items():
+        assert is_dataclass(ablation.settings_of(room))
+        assert callable(figures)

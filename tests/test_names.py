@@ -76,6 +76,19 @@ def doubled_classes():
     }
 
 
+def settings_fields():
+    "Name of a field of Settings -> {module: whether its value is taken from a name elsewhere}"
+    homes = defaultdict(dict)
+    for path in sorted(PACKAGE.rglob("*settings.py")):
+        for node in ast.parse(path.read_text()).body:
+            if isinstance(node, ast.ClassDef) and node.name == "Settings":
+                for field in node.body:
+                    if isinstance(field, ast.AnnAssign):
+                        taken = any(isinstance(part, ast.Name) for part in ast.walk(field.value))
+                        homes[field.target.id][str(path.relative_to(PACKAGE))] = taken
+    return homes
+
+
 def test_the_lint_knows_a_noun_from_a_pun():
     "Pronouns, participles and verbs in capitals are refused, nouns are not"
     assert all(map(is_banned, ("one", "_found", "FEWEST", "several", "TOLD", "mine", "KEEP")))
@@ -94,6 +107,16 @@ def test_names_are_nouns_of_the_field():
 def test_a_class_name_has_one_meaning():
     "No public class name stands in two modules"
     assert not doubled_classes()
+
+
+def test_a_number_has_one_name_and_one_home():
+    "No two rooms give a setting the same name, unless one of them takes the other's value"
+    homes = settings_fields()
+    assert not {
+        name: list(modules)
+        for name, modules in homes.items()
+        if len(modules) - sum(modules.values()) > 1
+    }
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ class Settings:
     spacing: float = 0.02  # m; between points of a surveyed surface: a fifth of a small target
     inlier: float = 0.05  # m; beyond it from a surveyed surface a corrected target is still wrong
     poor_fitness: float = 0.5  # share; with fewer inliers no rigid motion fits the targets
-    iterations: int = 200  # ICP from metres away takes more than Open3D's default of 30
+    icp_iterations: int = 200  # ICP from metres away takes more than Open3D's default of 30
     worsening: float = 0.001  # m; of control RMSE: less is within the targets' own noise
 
 

@@ -139,7 +139,7 @@ def _register(source, surface, largest, start, estimation):
         largest,
         start,
         getattr(icp, f"TransformationEstimation{estimation}")(),
-        icp.ICPConvergenceCriteria(max_iteration=SETTINGS.iterations),
+        icp.ICPConvergenceCriteria(max_iteration=SETTINGS.icp_iterations),
     ).transformation
 
 

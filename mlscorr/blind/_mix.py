@@ -66,7 +66,7 @@ def _case(kind, turns, rng):
         mdb = float(rng.choice(sizes, p=shares))
     elif kind != "clean":
         is_noise = kind == "noise"
-        mdb = float(rng.uniform(*(SETTINGS.noise_sizes if is_noise else SETTINGS.clear_sizes)))
+        mdb = float(rng.uniform(*(SETTINGS.noise_mdb if is_noise else SETTINGS.clear_sizes)))
     without = str(rng.choice([name for name in causes() if name not in names]))
     return Case(kind, names, mdb, names[0] if kind == "withheld" else without)
 

@@ -22,7 +22,7 @@ class Settings:
     # MDB of single effects, and their shares: goals are set at 2 and at 3
     clear_sizes: tuple[float, float] = (3.0, 6.0)
     # MDB, of pairs, withheld ones and mechanisms: what a diagnosis should not miss
-    noise_sizes: tuple[float, float] = (2.0, 8.0)
+    noise_mdb: tuple[float, float] = (2.0, 8.0)
     # MDB of noise, whose information grows with the square of its size
     unlikeness: float = 0.5
     # squared correlation below which another effect is wrongly named

@@ -127,6 +127,6 @@ def filled_sigmas(trajectory: Trajectory) -> tuple[Trajectory, tuple[str, ...]]:
 
 def _is_lone_jump(sigma):
     """Which epochs (n,) state sigmas (n, 3) far from those of both sides."""
-    usual = median_filter(sigma, size=(SETTINGS.neighbours, 1), mode="nearest")
+    usual = median_filter(sigma, size=(SETTINGS.median_epochs, 1), mode="nearest")
     ratio = np.divide(sigma, usual, out=np.ones_like(sigma), where=usual > 0)
     return ((ratio > SETTINGS.lone_jump) | (ratio < 1 / SETTINGS.lone_jump)).any(axis=1)

@@ -170,7 +170,7 @@ def _least_squares(equations, matched, recorded):
     """
     correction = np.zeros(6 * len(recorded))
     step = 0.0
-    for _ in range(SETTINGS.iterations):
+    for _ in range(SETTINGS.mounting_iterations):
         correction = correction + step  # here, so that the last equations are about the last one
         mountings, about = linearized(equations, matched, recorded, correction)
         solved = about.solve(None)

@@ -37,7 +37,7 @@ class Posterior:
     @property
     def mixture(self) -> list[tuple[SignalParameters, float]]:
         """The points that are worth the work, with weights that sum up to one."""
-        weighty = [point for point in self.points if point[1] > SETTINGS.smallest_weight]
+        weighty = [point for point in self.points if point[1] > SETTINGS.least_parameter_weight]
         total = sum(weight for _, weight in weighty)
         return [(parameters, weight / total) for parameters, weight in weighty]
 
@@ -125,7 +125,7 @@ class Objective:
         family : str
         logarithms : (k,) array
         """
-        steps = logarithms + SETTINGS.step * np.eye(len(logarithms))
+        steps = logarithms + SETTINGS.gradient_step * np.eye(len(logarithms))
         chosen, *near = (self.parameters(family, each) for each in (logarithms, *steps))
         try:
             solved = [block.weigh(chosen) for block in self.blocks]
@@ -134,7 +134,7 @@ class Objective:
         except np.linalg.LinAlgError:
             return IMPROBABLE, np.zeros(len(logarithms))
         value = self._prior(logarithms) + sum(part.log_likelihood for part in solved)
-        return value, (self._prior(steps) + ahead - value) / SETTINGS.step
+        return value, (self._prior(steps) + ahead - value) / SETTINGS.gradient_step
 
     def maximum(self, family: str, start: np.ndarray) -> tuple[np.ndarray, float]:
         """The most probable logarithms of a family, and the log posterior there.
@@ -149,7 +149,7 @@ class Objective:
             value, slope = self.gradient(family, x)
             return -value, -slope
 
-        limit = SETTINGS.farthest * self.spread
+        limit = SETTINGS.farthest_spreads * self.spread
         best = minimize(
             negative,
             np.clip(start, self.initial - limit, self.initial + limit),
@@ -170,13 +170,13 @@ class Objective:
         value : float
             The log posterior there.
         """
-        step = SETTINGS.wide_step * np.eye(len(mode))
+        step = SETTINGS.curvature_step * np.eye(len(mode))
         once = np.array([[self(family, mode + sign * s) for s in step] for sign in (1, -1)])
-        curvature = np.diag(2 * value - once.sum(axis=0)) / SETTINGS.wide_step**2
+        curvature = np.diag(2 * value - once.sum(axis=0)) / SETTINGS.curvature_step**2
         for i in range(len(mode)):
             for j in range(i):
                 both = self(family, mode + step[i] + step[j]) + value - once[0, i] - once[0, j]
-                curvature[i, j] = curvature[j, i] = -both / SETTINGS.wide_step**2
+                curvature[i, j] = curvature[j, i] = -both / SETTINGS.curvature_step**2
         scale = np.outer(self.spread, self.spread)
         values, vectors = np.linalg.eigh(curvature * scale)
         return scale * ((vectors / np.maximum(values, 1.0)) @ vectors.T)
@@ -204,7 +204,9 @@ def most_probable(
 
 
 def choose_parameters(
-    equations: Equations, start: Sequence[SignalParameters] = (), points: int = SETTINGS.points
+    equations: Equations,
+    start: Sequence[SignalParameters] = (),
+    points: int = SETTINGS.posterior_points,
 ) -> Posterior:
     """Posterior of the parameters: restricted likelihood, weakly held to what is stated.
 

@@ -13,10 +13,10 @@ class Settings:
     # With less control points neither the parameters nor a fault can be told; and two don't hold
     # the rotation of a mounting about the line between them
     smallest_targets: int = 3
-    neighbours: int = 5  # epochs, whose median holds edges and drops what stands alone
+    median_epochs: int = 5  # epochs, whose median holds edges and drops what stands alone
     lone_jump: float = 3.0  # ratio to it that no filter makes from one epoch to the next and back
     setup_sigmas: float = 3.0  # two neighbours that differ by less may share a wrong setup
-    resolution: float = 1e-6  # m, rad: less than any file's rounding, and no noise at all
+    resolution: float = 1e-6  # m, rad: less than any file's rounding, and no noise at all; guard
 
     # Tests
     significance: float = 0.001  # Baarda's (1968), but over all targets or steps together
@@ -45,7 +45,7 @@ class Settings:
     knot_tolerance: float = 0.5
     coarse_tolerance: float = 4.0  # the same, to see which ties hold: by half of it, in a quarter
     tie_sample: int = 100  # least ties that choose parameters: a scale to a tenth
-    dense_rows: int = 500  # with ties: for more of them knots are faster than their covariances
+    dense_rows: int = 500  # with ties: for more, knots are faster than covariances; guard
     sufficient_ratio: float = 1.1  # of a median sigma: a difference that no check point shows
     tie_points: int = 12  # as points below, each with a solution of all ties
     tie_freedom: float = 4.0  # degrees of freedom of Student's t (Lange et al. 1989)
@@ -64,18 +64,18 @@ class Settings:
 
     # The parameters' posterior, by Laplace and importance sampling
     block: int = 100  # observations; 25 correlation times at the start, so blocks part little
-    step: float = 0.01  # of a logarithm, for gradients
-    wide_step: float = 0.2  # for curvatures, which should tell of a sigma's width, not of a point
-    farthest: float = 4.0  # spreads from the start; there a likelihood is flat
-    points: int = 32  # over which a prediction is averaged: 64 give the same sigmas to 2 %
+    gradient_step: float = 0.01  # of a logarithm, for gradients
+    curvature_step: float = 0.2  # for curvatures, which show a sigma's width, not a point
+    farthest_spreads: float = 4.0  # spreads from the start; there a likelihood is flat
+    posterior_points: int = 32  # over which a prediction is averaged: 64 change sigmas by 2 %
     smallest_share: float = 0.02  # probability of a family that is given points
     heaviest: float = 5.0  # times the mean weight: one point in the tail can't stand for all
-    smallest_weight: float = 1e-3  # of parameters whose prediction is worth the work
+    least_parameter_weight: float = 1e-3  # of parameters whose prediction is worth the work
     prediction_epochs: int = 300  # for the parameters' spread, which changes as slowly as sigmas
-    smallest_sigma: float = 1e-12  # m, rad: for what the POS claims to know perfectly
+    smallest_sigma: float = 1e-12  # m, rad: for what the POS claims to know perfectly; guard
 
     # The mounting
-    iterations: int = 10  # of Gauss-Newton; a boresight wrong by degrees needs four
+    mounting_iterations: int = 10  # of Gauss-Newton; a boresight wrong by degrees needs four
     # One sigma of what is known without any measurement: a vehicle's size, and a drawing
     unmeasured: tuple[float, float] = (1.0, float(np.radians(5.0)))  # m, rad
     # Of a scanner's ranges (m) and encoder (ratio), without any measurement: ten times what data

@@ -90,7 +90,7 @@ def _converged(calibration, matched, ties) -> tuple[WeighedTies, np.ndarray]:
     step = 0.0
     correction = calibration.lsc.correction
     equations = calibration.equations
-    for _ in range(SETTINGS.iterations):
+    for _ in range(SETTINGS.mounting_iterations):
         correction = correction + step  # here, so that the last equations are about the last one
         mountings, about = linearized(equations, targets, recorded, correction)
         moved = georeferenced_ties(about, recorded, mountings, ties)

@@ -23,7 +23,7 @@ def use(now: Hypotheses, chain: Chain, row: int) -> Hypotheses:
     first = chain.pairs.first[row]
     k = chain.pairs.first[row + 1] - chain.pairs.first[row]
     count = 3 * chain.settings.joined_hypotheses
-    smallest = chain.settings.smallest_weight
+    smallest = chain.settings.least_log_weight
     weight = log_likelihoods(now, chain, row).reshape(-1)
     w = len(now.window)
     belief = np.empty(len(weight), np.int64)
@@ -42,7 +42,7 @@ def use(now: Hypotheses, chain: Chain, row: int) -> Hypotheses:
         after.weight[place] = weight[branch]
         after.used[place, w] = chain.pairs.control[pair] if pair >= 0 else -1
         if choice[place] < k:  # takes up the sound pairs only
-            for column in range(chain.settings.memory - 1):
+            for column in range(chain.settings.merging_matches - 1):
                 after.history[place, column] = after.history[place, column + 1]
             after.history[place, -1] = pair
     groups, total = merge(after.belief, after.history, after.used, after.weight)
@@ -98,7 +98,7 @@ def heaviest(now: Hypotheses, chain: Chain) -> Hypotheses:
     chain : Chain
     """
     count = chain.settings.joined_hypotheses
-    smallest = chain.settings.smallest_weight
+    smallest = chain.settings.least_log_weight
     rows = best_of_each(now.belief, now.weight, count, smallest)
     w = len(now.window)
     return select(now, rows, w, w)

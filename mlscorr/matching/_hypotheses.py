@@ -94,7 +94,7 @@ def start(chain: Chain) -> Hypotheses:
     ----------
     chain : Chain
     """
-    now = _empty(len(chain.rate), np.empty(0, np.int64), chain.settings.memory)
+    now = _empty(len(chain.rate), np.empty(0, np.int64), chain.settings.merging_matches)
     for belief in range(len(chain.rate)):
         now.belief[belief] = belief
         now.weight[belief] = 0.0
@@ -103,7 +103,7 @@ def start(chain: Chain) -> Hypotheses:
                 now.mean[belief, axis, i] = 0.0
                 for j in range(3):
                     now.covariance[belief, axis, i, j] = 1.0 if i == j else 0.0
-        for column in range(chain.settings.memory):
+        for column in range(chain.settings.merging_matches):
             now.history[belief, column] = -1
     return now
 
@@ -123,14 +123,14 @@ def predict(now: Hypotheses, chain: Chain, last: int, row: int) -> Hypotheses:
     time = chain.gps_time
     settings = chain.settings
     gap = abs(time[row] - time[last]) / settings.restart_time
-    stays = np.exp(-max(gap, np.exp(settings.smallest_weight)))
+    stays = np.exp(-max(gap, np.exp(settings.least_log_weight)))
     b = len(now.weight)
     m = len(chain.rate)
     parent = np.empty(b + min(b, settings.joined_hypotheses // 4) * m, np.int64)
     for hypothesis in range(len(parent)):
         parent[hypothesis] = hypothesis if hypothesis < b else (hypothesis - b) // m
     kept = len(now.window)
-    while kept > 0 and abs(time[now.window[-kept]] - time[row]) > settings.pause:
+    while kept > 0 and abs(time[now.window[-kept]] - time[row]) > settings.visit_gap:
         kept -= 1
     after = select(now, parent, kept, kept)
     matrix = transition(chain, last, row)
@@ -141,7 +141,7 @@ def predict(now: Hypotheses, chain: Chain, last: int, row: int) -> Hypotheses:
         else:
             after.belief[hypothesis] = (hypothesis - b) % m
             after.weight[hypothesis] += np.log((1.0 - stays) / m)
-            for column in range(settings.memory):
+            for column in range(settings.merging_matches):
                 after.history[hypothesis, column] = -2  # as of no other hypothesis
             _carry(matrix[m], after, hypothesis)
     return after

@@ -151,7 +151,7 @@ def join(
         for column in range(len(after.window)):
             both.used[pair, w + column] = after.used[j, column]
         weight = before.weight[i] + weights[i] + after.weight[j] + later_weights[j]
-        weight += 2.0 * chain.settings.smallest_weight * _clash(before, i, after, j, chain)
+        weight += 2.0 * chain.settings.least_log_weight * _clash(before, i, after, j, chain)
         for axis in range(3):
             for row in range(3):
                 vector[row] = vectors[i, axis, row] + later_vectors[j, axis, row]
@@ -242,6 +242,6 @@ def _clash(before, i, after, j, chain):
             if control >= 0 and control == after.used[j, place]:
                 apart = abs(chain.gps_time[row] - chain.gps_time[other])
                 same_pass = chain.pass_number[row] == chain.pass_number[other]
-                if same_pass and apart <= chain.settings.pause:
+                if same_pass and apart <= chain.settings.visit_gap:
                     return True
     return False

@@ -14,7 +14,7 @@ class Settings:
     """
 
     # Pairs
-    pause: float = 2.0  # s; without a point: the vehicle came by twice, and may see a target twice
+    visit_gap: float = 2.0  # s; without a point, after which a pass may see a target twice
     size_tolerance: float = 0.01  # m; between a size taken down and one observed
 
     # Beliefs
@@ -34,8 +34,8 @@ class Settings:
     restart_time: float = 200.0  # s; of those not in the path: outages of GNSS are minutes apart
 
     # Hypotheses
-    smallest_weight: float = -16.0  # log; against the best: 1e-7
-    memory: int = 4  # matches; hypotheses that agree in the last ones are merged
+    least_log_weight: float = -16.0  # log; against the best: 1e-7
+    merging_matches: int = 4  # matches; hypotheses that agree in the last ones are merged
     joined_hypotheses: int = 12  # hypotheses; of each belief, when past and future are joined
 
     # Decision

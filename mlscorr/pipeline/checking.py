@@ -187,7 +187,7 @@ def _placed_times(survey) -> tuple[int, list[str]]:
             continue
         placed.append(times)
         outside += outside_warnings(survey, file, times)
-    return survey.trajectory.count_passes(placed, MATCHING.pause), outside
+    return survey.trajectory.count_passes(placed, MATCHING.visit_gap), outside
 
 
 def _uncovered(survey, layouts) -> tuple[list[str], bool]:

@@ -61,7 +61,7 @@ def compare(
         warnings.warn(sentence, stacklevel=2)
     observed = Observed(survey, finding.candidates, features)
     load_open3d()  # takes seconds, which are not the method's
-    is_few = len(set(check.name)) < SETTINGS.check_points
+    is_few = len(set(check.name)) < SETTINGS.sufficient_check_points
     groups = _groups(control) if is_few else []
     done = (progress or silent)("Fitting", len(METHODS) * (1 + len(groups)))
     rows = []

@@ -173,7 +173,10 @@ def amounts_needed(
             "docs/results.md; none with --no-report",
         ),
         Amount(
-            "memory", SETTINGS.memory, "GB", "largest of 0.5 to 22 million points; docs/results.md"
+            "memory",
+            SETTINGS.base_memory,
+            "GB",
+            "largest of 0.5 to 22 million points; docs/results.md",
         ),
     )
 

@@ -53,7 +53,7 @@ class DiagnosedRounds:
         if label == "unknown":
             return f"Round {number}: no effect that was judged explains what is left."
         words = lowered(title(label))
-        if number < SETTINGS.rounds:
+        if number < SETTINGS.diagnosis_rounds:
             return f"Round {number}: {words} can't be put into the simulator once more."
         return f"After {number} rounds {words} is still found: the simulator has what was named."
 
@@ -123,7 +123,7 @@ def diagnose_until_none(
         As ``diagnose`` does.
     """
     rounds = [diagnose(survey, simulator, progress=progress, costs=costs)]
-    while len(rounds) < SETTINGS.rounds:
+    while len(rounds) < SETTINGS.diagnosis_rounds:
         last = rounds[-1]
         improved = rounds[-1].improved
         if improved is last.simulator:  # nothing is left, or nothing that a simulator can take

@@ -8,9 +8,9 @@ class Settings:
     """Limits and choices, each with its unit and reason."""
 
     seed: int = 0  # of random samples: the same survey gives the same result
-    rounds: int = 5  # of a diagnosis until none: a survey with more causes wants a look by hand
+    diagnosis_rounds: int = 5  # until none: a survey with more causes wants a look by hand
     orders: tuple[int, ...] = (2, 3, 4, 5)  # of polynomials that are compared: the paper's Table 1
-    check_points: int = 5  # points; with fewer, all points are cross-validated as well
+    sufficient_check_points: int = 5  # points; with fewer, all points are cross-validated as well
     single_points: int = 10  # points; up to here each is left out by itself, else in groups
     groups: int = 5  # groups; of control points spread in time, left out in turn
     scanned_radius: float = 2.0  # m about a target; more than the board, less than a street is wide
@@ -22,7 +22,7 @@ class Settings:
     looked_length: float = 15.0  # m, of the way to either side of one: beams may look 45 deg ahead
     listed_files: int = 5  # files; more are written as a pattern
     # Lines a second
-    rated_points: int = 200_000  # points, half a second of a fast scanner
+    rated_points: int = 200_000  # points, half a second of a fast scanner; guard
     turning_time: float = 0.5  # s of points: tens of lines of any scanner
     turning_points: int = 4000  # points of these: enough for the mean of a direction
     turning_rates: tuple[float, float] = (4.0, 600.0)  # 1/s, slower and faster than any scanner
@@ -37,7 +37,7 @@ class Settings:
     decodings: float = 5.0  # times decoding the points once: reading, ties, copying, drawing
     report_seconds: float = 20.0  # s; report.html and pictures
     report_megabytes: float = 6.0  # MB; of these
-    memory: float = 0.8  # GB; chunks and libraries, whatever the size of the files
+    base_memory: float = 0.8  # GB; chunks and libraries, whatever the size of the files
 
 
 SETTINGS = Settings()

@@ -367,7 +367,7 @@ def _put_clouds(text, path, clouds, trajectory):
         placed.append(times)
         spans.append((times.min(), times.max()))
         systems[str(match)] += 1
-    passes = trajectory.count_passes(placed, MATCHING.pause)
+    passes = trajectory.count_passes(placed, MATCHING.visit_gap)
     text.put("cloud", "files", names, f"files: {len(clouds)}, points: {points}, passes: {passes}")
     text.put("cloud", "gps_time", "auto", "; ".join(systems))
     start, end = np.array(sorted(spans)).T

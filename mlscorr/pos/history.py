@@ -227,7 +227,7 @@ def _returns(time, size, raised, restarts):
         # sigma of a filter grows until GNSS is back, that of a smoother until the middle
         peak = time[first + np.argmax(size[first:last])]
         is_tied = first > 0 and peak < (time[first] + 3 * time[last]) / 4
-        is_cut = (restarts > time[first]) & (restarts < time[last] + SETTINGS.fix_time)
+        is_cut = (restarts > time[first]) & (restarts < time[last] + SETTINGS.reacquisition_time)
         if is_tied and not is_cut.any():
             returns.append(time[last])
     return np.array(returns)
@@ -241,7 +241,7 @@ def _falls(time, size, changes, held, restarts):
     falls = (time[last - 1] + time[last])[is_fall] / 2
     # a sigma that falls while the path steps a little later or sooner tells of the same return
     away = np.abs(falls[:, None] - restarts).min(axis=1, initial=np.inf)
-    return falls[away > SETTINGS.fix_time]
+    return falls[away > SETTINGS.reacquisition_time]
 
 
 def _held(sigma):

@@ -20,7 +20,7 @@ class Settings:
     step_duration: float = 0.4  # s; over which filters and resampling spread a fall-back
     sigma_interval: float = 1.0  # s; of sigmas in SBET's companion smrmsg, beside a path of 200 Hz
     whole_step: float = 0.9  # of the largest size; a span that shows less cuts the step
-    fix_time: float = 10.0  # s; in which receivers fix ambiguities again, by their data sheets
+    reacquisition_time: float = 10.0  # s; in which receivers fix ambiguities anew (data sheets)
     # m, E, N, H: a fixed RTK solution, 1 cm and 1.5 cm + 1 ppm by receivers' data sheets, and as
     # much for what the inertial unit adds
     gnss_sigma: tuple[float, float, float] = (0.02, 0.02, 0.03)

@@ -26,7 +26,7 @@ class Settings:
     target_figure: tuple[float, float] = (1.85, 2.15)  # inch
 
     # what is taken of the cloud
-    sample_points: int = 1_000_000  # of each part; up to twice as many while they are gathered
+    sample_points: int = 1_000_000  # of each part; up to twice as many are gathered; guard
     plan_cell: float = 2.0  # m, of the grid that tells what is near a target, and of walls
     viewer_points: tuple[int, int] = (36_000, 24_000)  # even and near targets: 3 MB of a page
     close_ups: int = 24  # targets: 15 MB of a page
@@ -34,11 +34,11 @@ class Settings:
     close_up: tuple[int, int] = (440, 330)  # pixels, as the page shows it: so are its letters
 
     # how pictures are taken of it
-    canvas_bytes: float = 400e6  # B: as many views as fit are drawn at once, the others after them
-    picture_sizes: tuple[int, int] = (64, 8192)  # pixels, the least and largest width and height
+    canvas_bytes: float = 400e6  # B: as many views as fit are drawn at once; guard
+    picture_sizes: tuple[int, int] = (64, 8192)  # pixels, least and largest width and height; guard
     page_margins: tuple[float, float, float, float] = (0.012, 0.105, 0.11, 0.045)
     # of width or height: beside the panels, above and below them, between stacked ones
-    open3d_timeout: float = 60.0  # s for a pair of pictures; a software driver takes some 5 s
+    open3d_timeout: float = 60.0  # s for a pair of pictures; a software driver takes 5 s; guard
     largest_street: float = 250.0  # m; more is seen from above, where its streets don't overlap
     sideways_angle: float = 50.0  # deg, at most, to see all of a target's misclosure
     visible: float = 0.01  # m, a misclosure that is looked at from aside
@@ -46,7 +46,7 @@ class Settings:
     wall_height: float = 1.5  # m, of the least wall
     wall_flatness: float = 0.05  # m, the largest standard deviation of its points from a plane
     facades: int = 20  # of ties, where passes lie the farthest apart: some of them are well covered
-    plane_points: int = 15  # that tell how a wall or a target is turned
+    normal_points: int = 15  # that tell how a wall or a target is turned
 
 
 SETTINGS = Settings()

@@ -15,7 +15,7 @@ class Settings:
     black: float = 0.06  # reflectance of black target paint
     run_in: float = 6.0  # m from the ends to the first and last target: oblique beams reach them
     jitter: float = 0.25  # of the spacing, so that targets do not stand like a ruler's marks
-    largest_target: float = 1.2  # m: a board of 1.8 m still fits a lane, a ground floor, a pavement
+    largest_target: float = 1.2  # m: a board of 1.8 m fits a lane and a pavement; guard
     target_clearance: float = 0.1  # m at least between two targets
     eye_height: float = 2.2  # m above the way from where targets must be seen: a car's roof
     sight_distance: float = 3.5  # m before and after a target from where it must be seen too
@@ -50,12 +50,12 @@ class Settings:
     aligning_sigma: tuple = (0.02, 0.05, np.radians(0.3), np.radians(1.0))
 
     # Scanners
-    grazing: float = 0.01  # cosine of incidence below which nothing returns
+    no_return_cosine: float = 0.01  # cosine of incidence below which nothing returns
     fading: float = 10.0  # m where the strength has fallen to a half; the near field is flat
     pulse_length: float = 0.6  # m of range within which echoes merge: c / 2 times the usual 4 ns
     speckle: float = 0.08  # relative, one sigma: some 150 speckles a footprint, averaged
     weak: float = 0.01  # of full strength, where a scenario states the share of lost returns
-    block_rays: int = 1 << 17  # cast at a time: few enough that a block's arrays stay in cache
+    block_rays: int = 1 << 17  # cast at a time: a block's arrays stay in cache; guard
     hiding_depth: float = 0.03  # m before a target's plane from which a thing hides it
     hole_board: float = 2.0  # edge of the board about a hole, in its diameters
 

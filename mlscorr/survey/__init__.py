@@ -4,7 +4,15 @@ float64, SI units, radians inside; map axes E, N, H; body axes X right, Y forwar
 """
 
 from mlscorr.survey.beliefs import SEARCH_RADIUS, Assumption, Pos, Scanner
-from mlscorr.survey.clouds import NOISE_CLASSES, WEEK, CloudFile, Correcting, PointCloud, counted_on
+from mlscorr.survey.clouds import (
+    COORDINATE_ROUNDING,
+    NOISE_CLASSES,
+    WEEK,
+    CloudFile,
+    Correcting,
+    PointCloud,
+    counted_on,
+)
 from mlscorr.survey.columns import Columns
 from mlscorr.survey.data_frame import AXES, rows_frame
 from mlscorr.survey.recording import (

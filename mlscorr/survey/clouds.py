@@ -9,6 +9,7 @@ import numpy as np
 from mlscorr.survey.columns import Columns
 
 WEEK = 604_800.0  # s
+COORDINATE_ROUNDING = 0.0003  # m; one sigma of a coordinate at the usual LAS scale of 1 mm
 NOISE_CLASSES = (7, 18)  # low point (noise) and high noise: ASPRS LAS 1.4 R15, point classes
 
 

@@ -116,9 +116,9 @@ def fit_outline(
         weight, effective = _weights(value)
         mean, covariance = _moments(trials, weight, period)
         spread = 4 * np.sqrt(np.diag(covariance))
-        if width <= blur and effective > 3 * SETTINGS.smallest_share * count:
+        if width <= blur and effective > 3 * SETTINGS.least_effective_share * count:
             break
-        if effective > SETTINGS.smallest_share * count:
+        if effective > SETTINGS.least_effective_share * count:
             width /= 2
         drawn = SETTINGS.proposal_width**2 * covariance[np.ix_(free, free)]
         trials, spent = _next_trials(mean, drawn, free, number, count)
@@ -181,7 +181,7 @@ def _weights(value):
         weight = np.exp(power * (value - value.max()))
         weight /= weight.sum()
         effective = 1 / (weight @ weight)
-        if effective >= SETTINGS.smallest_share * len(value) or power < 1e-6:
+        if effective >= SETTINGS.least_effective_share * len(value) or power < 1e-6:
             return weight, effective if power == 1.0 else 0.0
         power *= 0.7
 

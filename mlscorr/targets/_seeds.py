@@ -138,7 +138,7 @@ def flat_patches(
     """
     left = _thinned(echoes.xyz, size / 12, rng)
     smallest = SETTINGS.smallest_count / 2
-    for _ in range(SETTINGS.patches):
+    for _ in range(SETTINGS.plane_patches):
         if len(left) < smallest:
             return
         triples = _near_triples(echoes.xyz[left], size, rng)
@@ -154,7 +154,9 @@ def flat_patches(
 def _steep(echoes, plane):
     """Which beams can be said to cross a plane."""
     sight = echoes.sight(slice(None))
-    return np.abs(sight @ plane.axes[2]) > SETTINGS.grazing * np.linalg.norm(sight, axis=1)
+    return np.abs(sight @ plane.axes[2]) > SETTINGS.least_crossing_sine * np.linalg.norm(
+        sight, axis=1
+    )
 
 
 def _near_triples(xyz, size, rng):
@@ -251,7 +253,7 @@ def _gaps(echoes, plane, points, size):
             centres.append(centre[i])
             near = np.linalg.norm(centre - centre[i], axis=1) < 2 * radius[i]
             yield centre[i], float(radius[i]), float(np.median(radius[near]))
-        if len(centres) >= SETTINGS.patches:
+        if len(centres) >= SETTINGS.plane_patches:
             return
 
 

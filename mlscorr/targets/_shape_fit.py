@@ -110,7 +110,7 @@ def exact_fit(echoes: Echoes, fit: ShapeFit, scanner: Scanner) -> ShapeFit | Non
     if 2 * fit.on_target.sum() < SETTINGS.smallest_count:
         return None
     fit = _refined(echoes, fit)
-    if not fit.on_target.any() or _sight(echoes, fit)[1] < SETTINGS.grazing:
+    if not fit.on_target.any() or _sight(echoes, fit)[1] < SETTINGS.least_crossing_sine:
         return None  # or a line of points alone, whose plane may hold the beams
     seed = fit.seed
     kind = fit.kind
@@ -225,7 +225,7 @@ def _blur(echoes, fit, scanner):
     slant = np.sqrt((1 + 1 / cosine**2) / 2)  # both ways in the plane, on average
     beam = distance * SETTINGS.divergence / 4 * slant
     intensity = echoes.intensity[rows[on_target & (state == BRIGHT)]].astype(float)
-    speckle = SETTINGS.speckle
+    speckle = SETTINGS.intensity_spread
     if len(intensity) > 5 and not fit.seed.by_edges:
         spread = 0.74 * np.subtract(*np.percentile(intensity, [75, 25]))
         speckle = float(np.clip(spread / max(np.median(intensity), 1e-9), speckle / 4, 0.5))

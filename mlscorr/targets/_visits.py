@@ -45,7 +45,7 @@ def split_visits(cloud: PointCloud, survey: Survey) -> list[tuple[int, PointClou
 def _visits(cloud, survey):
     """The points in order of time of each visit, of those of a segment of the trajectory."""
     time = cloud.gps_time
-    ends = np.unique([0, *(np.flatnonzero(np.diff(time) > MATCHING.pause) + 1), len(time)])
+    ends = np.unique([0, *(np.flatnonzero(np.diff(time) > MATCHING.visit_gap) + 1), len(time)])
     turns = [first + _turns(time[first:last], survey) for first, last in pairwise(ends)]
     ends = np.unique(np.concatenate([ends, *turns]))
     return [cloud[first:last] for first, last in pairwise(ends)]

@@ -181,7 +181,7 @@ def collect(
             count(placed)
             if len(held) > limit:
                 latest = chunk.gps_time.max()
-                hand_on(number, held, latest - MATCHING.pause, latest)
+                hand_on(number, held, latest - MATCHING.visit_gap, latest)
                 limit = max(IO.chunk_points, 2 * len(held))
             progress(len(chunk))
             del chunk, segment, rows, has_pose, placed  # large, and needed no more

@@ -83,7 +83,7 @@ class FittedTarget(Centre):
         other : FittedTarget
         """
         near = np.linalg.norm(self.position - other.position) < max(self.size, other.size) / 2
-        return bool(near and abs(self.gps_time - other.gps_time) < MATCHING.pause)
+        return bool(near and abs(self.gps_time - other.gps_time) < MATCHING.visit_gap)
 
 
 def fit_targets(
@@ -203,7 +203,7 @@ def distinct(targets: Iterable[FittedTarget]) -> list[FittedTarget]:
     """
     kept: dict[int, list[FittedTarget]] = {}  # by the pause in time, as only these overlap
     for target in sorted(targets, key=lambda target: -target.score * np.sqrt(target.points)):
-        slot = int(target.gps_time / MATCHING.pause)
+        slot = int(target.gps_time / MATCHING.visit_gap)
         near = chain(*(kept.get(number, []) for number in (slot - 1, slot, slot + 1)))
         if not any(target.overlaps(other) for other in near):
             kept.setdefault(slot, []).append(target)

@@ -83,7 +83,7 @@ def fit_piece(
 def _end_of(chunk):
     """The end of a chunk, at most a quarter of it: a scanner passes a target within a second."""
     first = int((1.0 - SETTINGS.largest_carry) * len(chunk))
-    return chunk[first:][chunk.gps_time[first:] > chunk.gps_time.max() - MATCHING.pause / 2]
+    return chunk[first:][chunk.gps_time[first:] > chunk.gps_time.max() - MATCHING.visit_gap / 2]
 
 
 def pieces(

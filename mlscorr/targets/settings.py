@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from mlscorr.survey import COORDINATE_ROUNDING
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -13,12 +15,12 @@ class Settings:
 
     # Candidates and visits
     near_radius: float = 2.0  # m; within which a post holds a target, and plates are sought first
-    piece_points: int = 20_000  # points; bounds the time for one piece
+    piece_points: int = 20_000  # points; bounds the time for one piece; guard
     turn_step: float = 0.5  # m; a vehicle that moved less may stand and shake, not turn back
 
     # Clusters and seeds
     smallest_count: int = 20  # points; on fewer, plane and outline can't both be held
-    smallest_levels: int = 4  # intensities; fewer are a flag or a class, not an intensity
+    smallest_levels: int = 4  # intensities; fewer are a flag or a class, not an intensity; guard
     link_shares: tuple[float, float] = (0.2, 0.4)  # size; beside a bright post, and wide scan lines
     thickness: float = 0.03  # m; off a plane: less than a post's or a frame's depth
     plane_trials: int = 100  # triples; find a plane of a third of the points with 0.98
@@ -26,21 +28,21 @@ class Settings:
     smallest_length: float = 0.7  # size; along what is visible of a target
     smallest_width: float = 0.33  # size; across it: a target may be hidden by a post
     bloom: float = 1.35  # size; of a disc that saturates the receiver
-    patches: int = 10  # patches; road, walls, and then plates; and gaps in a patch
-    grazing: float = 0.1  # sine; of a beam to a plane that it can be said to cross
+    plane_patches: int = 10  # patches; road, walls, and then plates; and gaps in a patch
+    least_crossing_sine: float = 0.1  # sine; of a beam to a plane that it can be said to cross
 
     # Outlines
     trials: int = 600  # outlines; in each round, half of them in a rough fit
     rough_rounds: int = 5  # rounds; tell if there is an outline; the exact one needs five times
-    smallest_share: float = 0.1  # trials; effective share, below which the likelihood is flattened
+    least_effective_share: float = 0.1  # trials; below it the likelihood is flattened
     proposal_width: float = 1.35  # sigma; of the posterior: the next trials
     hidden_share: float = 0.45  # size; from the seed to the centre: half of it may be hidden
     first_blur: float = 8.0  # size over blur; wide at first, so that no outline is lost
     rough_blur: float = 0.025  # size; of a rough fit
     wrong_side: float = 0.01  # beams; on the wrong side whatever their distance (mixed returns)
     divergence: float = 0.35e-3  # rad; four sigmas of a beam's width (RIEGL VQ-250 data sheet)
-    rounding: float = 0.0003  # m; one sigma of a coordinate at the usual LAS scale of 1 mm
-    speckle: float = 0.2  # intensity; relative spread where it is unknown
+    rounding: float = COORDINATE_ROUNDING  # m
+    intensity_spread: float = 0.2  # intensity; relative spread where it is unknown
     same_surface: float = 0.7  # dark over bright; from which on they may be one
     outside_middle: float = 0.65  # diameter; off a seed's middle, itself off by a seventh of it
     contradiction: float = 0.05  # beams; share of those that met nothing, well inside the outline
@@ -59,9 +61,9 @@ class Settings:
     rough_play: float = 0.1  # overlap or size; by which a rough fit may miss the limits
 
     # Search without control
-    largest_size: float = 1.5  # m; nobody carries a larger target
-    largest_carry: float = 0.25  # chunk; points that are looked at again with the next
-    largest_fits: int = 150  # regions; bounds time and memory of a chunk when all glitters
+    largest_size: float = 1.5  # m; nobody carries a larger target; guard
+    largest_carry: float = 0.25  # chunk; points that are looked at again with the next; guard
+    largest_fits: int = 150  # regions; bounds time and memory of a chunk when all glitters; guard
     rim: tuple[float, float] = (1.15, 1.6)  # half diagonal; where it ends, and is looked at
     smallest_likeness: float = 0.75  # Jaccard index; a ring has a dark quarter
     largest_ratio: float = 1.6  # width; length of a target of which a part is hidden

@@ -42,7 +42,7 @@ def join_across_faces(
     spread[:, :2] = np.where(is_pole, spread[:, :2].max(axis=1, keepdims=True), spread[:, :2])
     is_thin = (spread <= SETTINGS.roughest) | (is_pole & [True, True, False])
     # 99 % of a plane's noise lies within 2.5 sigmas
-    is_cut = is_thin & (points >= SETTINGS.points)[:, None]
+    is_cut = is_thin & (points >= SETTINGS.feature_points)[:, None]
     is_cut &= SETTINGS.cell / 2 - np.abs(mean) < 2.5 * spread
     rank = np.argsort(np.argsort(points, kind="stable"))
     joined = moments.copy()

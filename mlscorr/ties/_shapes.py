@@ -89,7 +89,7 @@ def find_shapes(
         See mlscorr.ties._cells.
     """
     moments, way = join_across_faces(middle, begin, group, moments)
-    full = np.flatnonzero(moments[:, 0] >= SETTINGS.points)
+    full = np.flatnonzero(moments[:, 0] >= SETTINGS.feature_points)
     covariance, noise = covariances(moments[full])
     # lambda_0 is not below det / (sum of the principal minors): spares what is no plane its axes
     minors = (np.trace(covariance, axis1=1, axis2=2) ** 2 - (covariance**2).sum(axis=(1, 2))) / 2
@@ -149,7 +149,7 @@ def _planes(moments, values, axes, noise, sight):
     variance, of_mean = _scatter(values[:, 0], moments, _along(normal, noise))
     slant = np.einsum("ni,ni->n", normal, sight)
     is_plane = (variance <= SETTINGS.roughest**2) & (values[:, 1] >= SETTINGS.narrowest**2)
-    is_plane &= np.abs(slant) >= SETTINGS.grazing
+    is_plane &= np.abs(slant) >= SETTINGS.least_plane_sine
     direction = normal * -np.sign(slant)[:, None]
     shift = np.zeros_like(normal)
     narrow = values[:, 1]
@@ -192,7 +192,7 @@ def _poles(moments, values, axes, noise, sight, way):
     points = moments[:, 0]
     axis = axes[:, :, 2] * np.where(axes[:, 2, 2:] < 0, -1.0, 1.0)
     across = np.cross(axis, sight)
-    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), SETTINGS.grazing)
+    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), SETTINGS.least_plane_sine)
     beam = np.cross(across, axis)
     matrix = np.einsum("nik,nk,njk->nij", axes, values, axes)
     side = _along(across, matrix)

@@ -49,7 +49,9 @@ def consistent_ties(ties: Ties, correction: np.ndarray) -> np.ndarray:
     left = residuals(ties, correction)[order]
     variance = ties.variance[order]
     # a direction and its opposite are the same, with the other sign; pass pairs are apart in time
-    points = np.column_stack([ties.gps_time / SETTINGS.window, 2 * ties.direction])[order]
+    points = np.column_stack([ties.gps_time / SETTINGS.agreement_interval, 2 * ties.direction])[
+        order
+    ]
     opposite = points * np.repeat([1.0, -1.0], [2, 3])
     values = np.append(np.append(left, -left), np.nan)
     count = min(SETTINGS.neighbours + 1, 2 * len(ties))

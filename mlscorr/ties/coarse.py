@@ -66,7 +66,7 @@ def coarse_correction(features: TieFeatures, radius: float) -> np.ndarray:
         for part in np.unique(stretch):
             inside = rows[(stretch == part) & is_plane[rows]]
             votes = _votes(features, inside, before, tree, radius)
-            if len(votes.misfit) >= SETTINGS.points:
+            if len(votes.misfit) >= SETTINGS.feature_points:
                 times.append((part + 0.5) * SETTINGS.pause)
                 motions.append(_motion(votes, radius))
                 middles.append(features.centre[inside].mean(axis=0))

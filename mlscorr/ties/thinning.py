@@ -73,7 +73,7 @@ def thin(
     bins = len(TIE_KINDS) * direction_class(features.direction) + kind_number(features)
     chances = [
         integer_hash(np.floor((features.centre - origin) / edge).astype(np.int64))
-        for edge in (SETTINGS.block, SETTINGS.cell)
+        for edge in (SETTINGS.thinning_block, SETTINGS.cell)
     ]
     group = np.column_stack([features.pass_number, moment, bins])
     return _least(group, [features.gps_time, *chances[::-1]], SETTINGS.features)
@@ -89,7 +89,7 @@ def some_blocks(features: TieFeatures, number: int) -> TieFeatures:
     """
     if len(features) <= number:
         return features
-    chance = integer_hash(np.floor(features.centre / SETTINGS.block).astype(np.int64))
+    chance = integer_hash(np.floor(features.centre / SETTINGS.thinning_block).astype(np.int64))
     return features[chance <= np.partition(chance, number)[number]]
 
 

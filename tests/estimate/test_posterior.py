@@ -62,7 +62,7 @@ def test_the_gradient_is_the_slope(objective, family):
     "Forward differences agree with central ones of half the step to a hundredth of their size"
     at = drawn(objective)
     _, gradient = objective.gradient(family, at)
-    h = SETTINGS.step / 2
+    h = SETTINGS.gradient_step / 2
     central = [
         (objective(family, at + h * e) - objective(family, at - h * e)) / (2 * h)
         for e in np.eye(len(at))
@@ -252,7 +252,7 @@ def test_a_search_turns_back_from_scales_that_rounding_spoils():
     ties = TieEquations.of(control.trajectory, control.pos, survey.ties, control.stated)
     ties = replace(ties, variance=1e-7 * ties.variance).select(np.repeat(np.arange(40), 2))
     objective = Objective.of(replace(control, ties=ties))
-    farthest = objective.initial + SETTINGS.farthest * objective.spread
+    farthest = objective.initial + SETTINGS.farthest_spreads * objective.spread
     with pytest.raises(np.linalg.LinAlgError, match=r"not positive definite|Rounding leaves"):
         objective.blocks[0].weigh(objective.parameters("matern32", farthest))
     assert objective("matern32", farthest) == IMPROBABLE

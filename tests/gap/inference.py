@@ -52,7 +52,11 @@ def dense(g, model):
     legs += scale**2 * turned * (bg.attitude @ bg.attitude.T)
     first = np.arange(len(bg.row)) < rows.metric.sum()
     place = np.where(first[:, None], rows.partials[bg.row, :3], rows.partials_2[bg.row, :3])
-    legs += model.fixes**2 * Covariance("exponential", SETTINGS.fix_time)(lag) * (place @ place.T)
+    legs += (
+        model.fixes**2
+        * Covariance("exponential", SETTINGS.fix_correlation_time)(lag)
+        * (place @ place.T)
+    )
     sums = np.zeros((m, len(bg.row)))
     sums[bg.row, np.arange(len(bg.row))] = 1.0
     design = rows.survey_design().toarray()

@@ -36,8 +36,8 @@ def test_a_pair_updates_the_state_as_a_dense_normal_does():
 def test_the_best_of_each_belief_are_kept_while_they_count():
     "Two of each belief at most, and none that is a ten-millionth of the best"
     belief = np.array([0, 0, 0, 1, 1])
-    weight = np.array([-1.0, -3.0, -2.0, 0.0, 2 * SETTINGS.smallest_weight])
-    assert sorted(best_of_each(belief, weight, 2, SETTINGS.smallest_weight)) == [0, 2, 3]
+    weight = np.array([-1.0, -3.0, -2.0, 0.0, 2 * SETTINGS.least_log_weight])
+    assert sorted(best_of_each(belief, weight, 2, SETTINGS.least_log_weight)) == [0, 2, 3]
 
 
 def test_the_heaviest_comes_first():

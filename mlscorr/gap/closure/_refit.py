@@ -73,7 +73,7 @@ def _fitted(cloud, shape, survey, expected, bright, rng):
     """
     kind, size = shape
     apart = np.linalg.norm(cloud.xyz - expected, axis=1)
-    if (apart <= SETTINGS.same * size).sum() < TARGETS.smallest_count:
+    if (apart <= SETTINGS.largest_offset * size).sum() < TARGETS.smallest_count:
         return None
     path = ScannerPath.of(survey, cloud.gps_time)
     beside = cloud.intensity[apart > SETTINGS.background * size]
@@ -87,6 +87,6 @@ def _fitted(cloud, shape, survey, expected, bright, rng):
     for spot in spots:
         targets = fit_targets(cloud, path, [shape], survey.scanner, rng, spot)
         away = [np.linalg.norm(target.position - expected) for target in targets]
-        if away and min(away) <= SETTINGS.same * size:
+        if away and min(away) <= SETTINGS.largest_offset * size:
             return targets[int(np.argmin(away))]
     return None

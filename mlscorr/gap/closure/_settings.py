@@ -11,9 +11,9 @@ class Settings:
     """
 
     around: float = 1.25  # sizes about a target's centre: a board's corner is 1.06 away
-    margin: float = 0.3  # m more: by so much a target may move in a simulation
+    search_margin: float = 0.3  # m more: by so much a target may move in a simulation
     edge: float = 1.05  # times a target's size: within that, what was recorded may be its edge
-    target_pulses: int = 40_000  # about a target, those nearest in time: the vehicle may stand
+    target_pulses: int = 40_000  # about a target, the nearest in time: vehicles stand; guard
     delivered: float = 0.7  # of all pauses, that are of one pulse: fewer tell of a thinned cloud
     line_pulses: int = 100  # that show how others follow them
     level: float = 0.01  # rad: elevations of one scan plane
@@ -21,7 +21,7 @@ class Settings:
     least_worst: float = 0.003  # m: as well as any simulated target is known
     extent: float = 0.6  # of a target's longest extent, from its expected centre to its last point
     background: float = 0.75  # of its size from its centre: off disc and plate
-    same: float = 0.5  # of its size, from where it is expected to where it is found
+    largest_offset: float = 0.5  # of its size, from where it is expected to where it is found
     block_length: float = 5.0  # s of a block of time: the drift of seconds is held out with it
     event_share: float = 0.25  # of an event's width that a block lasts: some is left to learn from
     # of a cause's squared shift: one such block leaves nothing to judge by

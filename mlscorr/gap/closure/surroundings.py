@@ -44,7 +44,7 @@ class Surroundings:
             return
         if (np.diff(inside.gps_time) < 0).any():
             inside = inside[np.argsort(inside.gps_time, kind="stable")]
-        extent = SETTINGS.around * self._targets.size + SETTINGS.margin + 2 * self._radius
+        extent = SETTINGS.around * self._targets.size + SETTINGS.search_margin + 2 * self._radius
         near = self._passing(inside, self._targets.position, extent)
         self._open.append((inside[near], inside.gps_time[[0, -1]]))
 
@@ -141,7 +141,7 @@ def _scanned(target):
 
 def _extent(target, apart):
     """How far from a target, observed apart from where it was surveyed, beams matter. m."""
-    return SETTINGS.around * target.size + SETTINGS.margin + apart
+    return SETTINGS.around * target.size + SETTINGS.search_margin + apart
 
 
 @njit(cache=True)

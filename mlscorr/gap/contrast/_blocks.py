@@ -16,7 +16,7 @@ def block_of(place: np.ndarray) -> np.ndarray:
     place : (n, 3) array
         Units: m.
     """
-    corner = np.floor(place[:, :2] / SETTINGS.block)
+    corner = np.floor(place[:, :2] / SETTINGS.bootstrap_block)
     return np.unique(corner, axis=0, return_inverse=True)[1].reshape(len(place))
 
 
@@ -79,7 +79,9 @@ def weights_of(blocks: int, rng: np.random.Generator) -> np.ndarray:
     blocks : int
     rng : numpy.random.Generator
     """
-    return rng.multinomial(blocks, np.full(blocks, 1 / blocks), SETTINGS.replicas).astype(float)
+    return rng.multinomial(blocks, np.full(blocks, 1 / blocks), SETTINGS.bootstrap_replicas).astype(
+        float
+    )
 
 
 def with_sigma(
@@ -104,7 +106,7 @@ def with_sigma(
         blocks = effective(sums[..., -1])
         value = figure(sums.sum(axis=0))
         drawn = figure(np.tensordot(weights, sums, axes=1))
-        good = np.isfinite(drawn).mean(axis=0) > SETTINGS.confidence
+        good = np.isfinite(drawn).mean(axis=0) > SETTINGS.difference_confidence
         known = (blocks >= SETTINGS.least_blocks) & good & np.isfinite(value)
         drawn = np.where(np.isfinite(drawn), drawn, value)
         sigma = drawn.std(axis=0) * np.sqrt(blocks / np.maximum(blocks - 1, 1.0))
@@ -120,4 +122,6 @@ def limit(blocks: np.ndarray, tests: int) -> np.ndarray:
         On which each sigma rests.
     tests : int
     """
-    return t.isf(0.5 * (1 - SETTINGS.confidence) / max(tests, 1), np.maximum(blocks - 1, 1.0))
+    return t.isf(
+        0.5 * (1 - SETTINGS.difference_confidence) / max(tests, 1), np.maximum(blocks - 1, 1.0)
+    )

@@ -104,7 +104,9 @@ class CellCollector:
         Cells, and points, at most.
     """
 
-    def __init__(self, survey: Survey, limit: int = SETTINGS.kept, points: int = SETTINGS.points):
+    def __init__(
+        self, survey: Survey, limit: int = SETTINGS.kept, points: int = SETTINGS.distance_points
+    ):
         self._survey = survey
         self._limit = limit
         self._most_points = points

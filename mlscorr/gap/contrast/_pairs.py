@@ -81,6 +81,6 @@ def _incidence(sight, scatter, points):
     values, axes = np.linalg.eigh(scatter / points[:, None, None])
     cosine = np.abs(np.einsum("ci,ci->c", sight, axes[:, :, 0]))
     cosine /= np.maximum(np.linalg.norm(sight, axis=1), 1e-9)
-    is_flat = (values[:, 0] <= OBSERVE.roughest**2) & (values[:, 1] >= OBSERVE.narrowest**2)
+    is_flat = (values[:, 0] <= OBSERVE.roughest**2) & (values[:, 1] >= OBSERVE.narrowest_patch**2)
     is_flat &= points >= 2 * OBSERVE.plane_points
     return np.where(is_flat, np.degrees(np.arccos(np.clip(cosine, 0.0, 1.0))), np.nan)

@@ -11,8 +11,8 @@ class Settings:
     """
 
     # what is kept
-    kept: int = 40_000  # cells, and edges, in memory: 10 MB, and a ratio of a bin to a percent
-    points: int = 20_000  # of whole cells, for distances between clouds
+    kept: int = 40_000  # cells, and edges: 10 MB, and a ratio of a bin to a percent; guard
+    distance_points: int = 20_000  # of whole cells, for distances between clouds; guard
     # depth edges along a scan line
     jump: float = 0.3  # m between the surfaces before and after: more than a curb
     plateau: int = 3  # pulses on each of them
@@ -41,10 +41,10 @@ class Settings:
         500,
     )
     incidences: tuple[float, ...] = (0, 15, 30, 45, 60, 75, 90)  # deg
-    block: float = 16.0  # m of ground that go together: a house or a lane has one reflectance
+    bootstrap_block: float = 16.0  # m of ground: a house or a lane has one reflectance
     least_blocks: int = 6  # in a bin, for a sigma known to a third; bins with fewer are joined
-    replicas: int = 400  # of the bootstrap: a sigma to 4 %
-    confidence: float = 0.99  # that nothing is said of two clouds that differ by chance alone
+    bootstrap_replicas: int = 400  # of the bootstrap: a sigma to 4 %
+    difference_confidence: float = 0.99  # that two clouds differ by more than chance
     # distances between distributions
     drawn: int = 300  # of each sample at a time, as all pairs of them are looked at: 0.7 MB
     halves: int = 30  # times that this is done: their mean to a fifth of the scatter of each

@@ -203,7 +203,7 @@ def _of_samples(channel, samples, rng, figures=None):
     smallest = min(len(sample.values) for sample in samples)
     half = smallest // 2 - smallest // 8  # halves are not quite alike
     number = {
-        name: min(half, SETTINGS.points if name == "chamfer" else SETTINGS.drawn)
+        name: min(half, SETTINGS.distance_points if name == "chamfer" else SETTINGS.drawn)
         for name in figures
     }
 

@@ -204,6 +204,6 @@ class Contrast:
             "whole": None if self.whole is None else self.whole.document(is_ratio),
             "tables": [table.document(is_ratio) for table in self.tables],
             "sentences": list(self.sentences),
-            "confidence": SETTINGS.confidence,
-            "replicas": SETTINGS.replicas,
+            "confidence": SETTINGS.difference_confidence,
+            "replicas": SETTINGS.bootstrap_replicas,
         }

@@ -130,7 +130,7 @@ class _Search:
             event, gain, table, sigma = self._by_steps(event)
         else:
             event, gain, table, sigma = self._between_rows(event, spacing)
-        return RefinedEvent(event, table, gain + np.log(share / SETTINGS.cell), sigma)
+        return RefinedEvent(event, table, gain + np.log(share / SETTINGS.event_cell), sigma)
 
     def _between_rows(self, event, spacing):
         """An event without a width: between two rows its evidence is the same at all times, and

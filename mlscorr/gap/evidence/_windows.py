@@ -165,7 +165,7 @@ class _Search:
     def best(self):
         """Windows refined one after the other, and the log evidence of all."""
         factors = SETTINGS.window_factors
-        prior = -np.log(SETTINGS.cell * len(self.bank) * len(factors) * len(SHAPES))
+        prior = -np.log(SETTINGS.event_cell * len(self.bank) * len(factors) * len(SHAPES))
         base, windows = self._first(SHAPES)
         first = windows
         evidence = self.score(base, windows) + prior

@@ -223,7 +223,12 @@ def _factor(errors, model, extra=0.0):
         for scale, mixing, covariance, clock in (
             (model.scale, position, Covariance(model.family, model.time * tau), errors.clock),
             (turn_scale, errors.attitude, Covariance(turn_family, turn_time * tau), None),
-            (model.fixes, errors.place, Covariance("exponential", SETTINGS.fix_time), None),
+            (
+                model.fixes,
+                errors.place,
+                Covariance("exponential", SETTINGS.fix_correlation_time),
+                None,
+            ),
             (1.0, growth * errors.position, Covariance("matern32", SETTINGS.window_time), None),
         )
         if scale > 0 and mixing.any()

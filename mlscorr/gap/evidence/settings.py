@@ -40,7 +40,7 @@ class Settings:
     # to five times what it states then (real units, pos_study.py)
     window_time: float = 100.0
     # s; without GNSS a velocity stays wrong for longer than most outages last
-    fix_time: float = 0.9
+    fix_correlation_time: float = 0.9
     # s; noise of GNSS fixes, one a second, has lost 1 / e of its correlation then
     free_sigma: float = 0.3
     # m; prior of what is accepted or absorbed: as good as free beside centimetres
@@ -76,7 +76,7 @@ class Settings:
     # the same, given one cause
     refinement: float = 3.0
     # log evidence from which on an event or a window is refined
-    cell: float = 3.0
+    event_cell: float = 3.0
     # refined, an event fills a third of its cell of the bank
     event_steps: tuple[float, float] = (0.5, 0.125)
     # widths of an event, and half of its log width: a search by halves from one to the other

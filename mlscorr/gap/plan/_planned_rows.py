@@ -51,8 +51,9 @@ def planned_rows(survey: Survey) -> Rows:
         )
     if not parts:
         raise ValueError(
-            f"None of {len(targets)} targets will come within {SETTINGS.farthest:.0f} m before the "
-            f"scanner on this trajectory, and {'the' if survey.reference else 'no'} [scene] "
+            f"None of {len(targets)} targets will come within "
+            f"{SETTINGS.farthest_target:.0f} m before the scanner on this "
+            f"trajectory, and {'the' if survey.reference else 'no'} [scene] "
             f"reference {'is out of its sight' if survey.reference else 'is given'}. Are "
             "control and trajectory in the same CRS?"
         )
@@ -104,7 +105,7 @@ def _facets(survey, rng):
     slant = np.einsum("ni,ni->n", normal, sight) / away
     start = place + sight / away[:, None] * OBSERVE.roughest
     visible = sees(mesh.caster, start - origin, start + sight * 0.99 - origin)
-    visible &= np.abs(slant) >= TARGETS.grazing
+    visible &= np.abs(slant) >= TARGETS.least_crossing_sine
     rows = np.flatnonzero(visible)[: SETTINGS.facets]
     n = len(rows)
     item = np.arange(len(rows))
@@ -145,7 +146,7 @@ def _sweeps(survey, place):
         local = place - origin
         out = local @ axis.T - np.einsum("ei,ei->e", axis, scanner)
         square = (local**2).sum(1)[:, None] - 2 * local @ scanner.T + (scanner**2).sum(1)
-        crossed = (out[:, :-1] * out[:, 1:] <= 0) & (square[:, :-1] <= SETTINGS.farthest**2)
+        crossed = (out[:, :-1] * out[:, 1:] <= 0) & (square[:, :-1] <= SETTINGS.farthest_target**2)
         nearest = np.argmin(np.where(crossed, square[:, :-1], np.inf), axis=1)
         k = np.flatnonzero(crossed[np.arange(len(place)), nearest])
         i = nearest[k]

@@ -55,7 +55,7 @@ def additions(rows: Rows, survey: Survey) -> dict[str, tuple[Rows, Survey]]:
         items = np.unique(rows.item[targets])
         count = min(SETTINGS.stop_targets, len(items))
         near = items[np.linspace(0, len(items) - 1, count).astype(int)]
-        stop = f"a stop of {SETTINGS.pause:.0f} s beside {len(near)} targets"
+        stop = f"a stop of {SETTINGS.pass_interval:.0f} s beside {len(near)} targets"
         far_targets = _more_targets(rows, survey, items, SETTINGS.factor)
         made |= {
             "as many targets again, between the others": _more_targets(rows, survey, items),
@@ -120,7 +120,7 @@ def _another_pass(rows, survey, backwards=False, faster=1.0):
 
     def anew(time):
         elapsed = (last - time) if backwards else (time - first)
-        return last + SETTINGS.pause + elapsed / faster
+        return last + SETTINGS.pass_interval + elapsed / faster
 
     turn = Rotation.from_euler("z", np.pi if backwards else 0.0)
     order = slice(None, None, -1 if backwards else 1)
@@ -168,8 +168,8 @@ def _stop(rows, survey, items):
         np.median(trajectory.gps_time[trajectory.segment(trajectory.gps_time) == 0])
     )
     step = np.median(np.diff(trajectory.gps_time))
-    start = trajectory.gps_time[-1] + SETTINGS.pause
-    time = start + np.arange(0.0, SETTINGS.pause, step)
+    start = trajectory.gps_time[-1] + SETTINGS.pass_interval
+    time = start + np.arange(0.0, SETTINGS.pass_interval, step)
     n = len(time)
     nearest = np.full(n, np.argmin(np.abs(trajectory.gps_time - middle.gps_time[0])))
     longer = _followed(trajectory, nearest, time)

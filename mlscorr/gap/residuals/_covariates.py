@@ -120,7 +120,7 @@ def poses_about(
 
 def _motion(trajectory, gps_time):
     """Speed (m/s), rate of heading to the right (rad/s) and heading (rad) at times (m,)."""
-    before, after = poses_about(trajectory, gps_time, SETTINGS.step)
+    before, after = poses_about(trajectory, gps_time, SETTINGS.motion_step)
     duration = after.gps_time - before.gps_time
     way = np.linalg.norm(after.position - before.position, axis=1)
     turn = (after.attitude * before.attitude.inv()).as_rotvec()[:, 2]

@@ -98,7 +98,7 @@ def _pairs(patches):
     early, late = pairs.T
     cosine = np.einsum("ni,ni->n", patches.normal[early], patches.normal[late])
     other = patches.pass_number[early] != patches.pass_number[late]
-    other |= np.abs(patches.gps_time[early] - patches.gps_time[late]) > SETTINGS.pair_pause
+    other |= np.abs(patches.gps_time[early] - patches.gps_time[late]) > SETTINGS.pause
     pair = (cosine >= np.cos(SETTINGS.parallel / 2)) & other
     early = early[pair]
     late = late[pair]

@@ -175,7 +175,7 @@ def _near(matched, candidates):
     for i, on_target in enumerate(near):
         rows = np.array(on_target, dtype=int)
         on = candidates.pass_number[rows] == matched.pass_number[i]
-        on &= np.abs(cloud.gps_time[rows] - matched.gps_time[i]) <= MATCHING.pause
+        on &= np.abs(cloud.gps_time[rows] - matched.gps_time[i]) <= MATCHING.visit_gap
         off = np.abs((cloud.xyz[rows] - matched.position[i]) @ matched.normal[i])
         on &= off <= TARGETS.thickness
         targets.append(rows[on][np.argsort(cloud.gps_time[rows[on]])])

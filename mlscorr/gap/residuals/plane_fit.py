@@ -109,7 +109,7 @@ def _fit(survey, chunk, number, rows, count):
     variance = values[:, 0] * held / freedom(held)
     least = np.maximum(SETTINGS.plane_points, SETTINGS.rule * count)
     good = (held >= least) & (variance <= SETTINGS.roughest**2)
-    good &= values[:, 1] >= SETTINGS.narrowest**2
+    good &= values[:, 1] >= SETTINGS.narrowest_patch**2
     good &= _is_whole(chunk.xyz[rows[first]] + mean, normal, variance)
     if not good.any():
         return None
@@ -137,7 +137,7 @@ def _fit(survey, chunk, number, rows, count):
         time=chunk.gps_time[sample],
         intensity=chunk.intensity[sample].astype(float),
         cloud=_on_planes(chunk, rows[np.repeat(good, count)], count[good], sample, normal),
-    )[np.abs(slant) >= TARGETS.grazing]
+    )[np.abs(slant) >= TARGETS.least_crossing_sine]
 
 
 def _trimmed(local, first, group):

@@ -53,7 +53,7 @@ def support(residual: np.ndarray) -> float:
     residual : (n,) array
         Units: m.
     """
-    return float(np.maximum(1.0 - (residual / SETTINGS.least_gate) ** 2, 0.0).sum())
+    return float(np.maximum(1.0 - (residual / SETTINGS.least_surface_gate) ** 2, 0.0).sum())
 
 
 def gate(survey: Survey, gps_time: np.ndarray) -> np.ndarray:
@@ -71,8 +71,8 @@ def gate(survey: Survey, gps_time: np.ndarray) -> np.ndarray:
         Units: m.
     """
     sigma = stated_sigma(survey.trajectory, survey.pos, gps_time)
-    size = SETTINGS.gate_sigmas * np.linalg.norm(sigma.drift + sigma.held, axis=1)
-    return np.clip(size, SETTINGS.least_gate, SEARCH_RADIUS)
+    size = SETTINGS.surface_gate_sigmas * np.linalg.norm(sigma.drift + sigma.held, axis=1)
+    return np.clip(size, SETTINGS.least_surface_gate, SEARCH_RADIUS)
 
 
 def consistent(gps_time: np.ndarray, direction: np.ndarray, residual: np.ndarray) -> np.ndarray:
@@ -97,7 +97,7 @@ def consistent(gps_time: np.ndarray, direction: np.ndarray, residual: np.ndarray
     order = np.argsort(gps_time, kind="stable")
     size = SETTINGS.plane_points  # in a street they come within a second
     group = np.arange(len(order)) // size
-    moment = np.floor(gps_time[order] / SETTINGS.window)
+    moment = np.floor(gps_time[order] / SETTINGS.outlier_interval)
     begins = np.flatnonzero((np.diff(group) != 0) | (np.diff(moment) != 0)) + 1
     agree = np.ones(len(gps_time), dtype=bool)
     for rows in np.split(order, begins):
@@ -143,7 +143,9 @@ def spread(columns: list[np.ndarray], limit: int, rng: np.random.Generator) -> n
     chance = np.zeros(n)
     for values in columns:
         span = np.ptp(values)
-        number = ((values - values.min()) / (span if span > 0 else 1.0) * SETTINGS.bins).astype(int)
+        number = (
+            (values - values.min()) / (span if span > 0 else 1.0) * SETTINGS.spread_bins
+        ).astype(int)
         chance += 1 / np.bincount(number)[number]
     keys = rng.exponential(size=n) / chance  # the least of these are a sample without replacement
     return np.sort(np.argpartition(keys, limit)[:limit])

@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from mlscorr.ties import SETTINGS as TIES
 
 
@@ -19,27 +17,27 @@ class Settings:
     cell: float = TIES.cell  # m
     moment: float = TIES.moment  # s
     block_cells: int = 4  # cells that are kept or left together, so that neighbours stay
-    plane_points: int = TIES.points  # of a plane
+    plane_points: int = TIES.feature_points  # of a plane
     samples: int = 12  # pulses that stand for a patch: their mean has a third of their scatter
     trims: tuple[float, ...] = (2.0, 2.5, 3.0, 3.5)  # sigmas; the last takes 0.05 % of the noise
     rule: float = 0.9  # share from which on a part stands for the whole: of points, of pauses
     roughest: float = TIES.roughest  # m about a plane
-    narrowest: float = 0.12  # m, one sigma across a patch: a normal to 1 deg from noise of 2 mm
+    narrowest_patch: float = 0.12  # m, one sigma across: a normal to 1 deg from noise of 2 mm
     file_step: float = 1e-3  # m: the usual scale factor of LAS coordinates
     patches: int = 1000  # on surfaces, of up to three rows; 200 were enough in gap_study
     patch_pulses: int = 400  # of a patch, fired again: a mean to a twentieth of the noise
     longest_miss: float = 4.5  # pulses: of longer pauses a loss of 30 % makes 1 % (0.3^4)
     line_pause: float = 20.5  # pulses: a longer pause is another scan line
     # what is compared
-    gate_sigmas: float = 4.0  # of the stated 3D sigma: 1 in 1 000 normal errors lies beyond
-    least_gate: float = 0.5  # m: boresight and lever arm are not in the POS's sigma; cars stand off
-    window: float = 5.0  # s at most, over which a POS error is one shift
+    surface_gate_sigmas: float = 4.0  # of the stated 3D sigma: 1 in 1 000 normal errors lies beyond
+    least_surface_gate: float = 0.5  # m: the POS's sigma lacks the mounting; cars stand off
+    outlier_interval: float = 5.0  # s at most, over which a POS error is one shift
     odd_distance: float = 0.03  # m: more than attitude errors make within a window
     odd_sigmas: float = 6.0  # of a window's own scatter
-    bins: int = 8  # of each covariate, over which a choice is spread
-    pair_pause: float = TIES.pause  # s between two visits of one pass
+    spread_bins: int = 8  # of each covariate, over which a choice is spread
+    pause: float = TIES.pause  # s between two visits of one pass
     pair_distance: float = 0.7  # cells between the middles of two patches of one plane
-    parallel: float = float(np.radians(8.0))  # rad: patches of few points know their normal so well
+    parallel: float = TIES.parallel  # rad
     surface_sigma: float = TIES.surface_sigma  # m; facets of static scans are no planes either
     facet_share: float = 0.75  # of a patch's beams that must meet one plane of the reference
     overlap: float = 0.01  # of the patches on the reference; fewer are chance: it lies elsewhere
@@ -51,7 +49,7 @@ class Settings:
     thinned: float = 0.6  # median share of returns: below it the cloud was thinned
     # covariates
     beside: float = 50.0  # m from the first pass, up to which a place has a location along it
-    step: float = 0.25  # s to each side, over which speed and turn rate are taken
+    motion_step: float = 0.25  # s to each side, over which speed and turn rate are taken
     on_target: float = 0.45  # of a target's size from its centre: on a disc, and on a plate
 
     @property

@@ -197,7 +197,7 @@ def _against_targets(survey, matched, candidates, simulated):
     for i in range(len(matched)):
         same = np.flatnonzero(np.array(other.name, dtype=object) == matched.name[i])
         apart = np.abs(other.gps_time[same] - matched.gps_time[i])
-        if len(same) == 0 or apart.min() > SETTINGS.pair_pause:
+        if len(same) == 0 or apart.min() > SETTINGS.pause:
             continue
         j = same[np.argmin(apart)]
         on = np.flatnonzero(rows.item == i)
@@ -249,7 +249,7 @@ def _nearest(patches, simulated):
         j = np.array(rows, dtype=int)
         cosine = simulated.normal[j] @ patches.normal[i]
         later = np.abs(simulated.gps_time[j] - patches.gps_time[i])
-        j = j[(cosine >= np.cos(SETTINGS.parallel / 2)) & (later <= SETTINGS.pair_pause)]
+        j = j[(cosine >= np.cos(SETTINGS.parallel / 2)) & (later <= SETTINGS.pause)]
         if len(j):
             other[i] = j[np.argmin(np.linalg.norm(simulated.centre[j] - patches.centre[i], axis=1))]
     return other

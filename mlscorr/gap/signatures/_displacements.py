@@ -90,7 +90,7 @@ def _directions(survey, time, xyz):
 
 def _about(trajectory, time):
     """Poses before and after times (k,): a second difference needs more time than a first one."""
-    return poses_about(trajectory, time, 2 * SETTINGS.step)
+    return poses_about(trajectory, time, 2 * SETTINGS.motion_step)
 
 
 def _turning(before, after):

@@ -226,7 +226,7 @@ def signature(bench: Bench, kind: type[Effect], fixed: dict, rng: np.random.Gene
         )
     tries = _tries(kind, size, fixed)
     jacobian = np.zeros((m, len(tries)))
-    step = SETTINGS.step * typical
+    step = SETTINGS.derivative_step * typical
     for column, (_, unit, more) in enumerate(tries if _is_seen(rows, fixed) else ()):
         ends = [
             bench.change(kind(magnitude=np.multiply(unit, sign * step).tolist(), **more)).shift

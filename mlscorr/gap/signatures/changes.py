@@ -182,7 +182,7 @@ class Bench:
         _, single, pulse = np.unique(self.returns.gps_time, return_index=True, return_inverse=True)
         pulses = self.returns[single]
         sums = {}
-        for _ in range(SETTINGS.replicas):
+        for _ in range(SETTINGS.random_replicas):
             changed = effect.apply(pulses, self.rows.reference, rng)
             for name in FIELDS:
                 if getattr(changed, name) is not getattr(pulses, name):
@@ -193,7 +193,7 @@ class Bench:
         variance = np.zeros(m)
         along_normal = np.zeros(m)
         for name, total in sums.items():
-            moved = self._speeds[name] * np.sqrt(total / SETTINGS.replicas)[pulse, None]
+            moved = self._speeds[name] * np.sqrt(total / SETTINGS.random_replicas)[pulse, None]
             along_normal += self._mean(np.einsum("ki,ki->k", moved, self._pulses.normal) ** 2)
             squares = self._mean((moved[:, :, None] * moved[:, None, :]).reshape(-1, 9))
             along = np.einsum("mi,mj->mij", rows.direction, rows.direction).reshape(-1, 9)
@@ -204,7 +204,7 @@ class Bench:
 
     def _lost(self, effect, rng):
         """Shift (m,) of the share that returns."""
-        replicas = SETTINGS.replicas if effect.random else 1
+        replicas = SETTINGS.random_replicas if effect.random else 1
         kept = sum(
             effect.apply(self.returns, self.rows.reference, rng).kept for _ in range(replicas)
         )
@@ -261,7 +261,7 @@ class Bench:
     def _pose_variance(self, effect, rng):
         """Variance (m,) by noise of the recorded trajectory, which rows of a moment share."""
         given = (self._trajectory, self.rows.reference, rng)
-        replicas = SETTINGS.replicas
+        replicas = SETTINGS.random_replicas
         return sum(self._pose_shift(effect.apply(*given)) ** 2 for _ in range(replicas)) / replicas
 
     def _control_shift(self, effect):

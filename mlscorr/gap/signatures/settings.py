@@ -8,8 +8,8 @@ class Settings:
     """How effects are differentiated, and at which times and widths events are tried."""
 
     epoch_step: float = 0.1  # s: no POS error changes faster, and events are seconds long
-    replicas: int = 200  # of a random effect: a variance to 10 %, with 12 pulses to 3 %
-    step: float = 0.1  # of the usual size: small enough to be linear, far above rounding
+    random_replicas: int = 200  # of a random effect: a variance to 10 %, with 12 pulses to 3 %
+    derivative_step: float = 0.1  # of the usual size: small enough to be linear, far above rounding
     loss: float = 0.5  # share lost at which a count of few pulses is most exact (binomial)
     widths: tuple[float, ...] = (2.0, 5.0, 15.0, 45.0)  # s: a lost fix to a street of high houses
     largest_shift: float = 100.0  # m everywhere at the usual size: a unit that is wrong

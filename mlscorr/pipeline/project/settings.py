@@ -7,11 +7,11 @@ from dataclasses import dataclass
 class Settings:
     """Limits and choices, each with its unit and reason."""
 
-    losses: int = 2  # times that a task may lose its worker alone, before it is to blame itself
-    waiting: int = 2  # tasks for each worker that are handed out: the next is there when it ends
-    area_seconds: int = 6_500  # that drives spend in an area with its margin: 2 GB, some minutes
-    interval: float = 10.0  # s between two lines on how far it has come, and looks at a cluster
-    cached: int = 2  # drives that a worker holds: that of this task, and of the one before
+    losses: int = 2  # times that a task may lose its worker before it is to blame; guard
+    waiting: int = 2  # tasks handed out for each worker: the next is there when one ends; guard
+    area_seconds: int = 6_500  # that drives spend in an area and its margin: 2 GB, minutes; guard
+    interval: float = 10.0  # s between two lines on progress, and looks at a cluster; guard
+    cached: int = 2  # drives that a worker holds: that of this task, and of the one before; guard
 
 
 SETTINGS = Settings()

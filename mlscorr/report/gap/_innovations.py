@@ -65,7 +65,7 @@ def passes_of(gps_time: np.ndarray) -> np.ndarray:
         usual = np.median(steps[steps > 0])
     else:
         usual = 0.0
-    cut = np.flatnonzero(steps > max(SETTINGS.pause, SETTINGS.pause_steps * usual)) + 1
+    cut = np.flatnonzero(steps > max(SETTINGS.row_gap, SETTINGS.row_gap_steps * usual)) + 1
     return np.array([[part[0], part[-1]] for part in np.split(time, cut)])
 
 

@@ -26,7 +26,7 @@ class Settings:
         Least and largest end of the axis of innovations. Units: sigma.
     map_sigmas : float
         At the ends of the map's colours. Units: sigma.
-    pause, pause_steps : float
+    row_gap, row_gap_steps : float
         Without a row, from which on two passes are parted: so long, and so many times the usual
         step. Units: s, 1.
     panels : int
@@ -41,8 +41,8 @@ class Settings:
     stripe_sigmas: float = 2.0
     drawn_sigmas: tuple[float, float] = (3.0, 6.0)
     map_sigmas: float = 4.0
-    pause: float = 15.0
-    pause_steps: float = 20.0
+    row_gap: float = 15.0
+    row_gap_steps: float = 20.0
     panels: int = 6
 
 

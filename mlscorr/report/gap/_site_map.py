@@ -84,7 +84,7 @@ def _parted(track):
         usual = np.median(step[step > 0])
     else:
         usual = np.inf
-    leaps = np.flatnonzero(step > SETTINGS.pause_steps * usual)
+    leaps = np.flatnonzero(step > SETTINGS.row_gap_steps * usual)
     return np.insert(track, leaps + 1, np.nan, axis=0)
 
 

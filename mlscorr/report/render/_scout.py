@@ -72,7 +72,7 @@ def _normal(points):
     """Unit normal of the bright ones of points (n, 4), NaN where they are too few."""
     if len(points):
         points = points[points[:, 3] >= np.percentile(points[:, 3], 90) / 2, :3]
-    if len(points) < SETTINGS.plane_points:
+    if len(points) < SETTINGS.normal_points:
         return np.full(3, np.nan)
     centred = points - np.median(points, axis=0)
     # what stands before or behind is left out by a second fit to the nearest points

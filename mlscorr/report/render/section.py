@@ -85,7 +85,7 @@ def worst_facades(residuals: TieResiduals) -> Ties:
 def _places(scouted, cells):
     """The Place of each cell (rows of the sample) that is a wall, after how well it shows."""
     places = []
-    clear = 10 * SETTINGS.plane_points  # more points don't make a wall clearer
+    clear = 10 * SETTINGS.normal_points  # more points don't make a wall clearer
     for rows in cells:
         if (place := _wall(scouted, rows)) is not None:
             # where wall and ground meet there is more to see
@@ -118,7 +118,7 @@ def _cells(scouted):
     height = xyz[order, 2]
     extent = np.maximum.reduceat(height, starts) - np.minimum.reduceat(height, starts)
     ends = np.append(starts[1:], len(order))
-    kept = (extent > 4 / 3 * SETTINGS.wall_height) & (ends - starts >= SETTINGS.plane_points)
+    kept = (extent > 4 / 3 * SETTINGS.wall_height) & (ends - starts >= SETTINGS.normal_points)
     return [order[starts[k] : ends[k]] for k in np.flatnonzero(kept)]
 
 
@@ -127,7 +127,7 @@ def _wall(scouted, rows):
     xyz = scouted.after.xyz[rows]
     ground = float(xyz[:, 2].min())
     rows = rows[xyz[:, 2] > ground + SETTINGS.wall_height / 3]
-    if len(rows) < SETTINGS.plane_points:
+    if len(rows) < SETTINGS.normal_points:
         return None
     xyz = scouted.after.xyz[rows]
     middle = np.median(xyz, axis=0)
@@ -155,7 +155,7 @@ def _visits(time):
     order = np.argsort(time, kind="stable")
     last = np.flatnonzero(np.diff(time[order]) >= TIES.pause)
     splits = (time[order[last]] + time[order[last + 1]]) / 2
-    visits = [rows for rows in np.split(order, last + 1) if len(rows) >= SETTINGS.plane_points]
+    visits = [rows for rows in np.split(order, last + 1) if len(rows) >= SETTINGS.normal_points]
     return tuple(splits.tolist()), visits
 
 

@@ -93,7 +93,7 @@ class Surfaces:
             In which the Hits stay until the next ones.
         """
         n = len(rays)
-        limits = (SETTINGS.grazing, SETTINGS.fading)
+        limits = (SETTINGS.no_return_cosine, SETTINGS.fading)
         hit = room.array("hit", n, dtype=np.int32)
         first = room.array("met", n, 3), hit, room.array("point", n, 3)
         if divergence == 0:

@@ -69,7 +69,7 @@ def crossing(
     slope = np.einsum("ni,ni->n", direction, normal)
     with np.errstate(divide="ignore", invalid="ignore"):
         distance = (offset - np.einsum("ni,ni->n", start, normal)) / slope
-    met = (np.abs(slope) >= SETTINGS.grazing) & (distance > 0)
+    met = (np.abs(slope) >= SETTINGS.no_return_cosine) & (distance > 0)
     return np.where(met, distance, np.nan), np.abs(slope)
 
 

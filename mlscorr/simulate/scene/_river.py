@@ -12,11 +12,43 @@ from numpy.random import Generator
 
 from mlscorr.simulate.scenario import Scenario
 from mlscorr.simulate.scene._bank import Bank
+from mlscorr.simulate.scene._dimensions import (
+    BUSH,
+    CAR,
+    HOUSE,
+    ON_GROUND,
+    ON_WALL,
+    WALL_ENDS,
+    Furniture,
+    HouseRow,
+    TargetHeight,
+)
 from mlscorr.simulate.scene._things import car, house, lamp, leaves, tree
 from mlscorr.simulate.scene.centre_line import CentreLine
 from mlscorr.simulate.scene.placing import Placed, TargetSpot, scatter
 from mlscorr.simulate.scene.shapes import UP, Mesh, box, four_corners, unit
 from mlscorr.simulate.settings import SETTINGS
+
+FRONTS = HouseRow(width=(12.0, 20.0), gap=(3.0, 10.0), setback=(0.0, 6.0))  # m
+WIDE_GAP = 25.0  # m, added to some gaps between houses
+LAMPS = Furniture(across=1.2, extent=0.2)  # m
+TREES = Furniture(across=5.0, extent=0.3)  # m
+CARS = Furniture(across=10.5, extent=2.3)  # m
+BUSHES = Furniture(across=4.0, extent=1.0)  # m; on slopes alone
+BUSH_DENSITY = 6.0  # per 100 m
+CROWN = (2.4, 2.4, 2.2)  # m, half axes of a tree's crown
+SLOPE_TREE = 1.0  # m, of a tree behind the upper edge of a slope
+FREE_ENDS = 3.0  # m, without furniture at the ends of the scene
+KIND_ENDS = 0.3  # m, between furniture and the end of its reach
+ABOVE_STEPS = 8.0  # m inland, from which on steps leave room for furniture
+ON_FRONTS = TargetHeight(least=1.4, below=0.4, span=0.8)  # m
+ON_POSTS = TargetHeight(least=1.0, below=0.2, span=1.0)  # m
+POSTS = {"quay": (0.4, 1.0), "slope": (2.0, 6.0), "steps": (8.2, 8.8)}  # m inland
+ON_QUAY = (0.4, 0.3)  # m, from a target down to the water and up to the promenade
+SLOPE_EDGE = 0.3  # m, from a target to a slope's edges
+SHORE_EDGE = 0.5  # m, more, from a target to the water's edge
+STEPS_RAISE = 0.6  # m, of targets above steps, so that these hide nothing of them
+TARGET_ENDS = 0.6  # m, between a target and the end of its reach
 
 
 @dataclass(frozen=True)
@@ -32,7 +64,6 @@ class River:
     """What stands along a bank; `spot` finds places for targets, `furniture` the rest."""
 
     bank = Bank()
-    bushes = 6.0  # on a slope, per 100 m
 
     def __init__(self, scenario: Scenario, line: CentreLine, length, rng):
         self.scenario = scenario.scene
@@ -52,7 +83,9 @@ class River:
         s : (...) array
             Length along the line. Units: m.
         """
-        return self.bank.shore + self.bank.meander * np.sin(np.asarray(s) / 45.0 + self._phase)
+        return self.bank.shore + self.bank.meander * np.sin(
+            np.asarray(s) / self.bank.meander_length + self._phase
+        )
 
     def place(
         self, s: float | np.ndarray, inland: float | np.ndarray, height: float | np.ndarray
@@ -78,8 +111,8 @@ class River:
         i = int(self._phase > np.pi)
         while s < self.length + SETTINGS.margin:
             for kind in (("quay", "slope")[i % 2], "steps"):
-                shortest, longest = (8.0, 14.0) if kind == "steps" else (40.0, 70.0)
-                length = self._shore_rng.uniform(shortest, longest)
+                lengths = self.bank.stairways if kind == "steps" else self.bank.quays
+                length = self._shore_rng.uniform(*lengths)
                 end = min(s + length, self.length + SETTINGS.margin)
                 if end - s > 1.0:
                     stretches.append(_Stretch(kind, s, end))
@@ -96,12 +129,12 @@ class River:
         rows = []
         s = -SETTINGS.margin
         heights = self.scenario.house_height
-        while s < self.length + SETTINGS.margin - 20.0:
-            width = rng.uniform(12.0, 20.0)
-            setback = rng.uniform(0, self.bank.setback)
+        while s < self.length + SETTINGS.margin - FRONTS.width[1]:
+            width = rng.uniform(*FRONTS.width)
+            setback = rng.uniform(*FRONTS.setback)
             height = rng.uniform(*heights)
             rows.append((s, s + width, setback, height))
-            s += width + rng.uniform(3.0, 10.0) + 25.0 * (rng.random() < self.scenario.gaps)
+            s += width + rng.uniform(*FRONTS.gap) + WIDE_GAP * (rng.random() < self.scenario.gaps)
         return np.array(rows).reshape(-1, 4)
 
     def _front(self, row):
@@ -118,7 +151,8 @@ class River:
         for row in self.houses:
             near, far = self._front(row)
             inward = unit(np.cross(far - near, UP))
-            pieces.append(house(near, far, inward, row[3], self._house_rng.uniform(0.2, 0.5)))
+            reflectance = self._house_rng.uniform(*HOUSE.reflectance)
+            pieces.append(house(near, far, inward, row[3], reflectance))
         return Mesh.concatenate(pieces)
 
     def _bank(self, stretch):
@@ -133,10 +167,13 @@ class River:
 
     def _cross_wall(self, s):
         """A wall with a parapet, from the water up to the promenade."""
-        corner = self.place(s - 0.15, -0.2, -1.0)
-        inland = self.place(s - 0.15, self.bank.slope + 0.5, -1.0) - corner
-        along = self.place(s + 0.15, -0.2, -1.0) - corner
-        return box(corner, inland, along, (self.bank.top + 1.3) * UP, 0.35)
+        bank = self.bank
+        half = bank.wall_width / 2
+        corner = self.place(s - half, -bank.wall_front, -bank.depth)
+        inland = self.place(s - half, bank.slope + bank.walls, -bank.depth) - corner
+        along = self.place(s + half, -bank.wall_front, -bank.depth) - corner
+        height = bank.top + bank.depth + bank.parapet
+        return box(corner, inland, along, height * UP, bank.wall)
 
     def _kind_at(self, s, margin):
         """Kind of the reach that holds s with a margin (m) to both sides, or None."""
@@ -162,9 +199,10 @@ class River:
             From the centre to the edge of the target. Units: m.
         rng : Generator
         """
-        kind = self._kind_at(s, half + 0.6)
+        margin = half + TARGET_ENDS
+        kind = self._kind_at(s, margin)
         shadow = self.bank.slope if kind == "slope" else 0.0  # of the walls at a slope's ends
-        if kind is None or self._kind_at(s, half + 0.6 + shadow) is None:
+        if kind is None or self._kind_at(s, margin + shadow) is None:
             return None
         if support == "wall":
             quay = self._on_quay(s, half, rng) if kind == "quay" else None
@@ -181,48 +219,46 @@ class River:
         return unit(ends[1] - ends[0])
 
     def _on_house(self, s, half, rng):
-        """On a house front, 2 cm before it."""
-        margin = half + 0.4
+        """On a house front."""
+        margin = half + WALL_ENDS
         row = next((row for row in self.houses if row[0] + margin < s < row[1] - margin), None)
         if row is None:
             return None
         near, far = self._front(row)
         u = -unit(far - near)
         foot = near + (s - row[0]) / (row[1] - row[0]) * (far - near)
-        low = max(1.4, half + 0.4)
-        centre = foot + rng.uniform(low, low + 0.8) * UP + 0.02 * np.cross(u, UP)
+        centre = foot + ON_FRONTS.draw(half, rng) * UP + ON_WALL * np.cross(u, UP)
         return TargetSpot(
             "wall", s, self.shore(s) + self.bank.fronts + row[2], centre, u, UP, foot[2]
         )
 
     def _on_quay(self, s, half, rng):
-        """On the quay wall, 2 cm before it."""
+        """On the quay wall."""
         u = -self._facing(s)
-        low = half + 0.4
-        high = max(half + 0.5, self.bank.top - half - 0.3)
-        centre = self.place(s, 0.0, rng.uniform(low, high)) + 0.02 * np.cross(u, UP)
+        low = half + ON_QUAY[0]
+        high = self.bank.top - half - ON_QUAY[1]
+        centre = self.place(s, 0.0, rng.uniform(low, high)) + ON_WALL * np.cross(u, UP)
         return TargetSpot("wall", s, float(self.shore(s)), centre, u, UP, -0.5)
 
     def _on_post(self, s, kind, half, rng):
         """On a post behind the quay's edge, on the slope, or above the steps."""
-        low, high = {"quay": (0.4, 1.0), "slope": (2.0, 6.0), "steps": (8.2, 8.8)}[kind]
-        inland = rng.uniform(low, high)
+        inland = rng.uniform(*POSTS[kind])
         foot = self.place(s, inland, self.bank.height(kind, inland))
-        low = max(1.0, half + 0.2) + (0.6 if kind == "steps" else 0.0)
-        centre = foot + rng.uniform(low, low + 1.0) * UP
+        raised = STEPS_RAISE if kind == "steps" else 0.0
+        centre = foot + ON_POSTS.draw(half, rng, raised) * UP
         lateral = float(self.shore(s) + inland)
         return TargetSpot("post", s, lateral, centre, -self._facing(s), UP, foot[2])
 
     def _on_slope(self, s, half, rng):
-        """1 cm above the slope, in its plane."""
-        margin = half + 0.3
-        inland = rng.uniform(margin + 0.5, max(margin + 0.6, self.bank.slope - margin))
+        """Just above the slope, in its plane."""
+        margin = half + SLOPE_EDGE
+        inland = rng.uniform(margin + SHORE_EDGE, self.bank.slope - margin)
         steps = np.array([-0.2, 0.2])
         along = self.place(s + steps, inland, self.bank.height("slope", inland))
         up = self.place(s, inland + steps, self.bank.height("slope", inland + steps))
         u = -unit(along[1] - along[0])
         normal = unit(np.cross(u, up[1] - up[0]))
-        centre = along.mean(axis=0) + 0.01 * normal
+        centre = along.mean(axis=0) + ON_GROUND * normal
         lateral = float(self.shore(s) + inland)
         return TargetSpot("road", s, lateral, centre, u, np.cross(normal, u), centre[2])
 
@@ -237,27 +273,27 @@ class River:
         pieces = [placed.posts]
         streams = self._furniture_rng.spawn(4)
         kinds = (
-            (self.scenario.poles, 1.2, 0.2, self._lamp),
-            (self.scenario.trees, 5.0, 0.3, self._tree),
-            (self.scenario.cars, 10.5, 2.3, self._car),
-            (self.bushes, 4.0, 1.0, self._bush),
+            (self.scenario.poles, LAMPS, self._lamp),
+            (self.scenario.trees, TREES, self._tree),
+            (self.scenario.cars, CARS, self._car),
+            (BUSH_DENSITY, BUSHES, self._bush),
         )
-        for (density, inland, extent, make), rng in zip(kinds, streams, strict=True):
+        for (density, thing, make), rng in zip(kinds, streams, strict=True):
 
-            def is_free(s, _, inland=inland, extent=extent):
-                kind = self._kind_at(s, extent + 0.3)
-                if inland == 4.0:
+            def is_free(s, _, thing=thing):
+                kind = self._kind_at(s, thing.extent + KIND_ENDS)
+                if thing is BUSHES:
                     right_place = kind == "slope"
                 else:
                     right_place = kind is not None
-                on_steps = kind == "steps" and inland < 8.0
-                hides = placed.in_the_way(s, float(self.shore(s)) + inland, extent)
+                on_steps = kind == "steps" and thing.across < ABOVE_STEPS
+                hides = placed.in_the_way(s, float(self.shore(s)) + thing.across, thing.extent)
                 return right_place and not on_steps and not hides
 
-            start = -SETTINGS.margin + 3.0
-            end = self.length + SETTINGS.margin - 3.0
+            start = -SETTINGS.margin + FREE_ENDS
+            end = self.length + SETTINGS.margin - FREE_ENDS
             for s, _ in scatter(density, start, end, is_free, rng):
-                pieces.append(make(s, inland, rng))
+                pieces.append(make(s, thing.across, rng))
         return Mesh.concatenate(pieces)
 
     def _foot(self, s, inland):
@@ -270,15 +306,17 @@ class River:
 
     def _tree(self, s, inland, rng):
         if self._kind_at(s, 0.0) != "quay":
-            inland = self.bank.slope + 1.0
-        return tree(self._foot(s, inland), self._facing(s), np.array([2.4, 2.4, 2.2]), rng)
+            inland = self.bank.slope + SLOPE_TREE
+        return tree(self._foot(s, inland), self._facing(s), np.array(CROWN), rng)
 
     def _car(self, s, inland, rng):
         along = self._facing(s)
-        return car(self._foot(s, inland), along, np.cross(along, UP), rng.uniform(0.1, 0.5))
+        right = np.cross(along, UP)
+        return car(self._foot(s, inland), along, right, rng.uniform(*CAR.reflectance))
 
     def _bush(self, s, inland, rng):
-        size = rng.uniform(0.5, 1.0)
-        foot = self._foot(s, inland + rng.uniform(-2.0, 2.0))
-        axes = size * np.array([1.2, 1.0, 0.8])
-        return leaves(foot + 0.6 * size * UP, axes, self._facing(s), int(500 * size), rng)
+        size = rng.uniform(*BUSH.size)
+        foot = self._foot(s, inland + rng.uniform(-BUSH.scatter, BUSH.scatter))
+        axes = size * np.array(BUSH.axes)
+        middle = foot + BUSH.height * size * UP
+        return leaves(middle, axes, self._facing(s), int(BUSH.leaves * size), rng)

@@ -20,6 +20,8 @@ class StreetSection:
         Lengths about which it widens to `widened`, for a U-turn. Units: m.
     widened : float
         A van's full lock, and room. Units: m.
+    turn_reach, turn_taper : float
+        From the middle of a U-turn to where the widening ends, and over which it narrows. Units: m.
     pavement, garden : float
         Width from the kerb to the house fronts, and of the ground behind them. Units: m.
     kerb : float
@@ -33,11 +35,15 @@ class StreetSection:
         thermoplastic paint. Units: m.
     dash : tuple of float
         Length of a dash of the middle line, and of the gap after it, usual in towns. Units: m.
+    asphalt, kerbstone, paving, lawn, white_line : float
+        Reflectance of the carriageway, of the kerb, of the pavement, of the gardens, of paint.
     """
 
     road: float = 3.0
     turns: tuple[float, ...] = ()
     widened: float = CAR.turning_radius + 2.0
+    turn_reach: float = 20.0
+    turn_taper: float = 8.0
     pavement: float = 1.8
     garden: float = 9.0
     kerb: float = 0.12
@@ -47,6 +53,11 @@ class StreetSection:
     line_from_kerb: float = 0.3
     paint: float = 0.003
     dash: tuple[float, float] = (3.0, 6.0)
+    asphalt: float = 0.18
+    kerbstone: float = 0.35
+    paving: float = 0.25
+    lawn: float = 0.3
+    white_line: float = 0.6
 
     def half_width(self, s: float | np.ndarray) -> np.ndarray:
         """Half width (...) at lengths s (...). Units: m.
@@ -58,7 +69,8 @@ class StreetSection:
         """
         width = np.full(np.shape(s), self.road)
         for middle in self.turns:
-            depth = np.clip((20.0 - np.abs(s - middle)) / 8.0, 0.0, 1.0)
+            inside = self.turn_reach - np.abs(s - middle)
+            depth = np.clip(inside / self.turn_taper, 0.0, 1.0)
             widened = self.road + max(0.0, self.widened - self.road) * depth**2 * (3 - 2 * depth)
             width = np.maximum(width, widened)
         return width
@@ -96,23 +108,23 @@ class StreetSection:
         return self.cross_fall * self.road - fall * smooth, fall * np.asarray(lateral) / smooth
 
 
-def section(scenario: DriveScenario, length: float, lane_edge: float = 2.4) -> StreetSection:
-    """StreetSection of a street wide enough for the lanes of a DriveScenario's passes.
+LANE_EDGE = 2.4  # m, from the middle of a lane to the kerb, as cars are parked half on it
+TURN_PLACE = 6.0  # m, from the end of the drive to the middle of a U-turn
 
-    A lane's middle keeps 2.4 m from the kerb, as cars are parked half on it.
+
+def section(scenario: DriveScenario, length: float) -> StreetSection:
+    """StreetSection of a street wide enough for the lanes of a DriveScenario's passes.
 
     Parameters
     ----------
     scenario : DriveScenario
     length : float
         Of the drive along the line. Units: m.
-    lane_edge : float
-        From the middle of a lane to the kerb. Units: m.
     """
     lateral = max(abs(lane.lateral) for lane in scenario.passes)
-    ends = {"forward": length + 6.0, "back": -6.0}
+    ends = {"forward": length + TURN_PLACE, "back": -TURN_PLACE}
     if scenario.u_turn:
         turns = {ends[lane.direction] for lane in scenario.passes}
     else:
         turns = ()
-    return StreetSection(max(StreetSection.road, lateral + lane_edge), tuple(sorted(turns)))
+    return StreetSection(max(StreetSection.road, lateral + LANE_EDGE), tuple(sorted(turns)))

@@ -9,12 +9,35 @@ import numpy as np
 from numpy.random import Generator
 
 from mlscorr.simulate.scenario import Scenario
+from mlscorr.simulate.scene._dimensions import (
+    CAR,
+    HOUSE,
+    ON_GROUND,
+    ON_WALL,
+    WALL_ENDS,
+    Furniture,
+    HouseRow,
+    TargetHeight,
+)
 from mlscorr.simulate.scene._section import section
 from mlscorr.simulate.scene._things import car, house, lamp, tree
 from mlscorr.simulate.scene.centre_line import CentreLine
 from mlscorr.simulate.scene.placing import Placed, TargetSpot, eyes, scatter
 from mlscorr.simulate.scene.shapes import UP, Mesh, four_corners, sees, unit
 from mlscorr.simulate.settings import SETTINGS
+
+FRONTS = HouseRow(width=(8.0, 14.0), gap=(2.0, 5.0), setback=(0.0, 0.4))  # m
+CARS = Furniture(across=-0.05, extent=2.3)  # m; half on the pavement
+LAMPS = Furniture(across=0.3, extent=0.2)  # m
+TREES = Furniture(across=0.7, extent=0.3)  # m
+CROWN = (1.7, 1.1, 1.6)  # m, half axes of a crown: cut back on the side of the houses
+CAR_LIFT = 0.05  # m, of a car that is parked with two wheels on the pavement
+FREE_ENDS = 4.0  # m, without furniture at the ends of the scene
+POST_PLACES = (0.6, 1.1)  # m, from the kerb to a target's post
+ROAD_PLACES = (0.5, 0.73)  # of half the road: where targets lie, in the tracks of no wheel
+ROAD_EDGE = 0.05  # m, between a target and the middle or the edge of the road
+ON_FRONTS = TargetHeight(least=1.2, below=0.3, span=1.0)  # m
+ON_POSTS = TargetHeight(least=1.0, below=0.2, span=1.2)  # m
 
 
 @dataclass(frozen=True)
@@ -44,12 +67,12 @@ class Street:
         houses = []
         for side in (-1, 1):
             s = -SETTINGS.margin
-            while s < self.length + SETTINGS.margin - 14.0:
-                width = rng.uniform(8.0, 14.0)
-                front = self._front(side, s, s + width, rng.uniform(0.0, 0.4))
+            while s < self.length + SETTINGS.margin - FRONTS.width[1]:
+                width = rng.uniform(*FRONTS.width)
+                front = self._front(side, s, s + width, rng.uniform(*FRONTS.setback))
                 if self._is_clear(front):
                     houses.append(front)
-                gap = rng.uniform(2.0, 5.0)
+                gap = rng.uniform(*FRONTS.gap)
                 s += width + (gap if rng.random() < self.scenario.gaps else 0.0)
         return houses
 
@@ -70,7 +93,8 @@ class Street:
         steps = np.linspace(0.0, 1.0, 5)[:, None]
         points = front.near + steps * (front.far - front.near)
         inward = unit(front.side * np.cross(front.far - front.near, UP))
-        points = np.concatenate([points, points + 4.0 * inward, points + 8.0 * inward])
+        middle = points + HOUSE.depth / 2 * inward
+        points = np.concatenate([points, middle, points + HOUSE.depth * inward])
         way = self.section.road + self.section.pavement - self.section.clearance
         return (self.line.distance(points) > way).all()
 
@@ -83,7 +107,7 @@ class Street:
         for front in self.houses:
             inward = unit(front.side * np.cross(front.far - front.near, UP))
             height = rng.uniform(*low_high)
-            reflectance = rng.uniform(0.2, 0.5)
+            reflectance = rng.uniform(*HOUSE.reflectance)
             pieces.append(house(front.near, front.far, inward, height, reflectance))
         return Mesh.concatenate(pieces)
 
@@ -95,25 +119,24 @@ class Street:
         garden = fence + self.section.garden
         kerb = np.full_like(s, self.section.kerb)
         flat = np.zeros_like(s)
-        rows = [
-            (-garden, kerb, "garden"),
-            (-fence, kerb, "pavement"),
-            (-edge, kerb, "kerb"),
-            (-edge, flat, "asphalt"),
-            (flat, self.section.height(s, flat), "asphalt"),
-            (edge, flat, "kerb"),
-            (edge, kerb, "pavement"),
-            (fence, kerb, "garden"),
+        rows = [  # from left to right: place, height, reflectance of the surface to the next
+            (-garden, kerb, self.section.lawn),
+            (-fence, kerb, self.section.paving),
+            (-edge, kerb, self.section.kerbstone),
+            (-edge, flat, self.section.asphalt),
+            (flat, self.section.height(s, flat), self.section.asphalt),
+            (edge, flat, self.section.kerbstone),
+            (edge, kerb, self.section.paving),
+            (fence, kerb, self.section.lawn),
             (garden, kerb, None),
         ]
-        reflectance = {"asphalt": 0.18, "kerb": 0.35, "pavement": 0.25, "garden": 0.3}
         strips = []
-        for (x, z, surface), (next_x, next_z, _) in pairwise(rows):
+        for (x, z, reflectance), (next_x, next_z, _) in pairwise(rows):
             left = self.line.place(s, x, z)
             right = self.line.place(s, next_x, next_z)
             owned = self._owns(s[:-1], (left[:-1] + right[1:]) / 2, (x + next_x)[:-1] / 2)
             quad = (left[:-1], right[:-1], right[1:], left[1:])
-            strips.append(four_corners(*(c[owned] for c in quad), reflectance[surface]))
+            strips.append(four_corners(*(c[owned] for c in quad), reflectance))
         return Mesh.concatenate(strips)
 
     def _markings(self):
@@ -131,7 +154,7 @@ class Street:
             painted = self._owns(s[:-1], (left[:-1] + right[1:]) / 2, middle[:-1])
             painted &= s[:-1] % (dash + gap) < dash
             quad = (left[:-1], right[:-1], right[1:], left[1:])
-            yield four_corners(*(corner[painted] for corner in quad), 0.6)
+            yield four_corners(*(corner[painted] for corner in quad), self.section.white_line)
 
     def _owns(self, s, middle, lateral):
         """Which ground quads belong to their part of the way, where it crosses or repeats itself.
@@ -181,8 +204,8 @@ class Street:
         return sees(self.mesh.caster, eye, np.broadcast_to(spot.centre, eye.shape)).all()
 
     def _on_wall(self, s, side, half, rng):
-        """On a house front, 2 cm before it; None where no front reaches far enough."""
-        margin = half + 0.4
+        """On a house front; None where no front reaches far enough."""
+        margin = half + WALL_ENDS
         fronts = (front for front in self.houses if front.side == side)
         front = next((f for f in fronts if f.start + margin < s < f.end - margin), None)
         if front is None:
@@ -191,8 +214,7 @@ class Street:
         u *= -side / np.linalg.norm(u)  # so that u x UP points to the street
         share = (s - front.start) / (front.end - front.start)
         foot = front.near + share * (front.far - front.near)
-        low = max(1.2, half + 0.3)
-        centre = foot + rng.uniform(low, low + 1.0) * UP + 0.02 * np.cross(u, UP)
+        centre = foot + ON_FRONTS.draw(half, rng) * UP + ON_WALL * np.cross(u, UP)
         return TargetSpot("wall", s, side * front.lateral, centre, u, UP, foot[2])
 
     def _on_post(self, s, side, half, rng):
@@ -200,19 +222,17 @@ class Street:
         _, forward, _ = self.line.frame(s)
         u = -side * (forward - forward[2] * UP) / np.linalg.norm(forward[:2])
         edge = float(self.section.half_width(s))
-        farthest = max(0.7, min(1.1, self.section.pavement - 0.6 * half))
-        lateral = side * (edge + rng.uniform(0.6, farthest))
+        lateral = side * (edge + rng.uniform(*POST_PLACES))
         foot = self.line.place(s, lateral, self.section.kerb)
-        low = max(1.0, half + 0.2)
-        centre = foot + rng.uniform(low, low + 1.2) * UP
+        centre = foot + ON_POSTS.draw(half, rng) * UP
         return TargetSpot("post", s, lateral, centre, u, UP, foot[2])
 
     def _on_road(self, s, side, half, rng):
-        """1 cm above the carriageway, turned in its plane."""
+        """Just above the carriageway, turned in its plane."""
         edge = float(self.section.half_width(s))
-        margin = np.sqrt(2) * half + 0.05
-        low = max(0.5 * edge, margin)
-        high = min(0.73 * edge, edge - margin)
+        margin = np.sqrt(2) * half + ROAD_EDGE
+        low = max(ROAD_PLACES[0] * edge, margin)
+        high = min(ROAD_PLACES[1] * edge, edge - margin)
         lateral = side * rng.uniform(min(low, high), max(low, high))
         steps = np.array([-0.2, 0.2])
         along = self.line.place(s + steps, lateral, self.section.height(s + steps, lateral))
@@ -222,7 +242,7 @@ class Street:
         right = np.cross(forward, normal)
         spin = rng.uniform(0.0, np.pi / 2)
         u = np.cos(spin) * right + np.sin(spin) * forward
-        centre = along.mean(axis=0) + 0.01 * normal
+        centre = along.mean(axis=0) + ON_GROUND * normal
         return TargetSpot("road", s, lateral, centre, u, np.cross(normal, u), centre[2])
 
     def furniture(self, placed: Placed) -> Mesh:
@@ -236,23 +256,23 @@ class Street:
         taken: list[tuple[float, int, float]] = []
         pieces = [placed.posts]
         kinds = (
-            (self.scenario.cars, -0.05, 2.3, self._car),
-            (self.scenario.poles, 0.3, 0.2, self._lamp),
-            (self.scenario.trees, 0.7, 0.3, self._tree),
+            (self.scenario.cars, CARS, self._car),
+            (self.scenario.poles, LAMPS, self._lamp),
+            (self.scenario.trees, TREES, self._tree),
         )
         streams = self._furniture_rng.spawn(len(kinds))
-        for (density, from_kerb, extent, make), rng in zip(kinds, streams, strict=True):
+        for (density, kind, make), rng in zip(kinds, streams, strict=True):
 
-            def is_free(s, side, from_kerb=from_kerb, extent=extent):
-                crowded = any(side == b and abs(s - a) < extent + c for a, b, c in taken)
-                lateral = side * (float(self.section.half_width(s)) + from_kerb)
-                return not crowded and self._has_room(s, lateral, extent, placed)
+            def is_free(s, side, kind=kind):
+                crowded = any(side == b and abs(s - a) < kind.extent + c for a, b, c in taken)
+                lateral = side * (float(self.section.half_width(s)) + kind.across)
+                return not crowded and self._has_room(s, lateral, kind.extent, placed)
 
-            start = -SETTINGS.margin + 4.0
-            end = self.length + SETTINGS.margin - 4.0
+            start = -SETTINGS.margin + FREE_ENDS
+            end = self.length + SETTINGS.margin - FREE_ENDS
             for s, side in scatter(density, start, end, is_free, rng):
-                taken.append((s, side, extent))
-                lateral = side * (float(self.section.half_width(s)) + from_kerb)
+                taken.append((s, side, kind.extent))
+                lateral = side * (float(self.section.half_width(s)) + kind.across)
                 pieces.append(make(s, side, lateral, rng))
         return Mesh.concatenate(pieces)
 
@@ -270,10 +290,11 @@ class Street:
     def _tree(self, s, side, lateral, rng):
         _, forward, _ = self.line.frame(s)
         forward = (forward - forward[2] * UP) / np.linalg.norm(forward[:2])
-        crown = np.array([1.7, 1.1, 1.6])  # m: cut back on the side of the houses
-        return tree(self.line.place(s, lateral, self.section.kerb), forward, crown, rng)
+        foot = self.line.place(s, lateral, self.section.kerb)
+        return tree(foot, forward, np.array(CROWN), rng)
 
     def _car(self, s, side, lateral, rng):
         """Half on the pavement."""
         _, forward, right = self.line.frame(s)
-        return car(self.line.place(s, lateral, 0.05), forward, right, rng.uniform(0.1, 0.5))
+        place = self.line.place(s, lateral, CAR_LIFT)
+        return car(place, forward, right, rng.uniform(*CAR.reflectance))

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.random import Generator
 
+from mlscorr.simulate.scene._dimensions import CAR, HOUSE, LAMP, ROOT, TREE
 from mlscorr.simulate.scene.shapes import UP, Mesh, box, four_corners, post, quads
 from mlscorr.simulate.settings import SETTINGS
 
@@ -63,14 +64,11 @@ def facade(
     ground : float
         Height of the ground floor. Units: m.
     """
-    # m: height and width of what holds a window
-    storey = 3.0
-    bay = 2.6
-    rows = max(0, int((height - ground) // storey))
+    rows = max(0, int((height - ground) // HOUSE.storey))
     if rows == 0:
         return quads(corner, along, height * UP, reflectance)
-    columns = max(1, int(np.linalg.norm(along) // bay))
-    top = ground + rows * storey
+    columns = max(1, int(np.linalg.norm(along) // HOUSE.bay))
+    top = ground + rows * HOUSE.storey
     plain = quads(
         np.array([corner, corner + top * UP]),
         along,
@@ -79,28 +77,27 @@ def facade(
     )
     column, row = np.meshgrid(np.arange(columns), np.arange(rows))
     u = along / columns
-    v = storey * UP
+    v = HOUSE.storey * UP
     cell = corner + ground * UP + column.reshape(-1, 1) * u + row.reshape(-1, 1) * v
-    return Mesh.concatenate([plain, _windows(cell, u, v, 0.18 * inward, reflectance)])
+    return Mesh.concatenate([plain, _windows(cell, u, v, HOUSE.recess * inward, reflectance)])
 
 
-def _windows(cell, u, v, depth, reflectance, glass=0.1):
-    """Mesh of cells (n, 3) of a front, spanned by u and v, each with a recessed window.
-
-    glass: reflectance of a pane off its mirror direction. Units: m.
-    """
-    window = cell + 0.25 * u + 0.25 * v
-    wu = 0.5 * u
-    wv = 0.5 * v
+def _windows(cell, u, v, depth, reflectance):
+    """Mesh of cells (n, 3) of a front, spanned by u and v, each with a recessed window. m."""
+    frame = HOUSE.frame
+    far = frame + HOUSE.window
+    window = cell + frame * u + frame * v
+    wu = HOUSE.window * u
+    wv = HOUSE.window * v
     frame_and_reveal = [
-        quads(cell, u, 0.25 * v, reflectance),
-        quads(cell + 0.75 * v, u, 0.25 * v, reflectance),
-        quads(cell + 0.25 * v, 0.25 * u, wv, reflectance),
-        quads(cell + 0.25 * v + 0.75 * u, 0.25 * u, wv, reflectance),
+        quads(cell, u, frame * v, reflectance),
+        quads(cell + far * v, u, frame * v, reflectance),
+        quads(cell + frame * v, frame * u, wv, reflectance),
+        quads(cell + frame * v + far * u, frame * u, wv, reflectance),
         *(quads(edge, wu, depth, reflectance) for edge in (window, window + wv)),
         *(quads(edge, wv, depth, reflectance) for edge in (window, window + wu)),
     ]
-    return Mesh.concatenate([*frame_and_reveal, quads(window + depth, wu, wv, glass)])
+    return Mesh.concatenate([*frame_and_reveal, quads(window + depth, wu, wv, HOUSE.glass)])
 
 
 def house(
@@ -124,23 +121,22 @@ def house(
         Of the eaves above the lower corner. Units: m.
     reflectance : float
     """
-    # m: from front to back, and of the roof above the eaves
-    depth = 8.0
-    ridge = 2.5
-    base = np.array([near[0], near[1], min(near[2], far[2]) - 0.5])
+    base = np.array([near[0], near[1], min(near[2], far[2]) - HOUSE.base])
     along = (far - near) * [1.0, 1.0, 0.0]
-    height = height + 0.5
-    is_house = height - 0.5 >= 5.0  # m; a lower one is a wall
-    back = (depth if is_house else 0.3) * inward
+    height = height + HOUSE.base
+    is_house = height - HOUSE.base >= HOUSE.lowest
+    back = (HOUSE.depth if is_house else HOUSE.wall_depth) * inward
     ends = quads(np.array([base, base + along]), back, height * UP, reflectance)
     if not is_house:
         top = quads(base + height * UP, along, back, reflectance)
         return Mesh.concatenate([quads(base, along, height * UP, reflectance), ends, top])
-    ground = 3.2 + 0.5 + abs(far[2] - near[2])  # windows start above both corners
+    ground = (
+        HOUSE.ground_floor + HOUSE.base + abs(far[2] - near[2])
+    )  # windows start above both corners
     eaves = np.array([base + height * UP, base + height * UP + back])
-    slopes = np.array([back / 2 + ridge * UP, -back / 2 + ridge * UP])
-    roof = quads(eaves, along, slopes, 0.3)
-    gable = eaves[0] + np.array([0.0 * back, back, back / 2 + ridge * UP])
+    slopes = np.array([back / 2 + HOUSE.ridge * UP, -back / 2 + HOUSE.ridge * UP])
+    roof = quads(eaves, along, slopes, HOUSE.roof)
+    gable = eaves[0] + np.array([0.0 * back, back, back / 2 + HOUSE.ridge * UP])
     gables = Mesh(np.array([gable, gable + along]), np.full(2, reflectance))
     return Mesh.concatenate(
         [facade(base, along, height, inward, reflectance, ground), ends, roof, gables]
@@ -163,17 +159,18 @@ def leaves(
     count : int
     rng : Generator
     """
-    edge = 0.2  # m, of a leaf: a bunch of real ones, so that hundreds fill a crown
     place = rng.standard_normal((count, 3))
-    place *= rng.uniform(0.1, 1.0, (count, 1)) ** (1 / 3) / np.linalg.norm(
+    place *= rng.uniform(TREE.hollow, 1.0, (count, 1)) ** (1 / 3) / np.linalg.norm(
         place, axis=1, keepdims=True
     )
     middle = centre + (place * radii) @ np.array([forward, np.cross(forward, UP), UP])
     corners = rng.standard_normal((count, 3, 3))
     corners -= corners.mean(axis=1, keepdims=True)
-    corners *= edge / np.linalg.norm(corners, axis=2, keepdims=True).mean(axis=1, keepdims=True)
-    reflectance = rng.uniform(0.35, 0.6, count)  # of green leaves at 905 nm
-    return Mesh(middle[:, None] + 0.58 * corners, reflectance)
+    corners *= TREE.leaf / np.linalg.norm(corners, axis=2, keepdims=True).mean(
+        axis=1, keepdims=True
+    )
+    reflectance = rng.uniform(*TREE.leaf_reflectance, count)
+    return Mesh(middle[:, None] + TREE.leaf_scale * corners, reflectance)
 
 
 def tree(foot: np.ndarray, forward: np.ndarray, crown: np.ndarray, rng: Generator) -> Mesh:
@@ -191,20 +188,16 @@ def tree(foot: np.ndarray, forward: np.ndarray, crown: np.ndarray, rng: Generato
         Half axes along forward, across it, upright. Units: m.
     rng : Generator
     """
-    bark = 0.25  # reflectance
-    trunk = rng.uniform(2.9, 3.4)
+    trunk = rng.uniform(*TREE.trunk)
     middle = foot + (trunk + crown[2]) * UP
-    count = int(min(1500, rng.uniform(150.0, 320.0) * np.prod(crown)))
-    return Mesh.concatenate(
-        [
-            post(foot - 0.3 * UP, trunk + 0.3 + crown[2], rng.uniform(0.18, 0.3), bark),
-            leaves(middle, crown, forward, count, rng),
-        ]
-    )
+    count = int(min(TREE.most_leaves, rng.uniform(*TREE.density) * np.prod(crown)))
+    thickness = rng.uniform(*TREE.thickness)
+    stem = post(foot - ROOT * UP, trunk + ROOT + crown[2], thickness, TREE.bark)
+    return Mesh.concatenate([stem, leaves(middle, crown, forward, count, rng)])
 
 
 def lamp(foot: np.ndarray, towards: np.ndarray) -> Mesh:
-    """Mesh of a street lamp of 6 m on its foot (3,), its arm along the unit vector `towards`.
+    """Mesh of a street lamp on its foot (3,), its arm along the unit vector `towards`.
 
     Parameters
     ----------
@@ -214,8 +207,15 @@ def lamp(foot: np.ndarray, towards: np.ndarray) -> Mesh:
         Unit vector of its arm.
     """
     side = np.cross(UP, towards)
-    arm = box(foot + 5.9 * UP - 0.1 * side, 1.2 * towards, 0.2 * side, 0.12 * UP, 0.3)
-    return Mesh.concatenate([post(foot - 0.3 * UP, 6.3, 0.14, 0.3), arm])
+    arm = box(
+        foot + (LAMP.height - LAMP.arm_drop) * UP - LAMP.arm_width / 2 * side,
+        LAMP.arm * towards,
+        LAMP.arm_width * side,
+        LAMP.arm_depth * UP,
+        LAMP.reflectance,
+    )
+    mast = post(foot - ROOT * UP, LAMP.height + ROOT, LAMP.width, LAMP.reflectance)
+    return Mesh.concatenate([mast, arm])
 
 
 def car(place: np.ndarray, forward: np.ndarray, right: np.ndarray, reflectance: float) -> Mesh:
@@ -229,17 +229,17 @@ def car(place: np.ndarray, forward: np.ndarray, right: np.ndarray, reflectance: 
         Unit vector.
     reflectance : float
     """
-    width = 1.7  # m
-    ahead = np.array([-2.1, 2.1, 2.1, 1.15, 0.45, -1.1, -1.8, -2.1])[:, None]  # m from its middle
-    above = np.array([0.25, 0.25, 0.65, 0.85, 1.4, 1.42, 0.95, 0.85])[:, None]  # m, of the ground
+    ahead = np.array(CAR.ahead)[:, None]
+    above = np.array(CAR.above)[:, None]
     outline = place + ahead * forward + above * UP
-    middle = place + 0.7 * UP
-    near = outline - width / 2 * right
-    far = outline + width / 2 * right
+    middle = place + CAR.middle * UP
+    half = CAR.width / 2 * right
+    near = outline - half
+    far = outline + half
     skin = four_corners(near, np.roll(near, -1, 0), np.roll(far, -1, 0), far, reflectance)
     sides = [
         np.stack([np.broadcast_to(m, s.shape), s, np.roll(s, -1, 0)], axis=1)
-        for m, s in ((middle - width / 2 * right, near), (middle + width / 2 * right, far))
+        for m, s in ((middle - half, near), (middle + half, far))
     ]
     sides = np.concatenate(sides)
     return Mesh.concatenate([skin, Mesh(sides, np.full(len(sides), reflectance))])

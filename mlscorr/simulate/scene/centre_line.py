@@ -14,6 +14,14 @@ from mlscorr.simulate.scene.shapes import UP
 from mlscorr.simulate.settings import SETTINGS
 from mlscorr.simulate.vehicle import VEHICLES
 
+# A winding line
+BENDS = ((0.85, 1.0), (0.15, 2.2))  # share of the swing, and waves along the line, of two waves
+LEAST_BEND = 24.0  # m along the line for a radian of the longer wave
+STEEPEST_WAVE = 1.3  # largest slope of the two waves together: 0.85 + 0.15 * 2.2, and some more
+SLOPE = 0.03  # rise over run of a street from its start to its end, at most
+HILL = 1.2  # m, from the mean height of a street to a top
+LEAST_HILL, HILL_TIME = 40.0, 5.0  # m and s, for a radian of the hills: at most 3 %
+
 
 @dataclass(frozen=True)
 class CentreLine:
@@ -130,18 +138,19 @@ def winding_line(
         Units: m/s.
     """
     phase = rng.uniform(0.0, 2 * np.pi, 4)
-    slope = rng.uniform(-0.03, 0.03)
+    slope = rng.uniform(-SLOPE, SLOPE)
     swing = np.radians(turns)
     tightest = max(VEHICLES[kind].tightest_bend, speed**2 / SETTINGS.comfort)
-    bend = max(24.0, 1.3 * swing * tightest)  # m along the line for a radian of the wave
+    bend = max(LEAST_BEND, STEEPEST_WAVE * swing * tightest)
     s = np.arange(-SETTINGS.margin, length + SETTINGS.margin + 1.0)
-    wave = 0.85 * np.sin(s / bend + phase[0]) + 0.15 * np.sin(2.2 * s / bend + phase[1])
+    (long, first), (short, second) = BENDS
+    wave = long * np.sin(first * s / bend + phase[0]) + short * np.sin(second * s / bend + phase[1])
     heading = phase[3] + swing * wave
-    hill = max(40.0, 5.0 * speed)
+    hill = max(LEAST_HILL, HILL_TIME * speed)
     if kind == "river":
         height = np.zeros_like(s)
     else:
-        height = 1.2 * np.sin(s / hill + phase[2]) + slope * s
+        height = HILL * np.sin(s / hill + phase[2]) + slope * s
     plan = cumulative_trapezoid(np.column_stack([np.sin(heading), np.cos(heading)]), s, axis=0)
     curve = CubicSpline(s, np.column_stack([np.vstack([np.zeros(2), plan]), height]))
     return CentreLine(CubicSpline(s, curve(s) - curve(0.0)))

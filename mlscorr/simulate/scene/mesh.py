@@ -11,9 +11,13 @@ from scipy.ndimage import gaussian_filter1d
 
 from mlscorr.io.clouds import announced_faces
 from mlscorr.simulate.scenario import Scenario, SceneScenario
+from mlscorr.simulate.scene._dimensions import TargetHeight
 from mlscorr.simulate.scene.centre_line import CentreLine
 from mlscorr.simulate.scene.placing import Placed, TargetSpot, eyes
 from mlscorr.simulate.scene.shapes import UP, Mesh, sees
+
+ON_POSTS = TargetHeight(least=1.0, below=0.3, span=1.0)  # m
+STEEPEST = 1.5  # m, by which a post's foot may be above or below the way
 
 
 def read_mesh(scene: SceneScenario, origin: ArrayLike) -> Mesh:
@@ -228,13 +232,12 @@ class MeshSite:
         """
         _, forward, _ = self.line.frame(s)
         u = -side * (forward - forward[2] * UP) / np.linalg.norm(forward[:2])
-        low = max(1.0, half + 0.3)
         for lateral in side * rng.uniform(*self.beside, 8):
             foot = self.line.place(s, lateral, 0.0)
             ground = self._ground.nearest(foot[None])[0]
-            if not np.isfinite(ground) or abs(ground - foot[2]) > 1.5:
+            if not np.isfinite(ground) or abs(ground - foot[2]) > STEEPEST:
                 continue
-            centre = np.array([*foot[:2], ground + rng.uniform(low, low + 1.0)])
+            centre = np.array([*foot[:2], ground + ON_POSTS.draw(half, rng)])
             if (
                 self._is_free(centre, s, half, u)
                 and self.line.distance(centre) > self.beside[0] - 0.5

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.random import Generator
 
 from mlscorr.simulate.scenario import TargetScenario
+from mlscorr.simulate.scene._dimensions import ROOT, TARGET_POST
 from mlscorr.simulate.scene._things import target
 from mlscorr.simulate.scene.centre_line import CentreLine
 from mlscorr.simulate.scene.shapes import UP, Mesh, box, post
@@ -223,21 +224,26 @@ def _choose_hidden(spots, share, rng):
     return hidden
 
 
-def _own_post(spot, size, width=0.06):
-    """The post of a width (m) behind a target, from the ground to its upper edge."""
-    foot = spot.centre - width * spot.normal
-    foot[2] = spot.ground - 0.3
-    return post(foot, spot.centre[2] + size / 2 - foot[2], width, 0.3)
+def _own_post(spot, size):
+    """The post behind a target, from the ground to its upper edge."""
+    foot = spot.centre - TARGET_POST.width * spot.normal
+    foot[2] = spot.ground - ROOT
+    height = spot.centre[2] + size / 2 - foot[2]
+    return post(foot, height, TARGET_POST.width, TARGET_POST.reflectance)
 
 
-def _slat(spot, kind, size, rng, distance=0.15, depth=0.02):
-    """An upright slat close in front of a target (m), flat: it hides 20 to 40 % of it."""
-    width = size * rng.uniform(*{"circle": (0.17, 0.25), "square": (0.23, 0.33)}[kind])
-    lateral = size * rng.uniform(-0.06, 0.06)
-    corner = spot.centre + distance * spot.normal + (lateral - width / 2) * spot.u
-    corner[2] = spot.ground - 0.3
-    height = spot.centre[2] + _half(kind, size) + 0.1 - corner[2]
-    return box(corner, width * spot.u, height * UP, depth * spot.normal, 0.3)
+def _slat(spot, kind, size, rng):
+    """An upright slat close in front of a target, flat: it hides a part of it."""
+    shares = TARGET_POST.slat_circle if kind == "circle" else TARGET_POST.slat_square
+    width = size * rng.uniform(*shares)
+    offset = TARGET_POST.slat_offset
+    lateral = size * rng.uniform(-offset, offset)
+    corner = spot.centre + TARGET_POST.slat_distance * spot.normal
+    corner = corner + (lateral - width / 2) * spot.u
+    corner[2] = spot.ground - ROOT
+    height = spot.centre[2] + _half(kind, size) + TARGET_POST.slat_over - corner[2]
+    depth = TARGET_POST.slat_depth * spot.normal
+    return box(corner, width * spot.u, height * UP, depth, TARGET_POST.reflectance)
 
 
 def eyes(line: CentreLine, s: float) -> np.ndarray:

@@ -60,7 +60,7 @@ def test_a_target_elsewhere_is_another(drive):
     "One that stands more than half its size away is not the one that was expected"
     centre = CENTRE + np.array([0.0, 0.5, 0.2])
     cloud = wall(np.random.default_rng(1), centre=centre)
-    assert np.linalg.norm(centre - CENTRE) > SETTINGS.same * SIZE
+    assert np.linalg.norm(centre - CENTRE) > SETTINGS.largest_offset * SIZE
     assert fit(cloud, drive) is None
 
 

@@ -52,7 +52,7 @@ def test_a_refined_event_counts_over_none_as_all_models_have_it(study, seed):
         gain = weigh_blocks(evidence.observations, models, residual, event.table).gain
         by_all = np.logaddexp.reduce(event.table.weighed(gain)[:, 0])
         members = [s for s in signs if s.name == event.signature.name]
-        expected = by_all - np.log(len(members) * SETTINGS.cell)
+        expected = by_all - np.log(len(members) * SETTINGS.event_cell)
         assert event.gain == pytest.approx(expected, abs=1.0)
 
 
