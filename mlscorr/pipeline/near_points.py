@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from mlscorr.evaluate import BeamCheck
 from mlscorr.io.surveys import ProjectParts
-from mlscorr.pipeline.beam_origin import with_beam_origin
+from mlscorr.pipeline.beams import with_beam_origin
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.survey import CloudFile, PointCloud, Survey, SurveyFileError, counted
 from mlscorr.targets import BY_EDGES, Candidates, search_radius, why_useless
