@@ -30,10 +30,9 @@ from mlscorr.estimate import believed_correction, estimate_correction
 from mlscorr.estimate._tie_equations import TieEquations
 from mlscorr.io.clouds import read_chunks
 from mlscorr.pipeline.finding import find_control
-from mlscorr.pipeline.tying import tie_passes
 from mlscorr.simulate import read_scenario, simulate
 from mlscorr.survey import PAINTED, Ties, Trajectory
-from mlscorr.ties import TieCollector
+from mlscorr.ties import TieCollector, tie_passes
 
 POINTS_PER_LINE = 400  # of 700: a survey takes two minutes
 DURATION = 150.0  # s of each pass
@@ -100,7 +99,8 @@ def read(survey):
             collector.add(file, chunk)
             yield chunk
 
-    return find_control(survey, None, None, chunks)[0], collector.features()
+    control, _ = find_control(survey, None, None, chunks).matches.by_role(survey)
+    return control, collector.features()
 
 
 def some_control(matched, number):

@@ -25,7 +25,6 @@ from mlscorr.gap.evidence import infer_causes
 from mlscorr.gap.residuals import background, find_patches
 from mlscorr.gap.residuals._shared_planes import shared_rows
 from mlscorr.gap.signatures import signatures
-from mlscorr.pipeline.tied_calibration import tie_mounting
 from mlscorr.survey import (
     CloudFile,
     ControlPoints,
@@ -37,7 +36,7 @@ from mlscorr.survey import (
     Survey,
     Trajectory,
 )
-from mlscorr.ties import TieCollector
+from mlscorr.ties import TieCollector, tie_mounting
 
 DATA = SHARED / "routescene_uav"
 FILES = "{}_points_time_derived.npz"  # of the name of a scene

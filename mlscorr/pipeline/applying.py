@@ -17,9 +17,9 @@ from mlscorr.io.store import document, output_folder, write_json
 from mlscorr.io.surveys import FILE_NAME, write_survey_copy
 from mlscorr.io.trajectories import write_trajectory_csv
 from mlscorr.pipeline.clouds import write_clouds
+from mlscorr.pipeline.control_checks import remounting_fault
 from mlscorr.pipeline.finding import silent
 from mlscorr.pipeline.found_effects import CLOCK, DATUM, MOUNTING, TAKEN_OUT, FoundEffects
-from mlscorr.pipeline.near_points import remounting_fault
 from mlscorr.survey import Summary, Survey, SurveyFileError, check_survey
 
 

@@ -3,21 +3,35 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from mlscorr.estimate import Calibration
+from mlscorr.estimate import (
+    Calibration,
+    believed_mounting,
+    control_fault,
+    estimate_mounting,
+    with_scanner_errors,
+)
 from mlscorr.evaluate import SEEN_BY_OTHERS, misfit_section, unseen_rows
 from mlscorr.io.clouds import sample_gps_times
 from mlscorr.matching import Refusal
 from mlscorr.pipeline.calibrated_survey import CalibratedSurvey, CalibrationResult, estimate_section
-from mlscorr.pipeline.near_points import remounting_fault, reuse_warnings
+from mlscorr.pipeline.control_checks import remounting_fault, reuse_warnings
+from mlscorr.pipeline.finding import Finding, find_control, find_or_compare_surfaces, read_into
 from mlscorr.pipeline.settings import SETTINGS
-from mlscorr.pipeline.tied_calibration import estimate_site
-from mlscorr.survey import Survey, SurveyFileError, check_survey
+from mlscorr.survey import Matched, Survey, SurveyFileError, TieFeatures, check_survey
+from mlscorr.ties import TieCollector, tie_mounting
+
+NOTHING_CALIBRATES = (
+    "{} has nothing to calibrate with: {} control points were found (at least 3 are needed, at "
+    "more than one time), and no two passes saw the same planes. A single pass without control "
+    "shows everything once, as its mounting puts it. Drive the way back as well, or survey control "
+    "points on both sides of the way, near and far."
+)
 
 
 def calibrate(
@@ -49,7 +63,8 @@ def calibrate(
     Raises
     ------
     ValueError
-        Without a mounting, for clouds that are not as it puts them, and as ``estimate_site``.
+        Without a mounting, for clouds that are not as it puts them, and as
+        ``calibrate_together``.
 
     >>> import mlscorr, numpy as np, tempfile, warnings
     >>> from mlscorr.simulate import Scenario, simulate
@@ -77,8 +92,21 @@ def calibrate(
                 "(m) and boresight (deg) that the cloud was georeferenced with. Add that section."
             )
         warn_of_scanners(part)
-    ties = survey.use_ties if ties is None else ties
-    control, check, finding, calibration = estimate_site(survey, ties, rng, progress)
+    if ties is None:
+        ties = survey.use_ties
+
+    if ties:
+        collector = TieCollector(survey)
+        read = read_into(collector.add)
+        finding, notes = find_or_compare_surfaces(survey, read, None, progress, rng)
+        features = collector.features()
+    else:
+        finding = find_control(survey, rng, progress)
+        features = None
+        notes = ()
+    control, check = _numbered(survey, finding)
+    calibration = calibrate_together(survey, control, features, notes)
+
     parts = _parts(survey, control, check, finding, calibration)
     for name, part in parts.items():
         for sentence in part.warnings:
@@ -95,6 +123,58 @@ def _title(name):
     if name:
         return f"Scanner {name}: "
     return ""
+
+
+def _numbered(survey: Survey, finding: Finding) -> Iterator[Matched]:
+    """The matched control points, then the check points, with the numbers of their scanners."""
+    of_pass = finding.scanners(survey)
+    for matched in finding.matches.by_role(survey):
+        scanner = [of_pass[number] for number in matched.observations.pass_number]
+        yield replace(matched, scanner=np.array(scanner, int))
+
+
+def calibrate_together(
+    survey: Survey, control: Matched, features: TieFeatures | None, notes: Sequence[str] = ()
+) -> Calibration:
+    """All mountings of a survey by matched control points, and by what was seen twice.
+
+    Parameters
+    ----------
+    survey : Survey
+        With a mounting of each scanner.
+    control : Matched
+        With the numbers of the scanners.
+    features : TieFeatures or None
+        None where ties are left out.
+    notes : sequence of str
+        Sentences on targets that were not found, for the error.
+
+    Raises
+    ------
+    ValueError
+        Where a scanner saw less than 3 control points, or all of them at one time, and nothing that
+        was seen twice, or ties are not wanted.
+    """
+    faults = [control_fault(control, number) for number in range(len(survey.mountings))]
+    if all(faults):
+        estimate = believed_mounting
+    else:
+        estimate = estimate_mounting
+    calibration = estimate(survey.trajectory, survey.mountings, control, survey.pos)
+    if features is not None:
+        calibration = tie_mounting(survey, calibration, control, features)
+    for number, (name, fault) in enumerate(zip(survey.by_scanner, faults, strict=True)):
+        own = None
+        if calibration.ties is not None:
+            own = calibration.ties.of_scanner(number)
+        if not fault or (own is not None and own.used.any()):
+            continue
+        if features is None:
+            raise ValueError(f"{_title(name)}{fault}")
+        count = len(set(control[control.scanner == number].name))
+        nothing = NOTHING_CALIBRATES.format(survey.path, count)
+        raise ValueError(_title(name) + " ".join([nothing, *notes]))
+    return with_scanner_errors(calibration, control)
 
 
 def _parts(survey, control, check, finding, calibration):
@@ -114,7 +194,11 @@ def _parts(survey, control, check, finding, calibration):
         scanned = finding.scanned.difference(others)
         missing = unseen_rows(part, refusals, finding.candidates, scanned)
         view = calibration.of(number, control.scanner)
-        sentences = *(view.own_warnings if name else view.warnings), *reuse_warnings(survey)
+        if name:
+            sentences = view.own_warnings
+        else:
+            sentences = view.warnings
+        sentences = (*sentences, *reuse_warnings(survey))
         parts[name] = CalibratedSurvey(part, view, *matched, missing, sentences)
     return parts
 

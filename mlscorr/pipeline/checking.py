@@ -23,9 +23,9 @@ from mlscorr.io.tables import far_cloud
 from mlscorr.io.trajectories import crs_code, crs_name
 from mlscorr.matching import SETTINGS as MATCHING
 from mlscorr.pipeline import needs
+from mlscorr.pipeline.control_checks import check_control, reuse_warnings
 from mlscorr.pipeline.faults import Fault, Faults, find_faults
 from mlscorr.pipeline.finding import find_control
-from mlscorr.pipeline.near_points import check_control, reuse_warnings
 from mlscorr.pipeline.quick_look import QuickLook, look_near_control
 from mlscorr.survey import ControlPoints, Matched, Survey
 
@@ -237,10 +237,11 @@ def _looked(
         if is_beside:
             faults.add("data", probe.refusal)
         else:
-            parts = faults.of("data", find_control, survey)
-            if parts is not None:
+            finding = faults.of("data", find_control, survey)
+            if finding is not None:
                 points = survey.surveyed
-                matched = parts[0] + parts[1]
+                control, check_points = finding.matches.by_role(survey)
+                matched = control + check_points
     elif probe.doubt:
         faults.warn(probe.doubt)
     control = matched[np.isin(matched.name, survey.control.name)]

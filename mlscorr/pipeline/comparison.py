@@ -9,11 +9,11 @@ import numpy as np
 from mlscorr.baselines import Undetermined
 from mlscorr.evaluate import Statistics, misclosures, unseen_rows
 from mlscorr.pipeline.compared_survey import ComparedSurvey
+from mlscorr.pipeline.control_checks import reuse_warnings
+from mlscorr.pipeline.correction import observe_survey, tie_use
 from mlscorr.pipeline.finding import silent
 from mlscorr.pipeline.methods import METHODS, Observed, load_open3d
-from mlscorr.pipeline.near_points import reuse_warnings
 from mlscorr.pipeline.settings import SETTINGS
-from mlscorr.pipeline.tying import observe_survey, tie_use
 from mlscorr.survey import Survey, check_survey
 
 
@@ -54,9 +54,8 @@ def compare(
     True
     """
     check_survey(survey)
-    survey, control, check, finding, features = observe_survey(
-        survey, tie_use(survey, None), rng, progress
-    )
+    survey, finding, features = observe_survey(survey, tie_use(survey, None), rng, progress)
+    control, check = finding.matches.by_role(survey)
     for sentence in reuse_warnings(survey):
         warnings.warn(sentence, stacklevel=2)
     observed = Observed(survey, finding.candidates, features)

@@ -2,17 +2,39 @@
 
 import warnings
 from collections.abc import Callable
-from typing import Any
+from dataclasses import replace
+from typing import Any, Literal, get_args
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
-from mlscorr.estimate import SETTINGS, Estimate
+from mlscorr.estimate import (
+    SETTINGS,
+    Estimate,
+    believed_correction,
+    check_order,
+    estimate_correction,
+    find_mounting_error,
+    mounting_warnings,
+    scanner_warnings,
+)
 from mlscorr.evaluate import datum_differences, unseen_rows
+from mlscorr.pipeline.control_checks import reuse_warnings
 from mlscorr.pipeline.corrected_survey import CorrectedSurvey
-from mlscorr.pipeline.finding import Finding
-from mlscorr.pipeline.near_points import reuse_warnings
-from mlscorr.pipeline.tying import TieUse, estimate_survey
-from mlscorr.survey import Matched, Survey, check_survey
+from mlscorr.pipeline.finding import Finding, find_control, find_or_compare_surfaces, read_into
+from mlscorr.survey import Matched, Survey, TieFeatures, check_survey
+from mlscorr.ties import TieCollector, tie_passes
+
+TieUse = Literal["auto", "off", "only"]
+
+NOTHING_TIED = (
+    "No two passes of {} saw the same thing, so ties alone correct nothing. Drive the street "
+    "twice, or survey control points."
+)
+LEFT_OUT = (
+    'What two passes both saw was left out, as asked: --no-ties, or use = "off" of [ties] in '
+    "survey.toml."
+)
 
 
 def correct(
@@ -48,7 +70,8 @@ def correct(
     Raises
     ------
     ValueError
-        When no target is found or matched.
+        When no target is found or matched, for another use of ties, an order that is none, and
+        where ties alone are asked for and there is none.
 
     >>> import mlscorr, numpy as np, tempfile
     >>> from mlscorr.simulate import Scenario, simulate
@@ -64,13 +87,134 @@ def correct(
     True
     """
     check_survey(survey)
-    survey, control, check, finding, estimate = estimate_survey(survey, order, ties, rng, progress)
+    ties = tie_use(survey, ties)
+    check_order(order)
+    if ties == "only":
+        survey = without_control(survey)
+
+    survey, finding, features = observe_survey(survey, ties, rng, progress)
+    control, check = finding.matches.by_role(survey)
+    estimate = estimate_together(survey, control, features, order)
+    if ties == "only" and estimate.ties is None:
+        raise ValueError(f"{NOTHING_TIED.format(survey.path)} {estimate.untied}")
+
     result = CorrectedSurvey(**corrected_fields(survey, control, check, finding, estimate))
     others = result.warnings[len(finding.warnings) :]  # those of the finding were told meanwhile
     datum = (difference.sentence for difference in result.datum)
     for sentence in (*others, *datum, *estimate.warnings):
         warnings.warn(sentence, stacklevel=2)
     return result
+
+
+def tie_use(survey: Survey, ties: TieUse | None) -> TieUse:
+    """Use of ties that is asked for; what survey.toml states where nothing is.
+
+    Parameters
+    ----------
+    survey : Survey
+    ties : str or None
+        As of ``correct``.
+
+    Raises
+    ------
+    ValueError
+        For another use than there is.
+    """
+    if ties is None:
+        if survey.use_ties:
+            return "auto"
+        return "off"
+    if ties not in get_args(TieUse):
+        known = ", ".join(map(repr, get_args(TieUse)))
+        raise ValueError(f"ties = {ties!r} is no use of ties: give one of {known}, or None.")
+    return ties
+
+
+def without_control(survey: Survey) -> Survey:
+    """The survey with all its surveyed points as check points.
+
+    Parameters
+    ----------
+    survey : Survey
+    """
+    return replace(survey, control=survey.control[[]], check=survey.surveyed)
+
+
+def observe_survey(
+    survey: Survey,
+    ties: TieUse,
+    rng: np.random.Generator | None = None,
+    progress: Callable | None = None,
+) -> tuple[Survey, Finding, TieFeatures | None]:
+    """Read a survey's clouds once, for its targets and for the features that may tie its passes.
+
+    Parameters
+    ----------
+    survey : Survey
+    ties : str
+        ``only``: no control point is needed.
+    rng, progress
+        As of ``find_targets``.
+
+    Returns
+    -------
+    survey : Survey
+        Its trajectory knows the seconds in which points lie.
+    finding : Finding
+        With a control point at least, but where ties alone are asked for.
+    features : TieFeatures or None
+        None where ties are off.
+
+    Raises
+    ------
+    ValueError
+        As ``find_control``.
+    """
+    collector = TieCollector(survey)
+    if ties == "off":
+        finding = find_control(survey, rng, progress)
+        features = None
+    elif ties == "auto":
+        finding = find_control(survey, rng, progress, read_into(collector.add))
+        features = collector.features()
+    else:
+        read = read_into(collector.add)
+        finding, _ = find_or_compare_surfaces(survey, read, None, progress)
+        features = collector.features()
+    trajectory = survey.trajectory.scanned_at(finding.candidates.seconds)
+    return replace(survey, trajectory=trajectory), finding, features
+
+
+@threadpool_limits.wrap(limits=1, user_api="blas")  # more threads, other last digits
+def estimate_together(
+    survey: Survey, control: Matched, features: TieFeatures | None, order: int
+) -> Estimate:
+    """The POS error by matched control points, and by what two passes both saw.
+
+    Parameters
+    ----------
+    survey : Survey
+    control : Matched
+        Without any, ties alone bring passes together where the POS says that they are.
+    features : TieFeatures or None
+        None where ties are left out.
+    order : int
+        Of the trend.
+    """
+    if len(control):
+        estimate = estimate_correction(survey.trajectory, control, survey.pos, order)
+    else:
+        estimate = believed_correction(survey.trajectory, survey.pos)
+    if features is None:
+        return replace(estimate, untied=LEFT_OUT)
+    estimate = tie_passes(survey, estimate, features)
+    sentences = ()  # on mountings, where the ties tell of wrong ones
+    if estimate.equations.mounting is not None:
+        sentences = tuple(scanner_warnings(estimate, list(survey.by_scanner)))
+    if not sentences and None not in survey.mountings:  # all of them may be wrong alike
+        error = find_mounting_error(estimate, control, survey.mountings)
+        sentences = mounting_warnings(error, len(survey.mountings))
+    return replace(estimate, notes=(*estimate.notes, *sentences))
 
 
 def corrected_fields(

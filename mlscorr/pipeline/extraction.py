@@ -14,7 +14,7 @@ import numpy as np
 from mlscorr.io.clouds import read_chunks
 from mlscorr.io.store import document, output_folder, write_json
 from mlscorr.io.tables import write_extracted_csv
-from mlscorr.pipeline.beam_origin import with_beam_origin
+from mlscorr.pipeline.beams import with_beam_origin
 from mlscorr.pipeline.finding import Finding, fit_while_reading, match_targets, silent, unmatched
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.survey import Summary, Survey, TargetObservations, check_rng, check_survey, rows_frame

@@ -56,17 +56,19 @@ def find_in_file(survey: Survey, origin: np.ndarray, with_ties: bool = True) -> 
         Whether planes and poles are looked for.
     """
     collector = TieCollector(survey, origin=origin)
-    read = read_into(collector.add) if with_ties else read_chunks
+    if with_ties:
+        read = read_into(collector.add)
+    else:
+        read = read_chunks
     fitted, candidates, near = fit_while_reading(survey, read)
     segments = {number: segment for (_, segment), number in candidates.passes.items()}
     features = collector.features()
     numbers = [segments[number] for number in features.pass_number.tolist()]
-    names = survey.surveyed.name
     return FileFinding(
         starts={segment: start for (_, segment), start in candidates.starts.items()},
         targets=[(segments[number], target) for number, target in fitted],
         unplaced=candidates.unplaced,
-        scanned=frozenset(names[i] for i in np.flatnonzero(near.is_scanned)),
+        scanned=near.scanned,
         warnings=tuple(near.warnings()),
         uncovered=tuple(near.beams.outside()),
         features=replace(features, pass_number=np.array(numbers, int)),

@@ -1,18 +1,22 @@
 """From cloud files to matched targets: read, fit, match."""
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from operator import itemgetter
 
 import numpy as np
+from scipy.spatial import cKDTree
 
+from mlscorr.evaluate import BeamCheck
 from mlscorr.io.clouds import read_chunks
 from mlscorr.matching import Matches, match
-from mlscorr.pipeline.near_points import NearPoints, check_control, no_control, nothing_found
+from mlscorr.pipeline.beams import with_beam_origin
+from mlscorr.pipeline.control_checks import check_control
 from mlscorr.pipeline.settings import SETTINGS
-from mlscorr.survey import Matched, PointCloud, Survey, check_rng
+from mlscorr.survey import CloudFile, PointCloud, Survey, check_rng, counted
 from mlscorr.targets import (
+    BY_EDGES,
     NO_POINTS,
     Candidates,
     FittedTarget,
@@ -21,6 +25,8 @@ from mlscorr.targets import (
     collect,
     distinct,
     fit_near_control,
+    search_radius,
+    why_useless,
 )
 
 
@@ -61,6 +67,143 @@ class Finding:
         return {number: int(numbers[key[0]]) for key, number in self.candidates.passes.items()}
 
 
+class NearPoints:
+    """Points near surveyed points that were looked at: their number and intensities.
+
+    Attributes
+    ----------
+    beams : BeamCheck
+    is_scanned : (b,) bool array
+        Which surveyed points have points about them.
+    is_present : (65536,) bool array
+        Which intensities they have.
+    points : int
+    of_file : dict
+        The survey of each CloudFile about which something was asked, with the place of its scanner.
+
+    Parameters
+    ----------
+    survey : Survey
+    """
+
+    def __init__(self, survey: Survey):
+        self.beams = BeamCheck(survey)
+        self.points = 0
+        self.survey = survey
+        self.of_file = {}
+        self.is_scanned = np.zeros(len(survey.surveyed), bool)
+        self.is_present = np.zeros(1 << 16, bool)
+
+    @property
+    def intensity_range(self) -> str:
+        """The darkest and the brightest, in words."""
+        present = np.flatnonzero(self.is_present)
+        return f"intensity {present[0]} to {present[-1]}"
+
+    @property
+    def scanned(self) -> frozenset[str]:
+        """Names of the surveyed points that have points about them."""
+        names = self.survey.surveyed.name
+        return frozenset(names[i] for i in np.flatnonzero(self.is_scanned))
+
+    def survey_of(self, file: CloudFile) -> Survey:
+        """The survey of the scanner that wrote a file, with the scanner's place.
+
+        Parameters
+        ----------
+        file : CloudFile
+        """
+        if file not in self.of_file:
+            self.of_file[file] = with_beam_origin(self.survey.of(file), file)
+        return self.of_file[file]
+
+    def warnings(self) -> Iterator[str]:
+        """Sentences on files whose beams can't have been measured so, or come from nowhere."""
+        yield from self.beams.warnings()
+        for file, survey in self.of_file.items():
+            if survey.mounting is None and survey.beam_origin is None:
+                yield (
+                    f"{survey.path} gives no [mounting], and the beams of {file.name} don't show "
+                    "where the scanner was: it is taken to be at the navigation centre. Plates "
+                    "that stand free may be missed or found centimetres off; give lever_arm and "
+                    "boresight under [mounting]."
+                )
+
+    def add(self, cloud: PointCloud) -> None:
+        """Count more of them.
+
+        Parameters
+        ----------
+        cloud : PointCloud
+        """
+        self.points += len(cloud)
+        self.is_present[cloud.intensity.astype(np.uint16)] = True
+
+    def add_ball(self, index: int, cloud: PointCloud) -> None:
+        """Look whether any of the points of a surveyed point, from there (m), lies about it."""
+        some = cloud.xyz[:: SETTINGS.scanned_stride]
+        self.is_scanned[index] |= (np.linalg.norm(some, axis=1) < SETTINGS.scanned_radius).any()
+
+    def warn_of_intensity(self) -> None:
+        """Warn where bright targets are surveyed and the intensity can't tell them."""
+        if self.points:
+            reason = why_useless(np.flatnonzero(self.is_present))
+        else:
+            reason = None
+        if reason is not None and not set(self.survey.surveyed.kind) <= set(BY_EDGES):
+            warnings.warn(
+                f"{reason} Bright targets can't be told by it: only plates that stand free are "
+                "found, by their edges, and painted ones are not. Export the cloud with its "
+                "intensity.",
+                stacklevel=3,
+            )
+
+
+def find_control(
+    survey: Survey,
+    rng: np.random.Generator | None = None,
+    progress: Callable | None = None,
+    read: Callable = read_chunks,
+) -> Finding:
+    """Find the targets of a survey that has control points, and some of these among them.
+
+    Parameters
+    ----------
+    survey, rng, progress, read
+        As of ``find_targets``.
+
+    Raises
+    ------
+    ValueError
+        As find_targets does, and when no control point was surveyed or found.
+    """
+    check_control(survey)
+    finding = find_targets(survey, rng, progress, read)
+    check_found_control(survey, finding)
+    return finding
+
+
+def check_found_control(survey: Survey, finding: Finding) -> None:
+    """Refuse a finding without a control point, by which nothing is corrected.
+
+    Parameters
+    ----------
+    survey : Survey
+    finding : Finding
+
+    Raises
+    ------
+    ValueError
+        Where check points alone are matched.
+    """
+    control, check = finding.matches.by_role(survey)
+    if len(control) == 0:
+        raise ValueError(
+            f"None of the {counted(len(survey.control), 'control point')} was found in the cloud, "
+            f"only {counted(len(check), 'check point')}, which must not take part in the estimate."
+        )
+
+
 def find_targets(
     survey: Survey,
     rng: np.random.Generator | None = None,
@@ -84,54 +227,43 @@ def find_targets(
     ValueError
         When no target is found, or none of those found matches.
     """
-    return _checked(survey, *fit_while_reading(survey, read, rng, _bar(survey, progress)))
+    reading = (progress or silent)("Reading the cloud", survey.points)
+    targets, candidates, near = fit_while_reading(survey, read, rng, reading)
+    return _checked(survey, targets, candidates, near)
 
 
-def _bar(survey, progress):
-    return (progress or silent)("Reading the cloud", survey.points)
-
-
-def _checked(survey, targets, candidates, near):
-    """The Finding of what fit_while_reading gives; raises as find_targets does."""
-    uncovered = tuple(near.beams.outside())
-    sentences = tuple(near.warnings())
-    for sentence in sentences:
-        warnings.warn(sentence, stacklevel=4)
-    finding = matched_finding(survey, targets, candidates, near)
-    names = frozenset(survey.surveyed.name[i] for i in np.flatnonzero(near.is_scanned))
-    return replace(finding, scanned=names, warnings=sentences, uncovered=uncovered)
-
-
-def matched_finding(
-    survey: Survey, targets: list[PassTarget], candidates: Candidates, near: NearPoints
-) -> Finding:
-    """Match what fit_while_reading gives; this decides for ``check`` and ``correct`` alike.
+def find_or_compare_surfaces(
+    survey: Survey,
+    read: Callable = read_chunks,
+    settle: Callable | None = None,
+    progress: Callable | None = None,
+    rng: np.random.Generator | None = None,
+) -> tuple[Finding, tuple[str, ...]]:
+    """Find the targets where there are any: a diagnosis can do without.
 
     Parameters
     ----------
-    survey : Survey
-        With all of its surveyed points, also where only some were looked at.
-    targets, candidates, near
-        As fit_while_reading gives them.
+    survey, read, settle
+        As of ``fit_while_reading``; the clouds are read to their ends in any case.
+    progress, rng
+        As of ``find_targets``.
 
-    Raises
-    ------
-    ValueError
-        When no target is found, or none of those found matches.
+    Returns
+    -------
+    finding : Finding
+        Empty where nothing was surveyed or found.
+    notes : tuple of str
+        The sentence that says so.
     """
-    if len(targets) == 0:
-        raise ValueError(nothing_found(survey, candidates, near))
-    finding = match_targets(targets, candidates, survey)
-    if len(finding.matches.matched) == 0:
-        reasons = " ".join(refusal.reason for refusal in finding.matches.refusals[:3])
-        places = len(np.unique(survey.surveyed.position, axis=0))
-        is_twice = 2 * places <= len(survey.surveyed)  # and then the CRS isn't what is wrong
-        questions = "Are control and cloud in the same CRS?", "Is each point named twice?"
-        raise ValueError(
-            f"None of the {len(survey.surveyed)} surveyed targets is among the {len(targets)} that "
-            f"were found ({near.intensity_range} there). {reasons} {questions[is_twice]}"
-        )
-    return finding
+    reading = (progress or silent)("Reading the cloud", survey.points)
+    targets, candidates, near = fit_while_reading(survey, read, rng, reading, settle)
+    note = "No target was surveyed: only surfaces are compared."
+    if len(survey.surveyed):
+        try:
+            return _checked(survey, targets, candidates, near), ()
+        except ValueError as error:
+            note = f"{error} Only surfaces are compared."
+    return unmatched([], Candidates()), (note,)
 
 
 def fit_while_reading(
@@ -187,12 +319,101 @@ def fit_while_reading(
 
     progress = progress or silent("", 0)
     candidates = collect(survey, near.beams.watched(read), fit, near.add, settled, progress)
-    near.warn_of_intensity(survey)
+    near.warn_of_intensity()
     of_pass = {number: [] for number in sorted(candidates.passes.values())}
     for _, key, target in sorted(fits, key=itemgetter(0)):  # not in the order of their points
         of_pass[candidates.passes[key]].append(target)
     targets = [(number, t) for number, some in of_pass.items() for t in distinct(some)]
     return targets, candidates, near
+
+
+def _checked(
+    survey: Survey, targets: list[PassTarget], candidates: Candidates, near: NearPoints
+) -> Finding:
+    """The Finding of what fit_while_reading gives; raises as find_targets does."""
+    uncovered = tuple(near.beams.outside())
+    sentences = tuple(near.warnings())
+    for sentence in sentences:
+        warnings.warn(sentence, stacklevel=4)
+    finding = matched_finding(survey, targets, candidates, near)
+    return replace(finding, scanned=near.scanned, warnings=sentences, uncovered=uncovered)
+
+
+def matched_finding(
+    survey: Survey, targets: list[PassTarget], candidates: Candidates, near: NearPoints
+) -> Finding:
+    """Match what fit_while_reading gives; this decides for ``check`` and ``correct`` alike.
+
+    Parameters
+    ----------
+    survey : Survey
+        With all of its surveyed points, also where only some were looked at.
+    targets, candidates, near
+        As fit_while_reading gives them.
+
+    Raises
+    ------
+    ValueError
+        When no target is found, or none of those found matches.
+    """
+    if len(targets) == 0:
+        raise ValueError(nothing_found(survey, candidates, near))
+    finding = match_targets(targets, candidates, survey)
+    if len(finding.matches.matched) == 0:
+        reasons = " ".join(refusal.reason for refusal in finding.matches.refusals[:3])
+        places = len(np.unique(survey.surveyed.position, axis=0))
+        is_twice = 2 * places <= len(survey.surveyed)  # and then the CRS isn't what is wrong
+        questions = "Are control and cloud in the same CRS?", "Is each point named twice?"
+        raise ValueError(
+            f"None of the {len(survey.surveyed)} surveyed targets is among the {len(targets)} that "
+            f"were found ({near.intensity_range} there). {reasons} {questions[is_twice]}"
+        )
+    return finding
+
+
+def nothing_found(survey: Survey, candidates: Candidates, near: NearPoints) -> str:
+    """The sentence for a cloud in which no surveyed target was found.
+
+    Parameters
+    ----------
+    survey : Survey
+    candidates : Candidates
+    near : NearPoints
+    """
+    surveyed = survey.surveyed
+    radius = search_radius(survey, surveyed).max()
+    if len(candidates.unplaced) > near.points:
+        return (
+            f"No target was found: {len(candidates.unplaced)} of the points near surveyed points "
+            "were measured in gaps of the trajectory or outside it. Export the whole trajectory."
+        )
+    if near.points == 0:
+        return (
+            f"No point of the cloud lies within {radius:.1f} m of any of the {len(surveyed)} "
+            "surveyed points. Are control and cloud in the same CRS and of the same street?"
+            f"{_other_heights(survey, radius)}"
+        )
+    return (
+        f"None of the {len(surveyed)} surveyed targets was found among {near.points} points "
+        f"within {radius:.1f} m of them ({near.intensity_range}). Targets are circles or squares "
+        "of the surveyed size, brighter than what surrounds them: check kind and size in the "
+        "control file, and the intensity."
+    )
+
+
+def _other_heights(survey, radius):
+    """A sentence where surveyed points lie farther above or below the drive than is searched."""
+    place = survey.surveyed.position
+    path = survey.trajectory.position
+    nearest = cKDTree(path[:, :2]).query(place[:, :2])[1]
+    above = float(np.median(place[:, 2] - path[nearest, 2]))
+    if abs(above) < radius:
+        return ""
+    side = "above" if above > 0 else "below"
+    return (
+        f" In the median the surveyed points lie {abs(above):.1f} m {side} the trajectory: their "
+        "heights may be of another geoid or over an ellipsoid, or in feet."
+    )
 
 
 def match_targets(targets: list[PassTarget], candidates: Candidates, survey: Survey) -> Finding:
@@ -235,86 +456,6 @@ def unmatched(targets: list[PassTarget], candidates: Candidates, reason: str = "
 def _by_pass_and_time(targets):
     """Fitted targets by (pass number, gps_time)."""
     return {(number, target.gps_time): target for number, target in targets}
-
-
-def find_control(
-    survey: Survey,
-    rng: np.random.Generator | None = None,
-    progress: Callable | None = None,
-    read: Callable = read_chunks,
-) -> tuple[Matched, Matched, Finding]:
-    """Find the targets and part them by role.
-
-    Parameters
-    ----------
-    survey, rng, progress, read
-        As of ``find_targets``.
-
-    Returns
-    -------
-    control, check : Matched
-    finding : Finding
-
-    Raises
-    ------
-    ValueError
-        As find_targets does, and when no control point was surveyed or found.
-    """
-    check_control(survey)
-    finding = find_targets(survey, rng, progress, read)
-    return *matched_by_role(survey, finding), finding
-
-
-def matched_by_role(survey: Survey, finding: Finding) -> tuple[Matched, Matched]:
-    """The matched control points, without which nothing is corrected, and the check points.
-
-    Parameters
-    ----------
-    survey : Survey
-    finding : Finding
-
-    Raises
-    ------
-    ValueError
-        Where no control point is matched.
-    """
-    control, check = finding.matches.by_role(survey)
-    if len(control) == 0:
-        raise ValueError(no_control(survey, len(check)))
-    return control, check
-
-
-def find_or_compare_surfaces(
-    survey: Survey,
-    read: Callable = read_chunks,
-    settle: Callable | None = None,
-    progress: Callable | None = None,
-    rng: np.random.Generator | None = None,
-) -> tuple[Finding, tuple[str, ...]]:
-    """Find the targets where there are any: a diagnosis can do without.
-
-    Parameters
-    ----------
-    survey, read, settle
-        As of ``fit_while_reading``; the clouds are read to their ends in any case.
-    progress, rng
-        As of ``find_targets``.
-
-    Returns
-    -------
-    finding : Finding
-        Empty where nothing was surveyed or found.
-    notes : tuple of str
-        The sentence that says so.
-    """
-    fitted = fit_while_reading(survey, read, rng, _bar(survey, progress), settle)
-    note = "No target was surveyed: only surfaces are compared."
-    if len(survey.surveyed):
-        try:
-            return _checked(survey, *fitted), ()
-        except ValueError as error:
-            note = f"{error} Only surfaces are compared."
-    return unmatched([], Candidates()), (note,)
 
 
 def read_into(*adds: Callable) -> Callable:

@@ -9,8 +9,8 @@ from functools import partial
 from mlscorr import baselines
 from mlscorr.estimate import SETTINGS as ESTIMATE
 from mlscorr.estimate import estimate_correction
+from mlscorr.pipeline.correction import estimate_together
 from mlscorr.pipeline.settings import SETTINGS
-from mlscorr.pipeline.tying import estimate_together
 from mlscorr.survey import Survey, TieFeatures
 from mlscorr.targets import Candidates
 

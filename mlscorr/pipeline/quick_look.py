@@ -9,12 +9,13 @@ import numpy as np
 from mlscorr.io.clouds import read_windows
 from mlscorr.io.tables import nearest_epochs
 from mlscorr.pipeline.finding import (
+    NearPoints,
+    check_found_control,
     fit_while_reading,
     match_targets,
-    matched_by_role,
     matched_finding,
+    nothing_found,
 )
-from mlscorr.pipeline.near_points import NearPoints, nothing_found
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.survey import ControlPoints, Matched, PointCloud, Survey
 from mlscorr.targets import Candidates, PassTarget, search_radius
@@ -91,7 +92,7 @@ def _decided(survey, fitted):
         return Matched.none(), str(error)
     matched = Matched.by_name(finding.matches.matched, survey.surveyed)
     try:
-        matched_by_role(survey, finding)
+        check_found_control(survey, finding)
     except ValueError as error:
         return matched, str(error)
     return matched, ""

@@ -35,9 +35,9 @@ from mlscorr.io.surveys import (
 )
 from mlscorr.io.tables import AxesError, ControlSection, holds_points, read_control
 from mlscorr.matching import SETTINGS as MATCHING
+from mlscorr.pipeline.beams import line_rate
 from mlscorr.pipeline.choice import choose_control, choose_crs
 from mlscorr.pipeline.drives import Cloud, choose_accuracy, choose_trajectory
-from mlscorr.pipeline.line_rate import line_rate
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.pipeline.survey_text import SurveyText
 from mlscorr.survey import PointCloud, Trajectory, counted

@@ -1,8 +1,12 @@
-"""What two passes both saw: features of each, pairs of them, and which of these agree."""
+"""What two passes both saw: features of each, pairs of them, which agree, and what they correct.
 
-from mlscorr.ties._coarse_mounting import coarse_mounting, remounted, turned_directions
+Pairs and corrections come in turn: what the first pairs correct shows which are pairs at all.
+"""
+
+from mlscorr.ties._coarse_mounting import coarse_mounting, remounted
+from mlscorr.ties._tied_mounting import tie_mounting
+from mlscorr.ties._tied_passes import tie_passes
 from mlscorr.ties.agreement import (
-    NORMAL_SCATTER,
     consistent_ties,
     group_by_time,
     information,
@@ -14,6 +18,6 @@ from mlscorr.ties.agreement import (
 from mlscorr.ties.coarse import coarse_correction
 from mlscorr.ties.collector import TieCollector, join_features
 from mlscorr.ties.pairing import pair_features
-from mlscorr.ties.search import TieSearch, agreeing_ties, feature_sigma, least_pause, search_ties
+from mlscorr.ties.search import TieSearch, feature_sigma, least_pause, search_ties
 from mlscorr.ties.settings import SETTINGS
 from mlscorr.ties.thinning import integer_hash, thinned_ties

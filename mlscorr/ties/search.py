@@ -7,6 +7,7 @@ import numpy as np
 from mlscorr.pos import stated_sigma
 from mlscorr.survey import Survey, TieFeatures, Ties, time_spans
 from mlscorr.ties._candidates import visit_number
+from mlscorr.ties._gates import widest_gate
 from mlscorr.ties.agreement import NORMAL_SCATTER, consistent_ties, residuals, weigh_by_time
 from mlscorr.ties.coarse import coarse_correction
 from mlscorr.ties.pairing import pair_features
@@ -46,8 +47,7 @@ def search_ties(survey: Survey, features: TieFeatures) -> TieSearch:
     features : TieFeatures
     """
     sigma = feature_sigma(survey, features)
-    radius = np.sqrt(2) * SETTINGS.gate_sigmas * float(sigma.max(initial=0.0))
-    radius = min(max(radius, SETTINGS.least_gate), survey.search_radius)
+    radius = min(max(widest_gate(sigma), SETTINGS.least_gate), survey.search_radius)
     correction = coarse_correction(features, radius)
     # what the first pairs, of visits, leave tells how near partners are
     for pause in (SETTINGS.pause, least_pause(survey, features)):

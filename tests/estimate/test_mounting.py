@@ -29,7 +29,7 @@ from mlscorr.io.surveys import mounting_values, write_survey_copy
 from mlscorr.io.surveys.survey_file import read_survey_file
 from mlscorr.io.surveys.survey_sections import CalibratedMountingSection
 from mlscorr.pipeline.calibration import warn_of_scanners
-from mlscorr.pipeline.near_points import reuse_warnings
+from mlscorr.pipeline.control_checks import reuse_warnings
 from mlscorr.simulate import Scenario, simulate
 from mlscorr.survey import Matched, Mounting, Trajectory
 from tests.beds.discs import observed_discs, surveyed_discs

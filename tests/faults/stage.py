@@ -19,7 +19,7 @@ from tests.beds.places import ROOT
 SERVER = """
 import json, os, signal, sys, warnings
 import mlscorr, mlscorr.cli, mlscorr.cli.terminal, mlscorr.pipeline.simulation
-import mlscorr.pipeline.calibration, mlscorr.pipeline.extraction, mlscorr.pipeline.tying
+import mlscorr.pipeline.calibration, mlscorr.pipeline.extraction, mlscorr.pipeline.correction
 with warnings.catch_warnings(action="ignore"):
     survey = mlscorr.read_survey(sys.argv[1])
     result = mlscorr.correct(survey)

@@ -15,8 +15,8 @@ from mlscorr.cli import app
 from mlscorr.effects import make_effect
 from mlscorr.io.surveys import write_survey_copy
 from mlscorr.pipeline import read_effects
+from mlscorr.pipeline.control_checks import reuse_warnings
 from mlscorr.pipeline.found_effects import cloud_rows
-from mlscorr.pipeline.near_points import reuse_warnings
 from mlscorr.simulate import Scenario, simulate
 from tests.beds.documents import undocumented
 

@@ -10,7 +10,7 @@ import pytest
 
 import mlscorr
 from mlscorr.io.clouds import read_chunks
-from mlscorr.pipeline.beam_origin import beam_origin, with_beam_origin
+from mlscorr.pipeline.beams import beam_origin, with_beam_origin
 from mlscorr.simulate import Scenario, simulate
 from mlscorr.survey import PointCloud
 

@@ -21,7 +21,8 @@ def survey():
 @pytest.mark.parametrize("radius", [2.0, 8.0, 15.0, 25.0])
 def test_targets_do_not_depend_on_the_search_radius(survey, radius):
     "Both control points and the check point are seen in both passes, scored 0.99 and more"
-    control, check, finding = find_control(replace(survey, search_radius=radius))
+    finding = find_control(replace(survey, search_radius=radius))
+    control, check = finding.matches.by_role(survey)
     matched = finding.matches.matched
     numbers = matched.pass_number.tolist()
     assert sorted(zip(matched.name, numbers, strict=True)) == EACH_TWICE
@@ -35,7 +36,7 @@ def test_targets_near_control_are_those_of_the_whole_cloud(survey):
     rows = mlscorr.extract(survey).targets
     assert sorted((row["name"], row["pass"]) for row in rows) == EACH_TWICE
     assert min(row["score"] for row in rows) > 0.99
-    near = find_control(survey)[2].matches.matched
+    near = find_control(survey).matches.matched
     place = {
         key: near.position[i] for i, key in enumerate(zip(near.name, near.pass_number, strict=True))
     }

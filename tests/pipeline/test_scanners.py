@@ -18,8 +18,7 @@ from mlscorr.correction import PointSigma
 from mlscorr.estimate import believed_correction, corrected_mounting
 from mlscorr.evaluate import BeamCheck
 from mlscorr.io.clouds import read_chunks
-from mlscorr.pipeline.tying import tie_passes
-from mlscorr.ties import TieCollector
+from mlscorr.ties import TieCollector, tie_passes
 from tests.beds import scanner_pair
 from tests.beds.documents import undocumented
 

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 import mlscorr
 from mlscorr.cli import app
 from mlscorr.io.trajectories import read_trajectory
-from mlscorr.pipeline.line_rate import line_rate
+from mlscorr.pipeline.beams import line_rate
 from mlscorr.pipeline.survey_text import SurveyText
 from mlscorr.survey import PointCloud, Pos, Scanner
 from tests.beds.las_crs import add_crs

@@ -8,9 +8,9 @@ import pytest
 
 import mlscorr
 from mlscorr.estimate import believed_correction
-from mlscorr.pipeline.tying import tie_passes
 from mlscorr.simulate import Scenario, simulate
 from mlscorr.survey import Pos
+from mlscorr.ties import tie_passes
 from tests.beds import painted_roads as road_bed
 from tests.beds import tie_streets as street_bed
 from tests.beds.reports import words

@@ -2,12 +2,13 @@
 
 - survey_file, project_file: read whole, with all that is wrong in one error
 - survey_sections, project_sections: what these files may state
-- survey_paths, survey_scanners, session_points, surveyed_points: which file belongs to what
+- survey_paths, point_owners: which file belongs to what, and which point to whom
 - survey_copy, folder_roles, simulated_clouds, crs_checks: survey.toml written anew, found, checked
 """
 
 from mlscorr.io.surveys.crs_checks import check_area, crs_notes
 from mlscorr.io.surveys.folder_roles import SIMULATED, FileRole, sort_files
+from mlscorr.io.surveys.point_owners import check_belongings, mounted_scanners
 from mlscorr.io.surveys.project_file import (
     DriveParts,
     ProjectParts,
@@ -16,7 +17,6 @@ from mlscorr.io.surveys.project_file import (
     stated_project,
 )
 from mlscorr.io.surveys.project_sections import SHARED_TILES
-from mlscorr.io.surveys.session_points import check_belongings
 from mlscorr.io.surveys.simulated_clouds import simulated_survey
 from mlscorr.io.surveys.survey_copy import mounting_values, write_survey_copy
 from mlscorr.io.surveys.survey_file import (
@@ -34,7 +34,6 @@ from mlscorr.io.surveys.survey_paths import (
     matching,
     session_file,
 )
-from mlscorr.io.surveys.survey_scanners import mounted_scanners
 from mlscorr.io.surveys.survey_sections import (
     MountingSection,
     PlannedSurveyFile,

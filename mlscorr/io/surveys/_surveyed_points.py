@@ -61,7 +61,11 @@ def scaled(points: ControlList, section: ControlSection, crs: str | None) -> Con
     """
     if section.scale_factor is None:
         return points
-    middle = (points.control if len(points.control) else points.check).position.mean(axis=0)
+    if len(points.control):
+        about = points.control
+    else:
+        about = points.check
+    middle = about.position.mean(axis=0)
     origin = np.array([*(section.scale_origin or middle[:2]), 0.0])
     if section.scale_factor == "ground":
         if crs is None:

@@ -87,14 +87,13 @@ def describe_projection(crs: str) -> tuple[str, str, str]:
     projected: Any = check_crs(crs)
     if projected.is_compound:
         vertical = projected.sub_crs_list[1].name
+        heights = f"The trajectory's ellipsoidal heights were transformed to {vertical}."
     else:
-        vertical = None
+        heights = "The trajectory's ellipsoidal heights were kept."
     return (
         f"The trajectory's latitude and longitude are taken as {projected.geodetic_crs.name}, "
         f"the datum of {projected.name}; nothing in an SBET says otherwise.",
-        f"The trajectory's ellipsoidal heights were transformed to {vertical}."
-        if vertical
-        else "The trajectory's ellipsoidal heights were kept.",
+        heights,
         "Headings were turned from the platform to grid north: minus wander angle, "
         "minus meridian convergence.",
     )

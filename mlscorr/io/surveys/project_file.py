@@ -306,7 +306,8 @@ def _with_beliefs(path, drives):
                 f"[{what}] of {unlike[0]} is not that of {stated[0].name}, and drives of a project "
                 f"share it: say under [{what}] in {path} what holds for all {len(drives)}."
             )
-        beliefs |= {what: values[0]} if values else {}
+        if values:
+            beliefs[what] = values[0]
     for drive in drives:
         yield drive._replace(settings=drive.settings.model_copy(update=beliefs))
 

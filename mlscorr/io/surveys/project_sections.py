@@ -85,4 +85,6 @@ class ProjectFile(survey_sections.CommonSections):
 def _folder(section):
     """Name of the folder of a drive's survey.toml."""
     path = Path(section.survey or "")
-    return (path.parent if path.suffix else path).name
+    if path.suffix:
+        return path.parent.name
+    return path.name

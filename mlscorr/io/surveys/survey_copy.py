@@ -74,8 +74,10 @@ def write_survey_copy(
     sections = scanners or [document]
     notes = notes or [""] * len(mountings)
     for section, mounting, note in zip(sections, mountings, notes, strict=bool(mountings)):
-        is_inside = isinstance(section, InlineTable)  # where no comment can stand
-        _set_mounting(section["mounting"], mounting, "" if is_inside else note)
+        if isinstance(section, InlineTable):  # where no comment can stand
+            _set_mounting(section["mounting"], mounting, "")
+        else:
+            _set_mounting(section["mounting"], mounting, note)
     Path(target).write_text(tomlkit.dumps(document), encoding="utf-8")
 
 

@@ -16,15 +16,14 @@ from mlscorr.io.clouds import (
 from mlscorr.io.store import as_path, input_file, is_folder, is_there, read_toml
 from mlscorr.io.surveys._surveyed_points import read_surveyed
 from mlscorr.io.surveys.crs_checks import crs_notes
-from mlscorr.io.surveys.session_points import check_belongings
+from mlscorr.io.surveys.point_owners import check_belongings, mounted_scanners, scanner_notes
 from mlscorr.io.surveys.survey_paths import SurveyPaths, files_of
-from mlscorr.io.surveys.survey_scanners import clouds_of, mounted_scanners, scanner_notes
 from mlscorr.io.surveys.survey_sections import PlannedSurveyFile, SurveyFile
+from mlscorr.io.tables import ControlList
 from mlscorr.io.trajectories import ADJUSTMENT, Sessions, check_crs, match_times, read_sessions
 from mlscorr.survey import (
     NOISE_CLASSES,
     CloudFile,
-    ControlPoints,
     InputFile,
     Pos,
     Scanner,
@@ -74,8 +73,10 @@ def read_survey(path: str | Path, planned: bool = False) -> Survey:
     """
     path = survey_toml(path)
     settings = read_survey_file(path, planned)
-    parts = read_parts(path, settings, files_of(path, settings))
-    return parts.survey([parts.cloud_file(cloud) for cloud in parts.files.clouds])
+    files = files_of(path, settings)
+    parts = read_parts(path, settings, files)  # trajectory and control
+    clouds = [parts.cloud_file(cloud) for cloud in files.clouds]
+    return parts.survey(clouds)
 
 
 @dataclass(frozen=True)
@@ -89,9 +90,8 @@ class SurveyParts:
     settings : PlannedSurveyFile
     files : SurveyPaths
     recorded : Sessions
-    control, check : ControlPoints
-    layout : str or None
-        How the list of these was understood.
+    surveyed : ControlList
+        Control and check points, and how the list of them was understood.
     inputs : tuple of InputFile
     """
 
@@ -99,9 +99,7 @@ class SurveyParts:
     settings: PlannedSurveyFile
     files: SurveyPaths
     recorded: Sessions
-    control: ControlPoints
-    check: ControlPoints
-    layout: str | None
+    surveyed: ControlList
     inputs: tuple[InputFile, ...]
 
     @property
@@ -137,30 +135,42 @@ class SurveyParts:
         ValueError
             Where clouds, trajectories and scanners don't go together.
         """
+        path = self.path
         settings = self.settings
         recorded = self.recorded
-        path = self.path
         trajectory = recorded.trajectory
-        layouts = [*recorded.layouts, *filter(None, [self.layout])]
+
+        clouds = tuple(file for file, _ in read)
+        check_belongings(path, self.files.sessions, recorded.parts, clouds)
+        scanners = mounted_scanners(path, settings, clouds)
+        parts = [part for scanner in scanners for part in scanner.clouds]
+        clouds = tuple(part for file in clouds for part in parts if part.path == file.path)
+        on_scanners = scanner_notes(scanners)
+        if len(scanners) == 1:
+            scanner = scanners[0].scanner
+            mounting = scanners[0].mounting
+            scanners = ()  # of several alone
+        else:
+            scanner = Scanner()
+            mounting = None
+
+        layouts = [*recorded.layouts, *filter(None, [self.surveyed.layout])]
         layouts += [converted(file.path).note for file, _ in read if is_foreign(file.path)]
-        cloud_files = tuple(file for file, _ in read)
-        check_belongings(path, self.files.sessions, recorded.parts, cloud_files)
-        scanners = mounted_scanners(path, settings, cloud_files)
-        is_one = len(scanners) == 1
         notes = crs_notes(settings.crs, trajectory, recorded.is_sbet)
-        notes += [*recorded.notes, *(note for _, note in read), *scanner_notes(scanners), *layouts]
+        notes += [*recorded.notes, *(note for _, note in read), *on_scanners, *layouts]
         if trajectory.position_sigma is None and "pos" not in settings.model_fields_set:
             notes.append(UNKNOWN_POS)
+
         return Survey(
             name=settings.name or path.absolute().parent.name,
             path=path,
             crs=settings.crs,
-            clouds=clouds_of(scanners, cloud_files),
+            clouds=clouds,
             trajectory=trajectory,
-            mounting=scanners[0].mounting if is_one else None,
-            control=self.control,
-            check=self.check,
-            scanner=scanners[0].scanner if is_one else Scanner(),
+            mounting=mounting,
+            control=self.surveyed.control,
+            check=self.surveyed.check,
+            scanner=scanner,
             pos=settings.pos.pos(),
             reference=self.files.reference,
             search_radius=settings.matching.search_radius,
@@ -168,7 +178,7 @@ class SurveyParts:
             notes=tuple(notes),
             layouts=tuple(layouts),
             inputs=self.inputs,
-            scanners=() if is_one else scanners,
+            scanners=scanners,
             corrected_by=tuple(n for part in settings.trajectories for n in part.corrected_by),
             is_remounted=settings.cloud is not None and settings.cloud.mounting == "recorded",
         )
@@ -189,7 +199,7 @@ def read_parts(path: Path, settings: PlannedSurveyFile, files: SurveyPaths) -> S
     inputs = tuple(input_file(*named) for named in [("survey", path), *files.named])
     recorded = read_sessions(files.sessions, settings.crs, stated_pos(settings))
     surveyed = read_surveyed(files.control, settings.control, recorded.trajectory, settings.crs)
-    return SurveyParts(path, settings, files, recorded, *surveyed, inputs)
+    return SurveyParts(path, settings, files, recorded, surveyed, inputs)
 
 
 def stated_pos(settings: PlannedSurveyFile) -> Pos | None:
@@ -224,7 +234,11 @@ def read_survey_file(path: str | Path, planned: bool = False) -> PlannedSurveyFi
         Names the line of bad TOML, or every key that is unknown (with the nearest known one),
         missing, or of the wrong type.
     """
-    settings = read_toml(survey_toml(path), PlannedSurveyFile if planned else SurveyFile, "it")
+    if planned:
+        sections = PlannedSurveyFile
+    else:
+        sections = SurveyFile
+    settings = read_toml(survey_toml(path), sections, "it")
     if settings.crs is not None:
         check_crs(settings.crs)
     return settings
@@ -320,16 +334,22 @@ def cloud_file(
         )
     records = spread_records(layout)[1]
     times = records["gps_time"][file.rows(records["point_source_id"])] + layout.time_offset
-    if not len(times) and (chunk := next(read_chunks(file), None)) is not None:  # too few of them
-        times = chunk.gps_time
+    if not len(times):  # too few of the file are spread over it
+        chunk = next(read_chunks(file), None)
+        if chunk is not None:
+            times = chunk.gps_time
     match = match_times(
         path.name, times, layout.is_standard, trajectory, setting, layout.time_offset
     )
-    if crs is not None and (conflict := crs_conflict(layout, crs)):
-        warnings.warn(conflict, stacklevel=3)
+    if crs is not None:
+        conflict = crs_conflict(layout, crs)
+        if conflict:
+            warnings.warn(conflict, stacklevel=3)
     constant = match.constant + layout.time_offset
     file = replace(
         file, time_constant=constant, time_system=match.cloud_system, new_week=match.new_week
     )
-    taken = f"; written less {ADJUSTMENT + layout.time_offset:.0f} s, as its header states"
-    return file, f"gps_time of {path.name}: {match}{taken if layout.time_offset else ''}."
+    taken = ""
+    if layout.time_offset:
+        taken = f"; written less {ADJUSTMENT + layout.time_offset:.0f} s, as its header states"
+    return file, f"gps_time of {path.name}: {match}{taken}."

@@ -14,7 +14,7 @@ from mlscorr.io.store import beside, files_like, is_folder, is_remote, is_there,
 from mlscorr.io.surveys.folder_roles import RESULTS
 from mlscorr.io.surveys.survey_sections import PlannedSurveyFile
 from mlscorr.io.trajectories import SessionFile, TrajectorySection
-from mlscorr.survey import CloudFile, SurveyFileError, counted
+from mlscorr.survey import counted
 
 
 @dataclass(frozen=True)
@@ -62,22 +62,19 @@ def files_of(path: Path, settings: PlannedSurveyFile, key: str = "cloud.files") 
     ValueError
         For a file that is named twice, and for two clouds of one name.
     """
-    names = settings.cloud.files if settings.cloud else ()
-    clouds = [cloud for name in names for cloud in matching(path, key, name)]
+    clouds = []
+    if settings.cloud:
+        for name in settings.cloud.files:
+            clouds += matching(path, key, name)
     if clouds:
         check_distinct(path, clouds, key)
     sessions = [session_file(path, section) for section in settings.trajectories]
     check_sessions(path, sessions)
-    if settings.control is None:
-        control = None
-    else:
-        control = settings.control.file
-    return SurveyPaths(
-        clouds,
-        sessions,
-        given_file(path, "control.file", control),
-        given_file(path, "scene.reference", settings.scene.reference),
-    )
+    control = None
+    if settings.control is not None:
+        control = given_file(path, "control.file", settings.control.file)
+    reference = given_file(path, "scene.reference", settings.scene.reference)
+    return SurveyPaths(clouds, sessions, control, reference)
 
 
 def session_file(path: Path, section: TrajectorySection) -> SessionFile:
@@ -143,15 +140,14 @@ def matching(path: Path, key: str, name: str) -> list[Path]:
     matches = files_like(path.parent, name)
     if "**" in name:
         below = {file.parent for file in matches} - {path.parent}
-    else:
-        below = set()
-    if results := {folder for folder in below if _holds_results(folder)}:
+        results = {folder for folder in below if _holds_results(folder)}
         matches = [file for file in matches if file.parent not in results]
-        warnings.warn(
-            f"{key} of {path}: {name} leaves out results of an earlier run in "
-            f"{', '.join(sorted(map(str, results)))}.",
-            stacklevel=2,
-        )
+        if results:
+            warnings.warn(
+                f"{key} of {path}: {name} leaves out results of an earlier run in "
+                f"{', '.join(sorted(map(str, results)))}.",
+                stacklevel=2,
+            )
     if not matches:
         raise FileNotFoundError(f"{key} of {path}: no file is like {there}.")
     return matches
@@ -162,45 +158,6 @@ def _holds_results(folder):
     return any(is_there(folder / name) for name in RESULTS) or is_there(
         folder.parent / "project.json"
     )
-
-
-def own_clouds(
-    path: Path,
-    key: str,
-    patterns: Sequence[str] | None,
-    clouds: Sequence[CloudFile],
-    owner: str = "",
-) -> list[CloudFile]:
-    """Those of a survey's clouds that patterns name; all without patterns.
-
-    Parameters
-    ----------
-    path : Path
-        Of survey.toml.
-    key : str
-        That holds the patterns.
-    patterns : sequence of str, optional
-    clouds : sequence of CloudFile
-    owner : str
-        Words on who has the patterns.
-
-    Raises
-    ------
-    ValueError
-        Where a pattern names none of them.
-    FileNotFoundError
-        Where there is no such file.
-    """
-    own = [] if patterns is not None else [*clouds]
-    for pattern in patterns or ():
-        there = {resolved(file) for file in matching(path, key, pattern)}
-        named = [cloud for cloud in clouds if resolved(cloud.path) in there]
-        if not named:
-            raise SurveyFileError(
-                f"{key} of {path}: {pattern}{owner} is none of the {len(clouds)} files of [cloud]."
-            )
-        own += named
-    return own
 
 
 def given_file(path: Path, key: str, name: str | None) -> Path | None:
@@ -236,8 +193,10 @@ def _lack(there):
     """Why there is no file of a name, and which one may be meant."""
     if is_folder(there):
         return "is a folder: name a file in it, or its clouds by a pattern, as FOLDER/*.laz"
-    is_listed = not is_remote(there) and there.parent.is_dir()
-    near = nearest(there.name, os.listdir(there.parent) if is_listed else ())
+    others = []
+    if not is_remote(there) and there.parent.is_dir():
+        others = os.listdir(there.parent)
+    near = nearest(there.name, others)
     if near:
         return f"does not exist; the nearest there is {near}"
     return "does not exist"

@@ -23,6 +23,7 @@ from mlscorr.io.store import (
 from mlscorr.io.surveys import SHARED_TILES, ProjectParts, read_project
 from mlscorr.io.trajectories import check_exports
 from mlscorr.pipeline.clouds import WrittenClouds
+from mlscorr.pipeline.correction import TieUse, without_control
 from mlscorr.pipeline.project import stages
 from mlscorr.pipeline.project.city import project_drives
 from mlscorr.pipeline.project.corrected import found_drive, motion_of
@@ -38,7 +39,6 @@ from mlscorr.pipeline.project.file_tasks import ReportInput
 from mlscorr.pipeline.project.progress import Progress, logged
 from mlscorr.pipeline.project.running import Run
 from mlscorr.pipeline.project.tasks import VERSION
-from mlscorr.pipeline.tying import TieUse, without_control
 
 STORE = "tasks"  # of the folder within the results
 

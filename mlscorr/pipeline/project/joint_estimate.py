@@ -8,8 +8,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from mlscorr.estimate import Estimate
+from mlscorr.pipeline.correction import estimate_together
 from mlscorr.pipeline.project.joint import FoundDrive, JointDrives, join_drives
-from mlscorr.pipeline.tying import estimate_together
 
 
 @dataclass(frozen=True)

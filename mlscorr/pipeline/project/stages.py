@@ -10,7 +10,7 @@ import numpy as np
 
 from mlscorr.io.store import FileIdentity, TaskStore, digest, resolved
 from mlscorr.io.surveys import SHARED_TILES, DriveParts, ProjectParts
-from mlscorr.pipeline.near_points import check_control
+from mlscorr.pipeline.control_checks import check_control
 from mlscorr.pipeline.project import file_tasks
 from mlscorr.pipeline.project.city import AreaInput, stored_results
 from mlscorr.pipeline.project.corrected import bare_survey

@@ -1,15 +1,136 @@
-"""Which scanner measured which of a survey's points: files of its own, or ids in those of all."""
+"""Whose a survey's points are: which session and which scanner recorded them.
 
+survey.toml tells it by the files of each, or by the point_source_ids in files of several.
+"""
+
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from mlscorr.io.clouds import count_sources, read_layout
-from mlscorr.io.surveys.survey_paths import own_clouds
+from mlscorr.io.clouds import count_sources, read_layout, timed_records
+from mlscorr.io.settings import SETTINGS
+from mlscorr.io.store import resolved
+from mlscorr.io.surveys.survey_paths import matching
 from mlscorr.io.surveys.survey_sections import PlannedSurveyFile, ScannerSection
-from mlscorr.survey import CloudFile, MountedScanner, SurveyFileError
+from mlscorr.io.trajectories import SessionFile, SessionSection
+from mlscorr.survey import CloudFile, MountedScanner, SurveyFileError, Trajectory
+
+
+def own_clouds(
+    path: Path,
+    key: str,
+    patterns: Sequence[str] | None,
+    clouds: Sequence[CloudFile],
+    owner: str = "",
+) -> list[CloudFile]:
+    """Those of a survey's clouds that patterns name; all without patterns.
+
+    Parameters
+    ----------
+    path : Path
+        Of survey.toml.
+    key : str
+        That holds the patterns.
+    patterns : sequence of str, optional
+    clouds : sequence of CloudFile
+    owner : str
+        Words on who has the patterns.
+
+    Raises
+    ------
+    ValueError
+        Where a pattern names none of them.
+    FileNotFoundError
+        Where there is no such file.
+    """
+    if patterns is None:
+        return [*clouds]
+    own = []
+    for pattern in patterns:
+        there = {resolved(file) for file in matching(path, key, pattern)}
+        named = [cloud for cloud in clouds if resolved(cloud.path) in there]
+        if not named:
+            raise SurveyFileError(
+                f"{key} of {path}: {pattern}{owner} is none of the {len(clouds)} files of [cloud]."
+            )
+        own += named
+    return own
+
+
+def check_belongings(
+    path: Path,
+    sessions: Sequence[SessionFile],
+    parts: Sequence[Trajectory],
+    clouds: Sequence[CloudFile],
+) -> None:
+    """Compare times of points with the trajectories whose files or point_source_ids they are.
+
+    The time of a point tells its trajectory in any case; this finds files under the wrong one.
+
+    Parameters
+    ----------
+    path : Path
+        Of survey.toml.
+    sessions : sequence of SessionFile
+    parts : sequence of Trajectory
+        Of these.
+    clouds : sequence of CloudFile
+
+    Raises
+    ------
+    ValueError
+        Where most points that were looked at in a file lie outside, and for files that are none
+        of the survey.
+
+    Warns
+    -----
+    UserWarning
+        Where some do.
+    """
+    if not clouds:
+        return
+    stated = []
+    for session, part in zip(sessions, parts, strict=True):
+        section = session.section
+        if isinstance(section, SessionSection) and (section.files or section.point_source_ids):
+            own = own_clouds(path, "trajectory.files", section.files, clouds)
+            stated.append((session.path.name, part, section.point_source_ids, own))
+    if not stated:
+        return
+    for cloud in clouds:
+        records = timed_records(read_layout(cloud.path))
+        times = cloud.trajectory_time(records["gps_time"])
+        belongs = np.zeros(len(times), bool)
+        inside = np.zeros(len(times), bool)
+        names = []
+        for name, part, ids, own in stated:
+            rows = np.isin(records["point_source_id"], ids or records["point_source_id"])
+            rows &= cloud in own
+            belongs |= rows
+            inside |= rows & (times >= part.gps_time[0]) & (times <= part.gps_time[-1])
+            if rows.any():
+                names.append(name)
+        outside = belongs & ~inside & np.isfinite(times)
+        if not outside.any():
+            continue
+        sentence = (
+            f"{outside.sum()} of {belongs.sum()} points sampled from {cloud.path.name} lie outside "
+            f"{' and '.join(names)}, to which {path.name} says they belong (first: "
+            f"{times[np.argmax(outside)]:.3f} s)"
+        )
+        if outside.sum() > (1 - SETTINGS.covered_share) * belongs.sum():
+            raise SurveyFileError(
+                f"{sentence}: another trajectory is theirs, or it is of another time system. "
+                "Correct files or point_source_ids under [[trajectory]], or leave them out: the "
+                "time of a point tells its trajectory."
+            )
+        warnings.warn(
+            f"{sentence}: the trajectory that covers their times is taken, where one does.",
+            stacklevel=3,
+        )
 
 
 def mounted_scanners(
@@ -48,21 +169,6 @@ def mounted_scanners(
         )
         for name, section in settings.scanners
     )
-
-
-def clouds_of(
-    scanners: Sequence[MountedScanner], clouds: Sequence[CloudFile]
-) -> tuple[CloudFile, ...]:
-    """The clouds of several scanners in the order of a survey's files.
-
-    Parameters
-    ----------
-    scanners : sequence of MountedScanner
-    clouds : sequence of CloudFile
-        The files.
-    """
-    parts = [part for scanner in scanners for part in scanner.clouds]
-    return tuple(part for cloud in clouds for part in parts if part.path == cloud.path)
 
 
 def _mounting(section):

@@ -1,0 +1,109 @@
+"""Passes of a drive brought together: ties are paired, corrected, and paired again, ever nearer."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from mlscorr.estimate import Estimate, previewed_correction, with_ties
+from mlscorr.survey import Survey, TieFeatures, Ties, time_spans
+from mlscorr.ties._gates import narrowest_gate, placed_sigma, widest_gate
+from mlscorr.ties.agreement import unheld_directions, unheld_sentence
+from mlscorr.ties.coarse import coarse_correction
+from mlscorr.ties.pairing import pair_features
+from mlscorr.ties.search import agreeing_ties, least_pause
+from mlscorr.ties.settings import SETTINGS
+from mlscorr.ties.thinning import thinned_ties
+
+
+def tie_passes(survey: Survey, estimate: Estimate, features: TieFeatures) -> Estimate:
+    """The estimate with the ties of a survey; the same with the reason where nothing is tied.
+
+    Pairs are looked for as far apart as the sigmas of the estimate allow; with each correction that
+    they make, within the geometric mean of that and of the scatter of what is left of them, half as
+    far at most, down to that scatter: at once, where a round left hardly less than that before.
+
+    Parameters
+    ----------
+    survey : Survey
+        Its search radius is the limit.
+    estimate : Estimate
+        By control points alone.
+    features : TieFeatures
+    """
+    mountings = ()  # that are open: those of several scanners, of which ties tell
+    if survey.scanners and None not in survey.mountings:
+        mountings = survey.mountings
+    sigma = placed_sigma(estimate.correction, survey, features)
+    radius = min(max(widest_gate(sigma), SETTINGS.least_gate), survey.search_radius)
+    moved = estimate.correction.increments(features.centre, features.gps_time)[0]
+    moved += coarse_correction(replace(features, centre=features.centre + moved), radius)
+    pause = SETTINGS.pause
+    least = least_pause(survey, features)
+    limit = 0.0
+    while True:
+        pairs = pair_features(features, moved, sigma, radius, pause=pause)
+        if not mountings:  # two scanners tell of their mountings, not of the drift
+            pairs = pairs[pairs.scanner[:, 0] == pairs.scanner[:, 1]]
+        ties = agreeing_ties(pairs, moved)
+        if len(ties) == 0 and not estimate.untied:
+            estimate = _untied(estimate, features, radius)
+        is_last = len(ties) == 0 or radius <= limit
+        if is_last and least < pause:
+            # visits come first: metres apart, they had no tie within the gates of a single one
+            pause = least
+            mountings = (survey.assumed_mounting,)
+            continue
+        if len(ties) == 0:
+            return estimate
+        if is_last:
+            unheld = _unheld(estimate, features, ties)
+            return with_ties(replace(estimate, notes=(*estimate.notes, *unheld)), ties, mountings)
+
+        half = thinned_ties(ties, SETTINGS.ties // 2)  # shows as well how near partners are
+        correction = previewed_correction(estimate, half, mountings)
+        moved = correction.increments(features.centre, features.gps_time)[0]
+        before = limit
+        limit = narrowest_gate(ties, moved)
+        is_settled = 0.0 < before < 1.1 * limit
+        if is_settled:
+            radius = limit
+        else:
+            radius = max(min(radius / 2, np.sqrt(radius * limit)), limit)
+
+
+def _untied(estimate: Estimate, features: TieFeatures, radius: float) -> Estimate:
+    """The estimate with the reason why nothing is tied, a warning where something should be."""
+    cells = np.floor(features.centre / radius)
+    cell = np.unique(cells, axis=0, return_inverse=True)[1].ravel()
+    first, last = time_spans(cell, features.gps_time)
+    near = int(np.count_nonzero((last - first)[cell] > SETTINGS.pause))  # at two visits
+    what = (
+        f"{near} of {len(features)} planes, poles and markings lie within about {radius:.1f} m of "
+        "what was scanned at another time"
+    )
+    if near < SETTINGS.neighbours:
+        reason = (
+            f"Nothing was scanned twice, or hardly: {what}. A second pass, best in the opposite "
+            "direction, carries what control points tell to where there are none."
+        )
+        return replace(estimate, untied=reason)
+    reason = (
+        f"Nothing that two passes both saw agrees: {what}, yet none is parallel and near enough. "
+        "Passes may lie farther apart than the POS states (raise its sigmas, or search_radius of "
+        "[matching]), or the mounting be wrong by degrees (mlscorr calibrate)."
+    )
+    return replace(estimate, untied=reason, notes=(*estimate.notes, reason))
+
+
+def _unheld(estimate: Estimate, features: TieFeatures, ties: Ties) -> Iterator[str]:
+    """Sentences on passes between which neither ties nor control of both hold a direction."""
+    control = estimate.equations.observed
+    first, last = time_spans(features.pass_number, features.gps_time)
+
+    for part, axis in unheld_directions(ties):
+        if np.median(np.diff(part.gps_time)) < SETTINGS.pause:  # of one pass: the POS holds it
+            continue
+        spans = zip(first[part.pass_number[0]], last[part.pass_number[0]], strict=True)
+        if not all(((control >= begin) & (control <= end)).any() for begin, end in spans):
+            yield unheld_sentence(part, axis)
