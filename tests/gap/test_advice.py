@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.gap import NOTHING_TO_DO
 from mlscorr.gap._agreement import Agreement
-from mlscorr.gap.advice import ADVICE, ONLY_DRIFT, advice_of, excess_of, sentence_of
+from mlscorr.gap.advice import ADVICE, NOTHING_TO_DO, ONLY_DRIFT, advice_of, excess_of, sentence_of
 from mlscorr.gap.closure import Closure
 from mlscorr.gap.closure._over_sigma import OverSigma
 from mlscorr.gap.closure.closure import Gap
