@@ -5,7 +5,16 @@ from typing import Annotated
 import typer
 
 import mlscorr
-from mlscorr.cli.terminal import Exit, Json, Out, Overwrite, Quiet, SurveyArgument, exit_code, say
+from mlscorr.cli.terminal import (
+    Exit,
+    Json,
+    Out,
+    Overwrite,
+    Quiet,
+    SurveyArgument,
+    exit_code,
+    say_results,
+)
 from mlscorr.cli.work import print_json, work
 
 
@@ -36,9 +45,12 @@ def apply(
         applied = mlscorr.apply(mlscorr.read_survey(survey), effects)
         content = applied.write(out, overwrite, progress)
     print_json(content, as_json)
+    results = []
     for effect in applied.effects:
         sizes = ", ".join(f"{size:.4g}" for size in np.atleast_1d(effect.magnitude))
-        say(f"Taken out: {effect.name} {sizes} {effect.quantities()['magnitude'].unit}")
-    say(f"Survey:    {out / 'survey.toml'}, with the clouds beside it")
+        unit = effect.quantities()["magnitude"].unit
+        results.append(("Taken out", f"{effect.name} {sizes} {unit}"))
+    results.append(("Survey", f"{out / 'survey.toml'}, with the clouds beside it"))
+    say_results(results)
     if any(file["untouched"] for file in content["files"]):
         raise typer.Exit(Exit.IN_PART)

@@ -37,9 +37,13 @@ def calibrate(
         _tell_estimates(part)
     if "scanners" not in content:
         _tell_estimates(content)
-    say(f"Calibration: {out / 'calibration.json'}")
-    say(f"Page:        {out / 'calibration.html'}")
-    say(f"Survey:      {out / 'survey.toml'}, with the calibrated mounting")
+    terminal.say_results(
+        [
+            ("Calibration", out / "calibration.json"),
+            ("Page", out / "calibration.html"),
+            ("Survey", f"{out / 'survey.toml'}, with the calibrated mounting"),
+        ]
+    )
     if not clouds:
         say("Its clouds are still as the recorded mounting put them; --clouds writes them anew.")
     if untouched := sum(file["untouched"] for file in content["files"]):

@@ -55,6 +55,5 @@ def _tell(report, out):
         terminal.say(
             f"{row['name']:16s}{axes}{row[by]['rmse_3d']:9.3f}{row['control']['rmse_3d']:9.3f}"
         )
-    terminal.say(f"Report: {out / 'compare.html'}")
-    for file in report["files"]:
-        terminal.say(f"Cloud:  {out / file['name']}")
+    clouds = [("Cloud", out / file["name"]) for file in report["files"]]
+    terminal.say_results([("Report", out / "compare.html"), *clouds])

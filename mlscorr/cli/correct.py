@@ -128,7 +128,8 @@ def tell(report: dict, out: Path, as_json: bool, page: bool = True) -> None:
         ("check points", report["check"], "after"),
     ]
     terminal.say_rmse(rows, width=24, decimals=3)
+    results: list[tuple[str, object]] = []
     if page:
-        terminal.say(f"Report:    {out / 'report.html'}")
-        terminal.say(f"Pictures:  {out / 'pictures'}")
-    terminal.say(f"Corrected: {', '.join(str(out / file['name']) for file in report['files'])}")
+        results += [("Report", out / "report.html"), ("Pictures", out / "pictures")]
+    clouds = ", ".join(str(out / file["name"]) for file in report["files"])
+    terminal.say_results([*results, ("Corrected", clouds)])

@@ -77,9 +77,13 @@ def diagnose(
         content = diagnosed.write(out, overwrite)
     print_json(content, as_json)
     _tell(content)
-    terminal.say(f"Page:      {out / 'gap.html'}")
-    terminal.say(f"Numbers:   {out / 'gap.json'}")
-    terminal.say(f"Simulator: {out / 'simulator.toml'}")
+    terminal.say_results(
+        [
+            ("Page", out / "gap.html"),
+            ("Numbers", out / "gap.json"),
+            ("Simulator", out / "simulator.toml"),
+        ]
+    )
 
 
 def _costs(text):

@@ -1,7 +1,15 @@
 """The command that lists target-like objects."""
 
 import mlscorr
-from mlscorr.cli.terminal import Json, Out, Overwrite, Quiet, SurveyArgument, say
+from mlscorr.cli.terminal import (
+    Json,
+    Out,
+    Overwrite,
+    Quiet,
+    SurveyArgument,
+    say,
+    say_results,
+)
 from mlscorr.cli.work import print_json, work
 
 
@@ -30,5 +38,5 @@ def extract(
         )
     for row in content["unseen"]:
         say(f"Without target: {row['name']}: {row['reason']}")
-    say(f"Targets:  {out / 'targets.csv'} and {out / 'targets.json'}")
-    say(f"Pictures: {out / 'targets.png'}")
+    tables = f"{out / 'targets.csv'} and {out / 'targets.json'}"
+    say_results([("Targets", tables), ("Pictures", out / "targets.png")])

@@ -1,7 +1,16 @@
 """The command that says what a survey will show before it is driven."""
 
 import mlscorr
-from mlscorr.cli.terminal import Effects, Json, Out, Overwrite, Quiet, SurveyArgument, say
+from mlscorr.cli.terminal import (
+    Effects,
+    Json,
+    Out,
+    Overwrite,
+    Quiet,
+    SurveyArgument,
+    say,
+    say_results,
+)
 from mlscorr.cli.work import print_json, work
 
 
@@ -35,5 +44,4 @@ def plan(
         say(accuracy_sentence(content["accuracy"]))
     for number, sentence in enumerate(content["advice"], start=1):
         say(f"{number}. {sentence}")
-    say(f"Page:    {out / 'plan.html'}")
-    say(f"Numbers: {out / 'plan.json'}")
+    say_results([("Page", out / "plan.html"), ("Numbers", out / "plan.json")])

@@ -56,7 +56,7 @@ def correct_drives(
     for row in result.document["drives"]:
         terminal.say(f"{row['name']}: {row['headline']}")
     if options.page:
-        terminal.say(f"Project:   {out / 'project.html'}")
+        terminal.say_results([("Project", out / "project.html")])
     reports = result.reports.items()
     failed = [f"{name}: {text}" for name, own in reports for text in failures(gates, own)]
     terminal.end(failed, result.is_whole)

@@ -5,7 +5,17 @@ from typing import Annotated
 
 import typer
 
-from mlscorr.cli.terminal import Effects, Exit, Json, Out, Overwrite, Quiet, exit_code, say
+from mlscorr.cli.terminal import (
+    Effects,
+    Exit,
+    Json,
+    Out,
+    Overwrite,
+    Quiet,
+    exit_code,
+    say,
+    say_results,
+)
 from mlscorr.cli.work import print_json, work
 
 
@@ -35,5 +45,5 @@ def simulate(
         f"{made['control']} control and {counted(made['check'], 'check point')}, "
         f"{counted(made['passes'], 'pass')} in {made['end'] - made['start']:.0f} s."
     )
-    say(f"Survey:  {out / 'survey.toml'}")
-    say(f"Truth:   {out / 'truth.json'} and {out / 'truth.npz'}")
+    truth = f"{out / 'truth.json'} and {out / 'truth.npz'}"
+    say_results([("Survey", out / "survey.toml"), ("Truth", truth)])

@@ -279,6 +279,19 @@ def say_statements(statements: list[dict]) -> None:
             speak("    " + ": ".join(filter(None, (item["name"], item["text"]))))
 
 
+def say_results(results: Iterable[tuple[str, object]]) -> None:
+    """Print where the results of a command are, or what it did, below each other.
+
+    Parameters
+    ----------
+    results : iterable of (title, path or text)
+    """
+    rows = list(results)
+    width = max((len(title) for title, _ in rows), default=0) + 1
+    for title, text in rows:
+        say(f"{title + ':':{width}s} {text}")
+
+
 def say_rmse(rows: Iterable[tuple[str, dict, str]], width: int, decimals: int) -> None:
     """Print a table of the RMSE of misclosures on stderr.
 

@@ -1,7 +1,15 @@
 """The command that finds what two passes both saw."""
 
 import mlscorr
-from mlscorr.cli.terminal import Json, Out, Overwrite, Quiet, SurveyArgument, say
+from mlscorr.cli.terminal import (
+    Json,
+    Out,
+    Overwrite,
+    Quiet,
+    SurveyArgument,
+    say,
+    say_results,
+)
 from mlscorr.cli.work import print_json, work
 
 
@@ -37,4 +45,4 @@ def ties(
         else:
             which = f"Passes {first} and {second}"
         say(f"{which}: rms {', '.join(parts)}.")
-    say(f"Ties: {out / 'ties.csv'} and {out / 'ties.json'}")
+    say_results([("Ties", f"{out / 'ties.csv'} and {out / 'ties.json'}")])

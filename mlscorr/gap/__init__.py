@@ -11,7 +11,7 @@ The story, a room each:
 - advice, document: what to do about it, and all of it as plain numbers and words
 """
 
-from mlscorr.gap.advice import NOTHING_TO_DO, no_cause
+from mlscorr.gap.advice import no_cause
 from mlscorr.gap.document import (
     assumed_document,
     cause_document,

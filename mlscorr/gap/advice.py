@@ -16,6 +16,7 @@ NOTHING_TO_DO = "Nothing needs to be done: what is left agrees with what the sim
 ONLY_DRIFT = (
     "Run mlscorr correct: what is left looks like drift of the POS, whose sigma nobody stated."
 )
+SEE_CHANNELS = "See by what the clouds differ beside geometry: Channels."
 ADVICE = {  # where no cause is named, by what is left is more than
     "": NOTHING_TO_DO,
     "stated": "Errors are larger than stated: run mlscorr correct, or state POS sigmas larger.",
@@ -120,6 +121,7 @@ def advice_of(
     excess: str,
     is_stated: bool = True,
     left_out: Mapping[str, str] = MappingProxyType({}),
+    is_equal: bool = True,
 ) -> list[str]:
     """What to do about a verdict, in sentences.
 
@@ -135,11 +137,19 @@ def advice_of(
         Whether somebody stated the sigmas of the POS.
     left_out : mapping of str to str
         Why effects were not judged.
+    is_equal : bool
+        Whether the clouds are equal beside geometry, so that nothing may need to be done.
     """
     verdict = inference.verdict
+    labels = (*verdict.set, *inference.same)
+    open_question = [lowered(title(n)) for n in labels if n not in ("none", verdict.label)]
+    is_open = bool(open_question and next_data)
     sentences = []
     if verdict.label == "none":
-        sentences.append(ADVICE[excess] if is_stated or excess else ONLY_DRIFT)
+        if not is_stated and not excess:
+            sentences.append(ONLY_DRIFT)
+        elif excess or (is_equal and not is_open):
+            sentences.append(ADVICE[excess])
     elif verdict.is_hidden:
         sentences.append(
             "Find out why the targets of that stretch could not be matched before the survey is "
@@ -161,19 +171,17 @@ def advice_of(
                 "explain it: don't use it."
             )
     else:
-        sentences += [effect_class(part).remedy for part in verdict.label.split("+")]
+        remedies = [effect_class(part).remedy for part in verdict.label.split("+")]
+        sentences += dict.fromkeys(remedies)
         (low, high), before, after = closure.null_band, closure.before, closure.after
         if closure.shrink < 0 and not low <= after <= high:
             sentences.append(
                 f"But with that size in the simulator the gap grew (from {before:.1f} to "
                 f"{after:.1f} {closure.unit}): trust what was found, not how large it is."
             )
-    labels = (*verdict.set, *inference.same)
-    open_question = [lowered(title(n)) for n in labels if n not in ("none", verdict.label)]
-    if open_question and next_data:
-        sentences = [sentence for sentence in sentences if sentence != NOTHING_TO_DO]
+    if is_open:
         sentences.append(
             f"To settle what is open ({', '.join(dict.fromkeys(open_question))}), measure "
             f"{next_data[0].survey}: {next_data[0].why}"
         )
-    return list(dict.fromkeys(map(with_articles, sentences)))
+    return [with_articles(sentence) for sentence in sentences]

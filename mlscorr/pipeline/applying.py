@@ -13,9 +13,9 @@ from mlscorr.correction import Correction
 from mlscorr.effects import Effect, joined
 from mlscorr.estimate import corrected_mounting
 from mlscorr.io.clouds import written_name
-from mlscorr.io.store import document, output_folder, write_json
 from mlscorr.io.surveys import FILE_NAME, write_survey_copy
 from mlscorr.io.trajectories import write_trajectory_csv
+from mlscorr.pipeline._result import Reported, ResultFiles
 from mlscorr.pipeline.clouds import write_clouds
 from mlscorr.pipeline.control_checks import remounting_fault
 from mlscorr.pipeline.finding import silent
@@ -186,46 +186,63 @@ class AppliedSurvey(Summary):
             As ``CorrectedSurvey.write`` does.
         """
         survey = self.survey
+        by_time = [effect.name for effect in self.effects if effect.name not in DATUM]
+
+        def clouds(folder):
+            done = (progress or silent)("Writing the cloud", survey.points)
+            return write_clouds(survey, folder, self.correction, done)
+
+        content = self._files(out, by_time).write(out, overwrite, clouds)
+        self._warn(content, by_time)
+        return content
+
+    def _files(self, out, by_time):
+        """trajectory.csv if it moves, survey.toml and applied.json."""
+        survey = self.survey
         correction = self.correction
         mounting = correction.corrected_mounting
-        files = []
-        left = []
-        by_time = [effect.name for effect in self.effects if effect.name not in DATUM]
-        with output_folder(out, survey.inputs, overwrite) as folder:
-            done = (progress or silent)("Writing the cloud", survey.points)
-            for path, points, outside in write_clouds(survey, folder, correction, done):
-                left.append(outside if by_time else 0)
-                files.append({"name": path.name, "points": points, "untouched": left[-1]})
-            trajectory = None
-            if any(effect.name not in MOUNTING for effect in self.effects):
-                trajectory = "trajectory.csv"
-                write_trajectory_csv(folder / trajectory, correction.corrected)
-            parts = survey.by_scanner.values()
-            write_survey_copy(
-                survey.path,
-                folder / FILE_NAME,
-                out,
-                [] if mounting is None else [mounting],
-                [[written_name(file.path) for file in part.clouds] for part in parts],
-                trajectory,
-                survey.corrected_by,
-                [] if mounting is None else [self.note],
-            )
+        tables = {}
+        trajectory = None
+        if any(effect.name not in MOUNTING for effect in self.effects):
+            trajectory = "trajectory.csv"
+            tables[trajectory] = lambda path: write_trajectory_csv(path, correction.corrected)
+        tables[FILE_NAME] = lambda path: write_survey_copy(
+            survey.path,
+            path,
+            out,
+            [] if mounting is None else [mounting],
+            [[written_name(file.path) for file in p.clouds] for p in survey.by_scanner.values()],
+            trajectory,
+            survey.corrected_by,
+            [] if mounting is None else [self.note],
+        )
+
+        def report(written):
             effects = [effect.document() for effect in self.effects]
-            content = document("applied", {"name": survey.name, "effects": effects, "files": files})
-            write_json(folder / "applied.json", content)
-        if any(left):
+            files = [
+                {"name": path.name, "points": points, "untouched": outside if by_time else 0}
+                for path, points, outside in written.clouds
+            ]
+            return Reported({"name": survey.name, "effects": effects, "files": files}, {})
+
+        return ResultFiles("applied", survey.inputs, report, tables)
+
+    def _warn(self, content, by_time):
+        """Warn of clouds that are torn now, and of a reference surface that stays."""
+        survey = self.survey
+        correction = self.correction
+        left = sum(row["untouched"] for row in content["files"])
+        if left:
             warnings.warn(
-                f"{sum(left)} of {survey.points} points outside the trajectory or in its gaps keep "
+                f"{left} of {survey.points} points outside the trajectory or in its gaps keep "
                 f"{joined(by_time)}, which goes by time: the clouds are torn there. Export the "
                 "whole trajectory, or clip the clouds to it.",
-                stacklevel=2,
+                stacklevel=3,
             )
         if survey.reference is not None and correction.datum.any():
             way = ", ".join(f"{a} {v:+.3f}" for a, v in zip("ENH", correction.datum, strict=True))
             warnings.warn(
                 f"The reference surface {survey.reference} stays where the clouds were. Move it by "
                 f"{way} m, too, or remove scene.reference from the new survey.toml.",
-                stacklevel=2,
+                stacklevel=3,
             )
-        return content

@@ -12,9 +12,9 @@ import numpy as np
 from mlscorr.estimate import MOUNTING_COMPONENTS, SCANNER_COMPONENTS, Calibration
 from mlscorr.evaluate import TargetRow, misfit_section, score, surveyed_rows
 from mlscorr.io.clouds import written_name
-from mlscorr.io.store import document, output_folder, write_json
 from mlscorr.io.surveys import FILE_NAME, mounting_values, write_survey_copy
 from mlscorr.io.trajectories import write_trajectory_csv
+from mlscorr.pipeline._result import Reported, ResultFiles
 from mlscorr.pipeline.clouds import write_clouds
 from mlscorr.pipeline.finding import silent
 from mlscorr.pipeline.found_effects import cloud_rows
@@ -75,43 +75,54 @@ class CalibrationResult(Summary):
         ValueError, OSError
             As ``CorrectedSurvey.write`` does.
         """
+        survey = self.survey
+
+        def write_corrected(folder):
+            done = (progress or silent)("Writing the cloud", survey.points)
+            moved = {
+                name: _correction(part.calibration, with_drift) for name, part in self.parts.items()
+            }
+            return write_clouds(survey, folder, moved, done)
+
+        files = self._files(out, with_drift, clouds)
+        return files.write(out, overwrite, write_corrected if clouds else None)
+
+    def _files(self, out, with_drift, clouds):
+        """trajectory.csv, survey.toml, calibration.json and its page."""
         from mlscorr.report import calibration_page
 
         survey = self.survey
-        parts = self.parts
-        read = {"clouds": cloud_rows(survey), "files": []}
-        content = document("calibration", self.report(with_drift) | read)
-        calibrations = {name: part.calibration for name, part in parts.items()}
-        files = [[written_name(file.path) for file in p.survey.clouds] for p in parts.values()]
-        with output_folder(out, survey.inputs, overwrite) as folder:
-            if with_drift:  # the one of all
-                drift = next(iter(calibrations.values())).drift
-                write_trajectory_csv(folder / "trajectory.csv", drift.corrected)
-            if clouds:
-                done = (progress or silent)("Writing the cloud", survey.points)
-                moved = {
-                    name: c.correction_with_drift if with_drift else c.correction()
-                    for name, c in calibrations.items()
-                }
-                for path, points, outside in write_clouds(survey, folder, moved, done):
-                    row = {"name": path.name, "points": points, "untouched": outside}
-                    content["files"].append(row)
-            calibration_page(content).write(folder / "calibration.html")
-            write_json(folder / "calibration.json", content)
-            write_survey_copy(
-                survey.path,
-                folder / FILE_NAME,
-                out,
-                [calibration.lsc.mounting for calibration in calibrations.values()],
-                files if clouds else (),
-                "trajectory.csv" if clouds and with_drift else None,
-                [
-                    *survey.corrected_by,
-                    *(name for part in parts.values() for name in part.used.name),
-                ],
-                [calibration.sigma_note for calibration in calibrations.values()],
-            )
-        return content
+        parts = self.parts.values()
+        names = []
+        if clouds:
+            names = [[written_name(file.path) for file in part.survey.clouds] for part in parts]
+        tables = {}
+        if with_drift:  # the one of all
+            drift = next(iter(parts)).calibration.drift
+            tables["trajectory.csv"] = lambda path: write_trajectory_csv(path, drift.corrected)
+        tables[FILE_NAME] = lambda path: write_survey_copy(
+            survey.path,
+            path,
+            out,
+            [part.calibration.lsc.mounting for part in parts],
+            names,
+            "trajectory.csv" if clouds and with_drift else None,
+            [*survey.corrected_by, *(name for part in parts for name in part.used.name)],
+            [part.calibration.sigma_note for part in parts],
+        )
+
+        def report(written):
+            files = [
+                {"name": path.name, "points": points, "untouched": outside}
+                for path, points, outside in written.clouds or ()
+            ]
+            read = {"clouds": cloud_rows(survey), "files": files}
+            pages = {
+                "calibration.html": lambda path, content: calibration_page(content).write(path)
+            }
+            return Reported(self.report(with_drift) | read, pages)
+
+        return ResultFiles("calibration", survey.inputs, report, tables)
 
 
 @dataclass(frozen=True, repr=False)
@@ -233,6 +244,13 @@ class CalibratedSurvey(CalibrationResult):
         """Rows of every surveyed point and pass."""
         points = self.matched_control, self.matched_check
         return surveyed_rows(*points, correction, self.calibration.outliers) + self.missing
+
+
+def _correction(calibration, with_drift):
+    """The Correction of the mounting, and of the trajectory too where the drift is wanted."""
+    if with_drift:
+        return calibration.correction_with_drift
+    return calibration.correction()
 
 
 def estimate_section(correction: np.ndarray, sigma: np.ndarray) -> dict[str, object]:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mlscorr.evaluate import TargetRow, surveyed_rows
-from mlscorr.io.store import document, output_folder, write_json
+from mlscorr.io.store import document
+from mlscorr.pipeline._result import Reported, ResultFiles
 from mlscorr.pipeline.clouds import write_clouds
 from mlscorr.pipeline.finding import silent
 from mlscorr.pipeline.methods import method_named
@@ -62,9 +64,9 @@ class ComparedSurvey(Summary):
             return "check"
         return "control"
 
-    @property
+    @cached_property
     def document(self) -> dict:
-        """The document of compare.json."""
+        """The document of compare.json, without the files."""
         from mlscorr.report import comparison_screen
 
         content = {
@@ -138,12 +140,18 @@ class ComparedSurvey(Summary):
             why = self.row(method_named(name).name)["why"]
             if why is not None:
                 raise ValueError(f"The method {name} has no cloud to write: {why}")
-        content = self.document
-        with output_folder(out, self.survey.inputs, overwrite, clouds) as folder:
-            content["files"] = self._write_clouds(folder, clouds, progress or silent)
-            write_json(folder / "compare.json", content)
-            write_comparison(folder / "compare.html", content)
-        return content
+        pages = {"compare.html": write_comparison}
+        files = ResultFiles(
+            "compare",
+            self.survey.inputs,
+            lambda written: Reported(self.document | {"files": written.clouds}, pages),
+        )
+        return files.write(
+            out,
+            overwrite,
+            lambda folder: self._write_clouds(folder, clouds, progress or silent),
+            clouds,
+        )
 
     def _write_clouds(self, folder, names, progress):
         """Rows on the files that were written."""

@@ -25,7 +25,6 @@ from mlscorr.evaluate import (
     tie_section,
 )
 from mlscorr.io.clouds import sha256
-from mlscorr.io.store import document, output_folder, write_json
 from mlscorr.io.tables import write_targets_csv
 from mlscorr.io.trajectories import (
     check_exports,
@@ -33,6 +32,7 @@ from mlscorr.io.trajectories import (
     write_trajectory_csv,
     write_weak,
 )
+from mlscorr.pipeline._result import Reported, ResultFiles
 from mlscorr.pipeline.clouds import MovedClouds, WrittenClouds, write_counted
 from mlscorr.pipeline.finding import silent
 from mlscorr.survey import Matched, Summary, Survey, Trajectory, rows_frame
@@ -201,11 +201,14 @@ class CorrectedSurvey(Summary):
             When writing fails.
         """
         check_exports(trajectories, self.survey.crs, is_read=True)
-        with output_folder(out, self.survey.inputs, overwrite) as folder:
+
+        def clouds(folder):
             done = (progress or silent)("Writing the cloud", self.survey.points)
             moved = MovedClouds(self.survey, self.estimate.correction, self.held)
             (written,) = write_counted([moved], folder, done, sigma)
-            return self.write_beside(folder, written, progress, page, trajectories)
+            return written
+
+        return self._files(progress, page, trajectories).write(out, overwrite, clouds)
 
     @property
     def held(self) -> tuple[tuple[float, float], Support]:
@@ -225,35 +228,52 @@ class CorrectedSurvey(Summary):
         trajectories: Sequence[str] = (),
     ) -> dict:
         """Write all but the clouds into a folder that is there, as ``write`` does."""
+        return self._files(progress, page, trajectories).write_beside(folder, written)
+
+    def _files(self, progress, page, trajectories):
+        """Trajectory, targets, weak stretches and report.json; report.html and the pictures."""
         from mlscorr.report import first_screen
 
-        write_trajectory_csv(folder / "trajectory.csv", self.trajectory)
-        exports = [
-            name
-            for export in trajectories
-            for name in export_trajectory(folder / export, self.trajectory, self.survey.crs)
-        ]
-        write_targets_csv(folder / "targets.csv", [row.document() for row in self.targets])
+        survey = self.survey
+        rows = [row.document() for row in self.targets]
         weak = [stretch.document() for stretch in self.estimate.support.weak]
-        weak_names = write_weak(folder, weak, self.trajectory, self.survey.crs)
-        report = self._report(folder, written, exports, weak_names)
-        content = document("report", first_screen(report) | report.document())
-        write_json(folder / "report.json", content)
-        if page:
-            self._draw(folder, report, progress or silent)
-        return content
+        exports = {
+            name: lambda path: export_trajectory(path, self.trajectory, survey.crs)
+            for name in trajectories
+        }
+        tables = {
+            "trajectory.csv": lambda path: write_trajectory_csv(path, self.trajectory),
+            **exports,
+            "targets.csv": lambda path: write_targets_csv(path, rows),
+            "weak.csv": lambda path: write_weak(path.parent, weak, self.trajectory, survey.crs),
+        }
 
-    def _draw(self, folder, report, progress):
-        """Write report.html and the pictures."""
+        def report(written):
+            exported = [name for export in trajectories for name in written.tables[export]]
+            report = self._report(
+                written.folder, written.clouds, exported, written.tables["weak.csv"]
+            )
+            pages = self._pages(report, progress or silent) if page else {}
+            return Reported(first_screen(report) | report.document(), pages)
+
+        return ResultFiles("report", survey.inputs, report, tables)
+
+    def _pages(self, report, progress):
+        """report.html and the folder of pictures."""
         from mlscorr.report import view_cloud, write_pictures, write_report
 
         correction = self.estimate.correction
         ties = self.estimate.ties
-        views = view_cloud(self.survey, correction, report.targets, progress, ties)
-        shown = self.survey, correction, report, views, self.fitted, ties
-        write_report(folder / "report.html", *shown)
-        (folder / "pictures").mkdir()
-        write_pictures(folder / "pictures", correction, report, ties)
+
+        def write_page(path, _):
+            views = view_cloud(self.survey, correction, report.targets, progress, ties)
+            write_report(path, self.survey, correction, report, views, self.fitted, ties)
+
+        def draw(path, _):
+            path.mkdir()
+            write_pictures(path, correction, report, ties)
+
+        return {"report.html": write_page, "pictures": draw}
 
     @cached_property
     def next_control(self) -> tuple[NextControl, ...]:

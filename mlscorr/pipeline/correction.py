@@ -99,9 +99,9 @@ def correct(
         raise ValueError(f"{NOTHING_TIED.format(survey.path)} {estimate.untied}")
 
     result = CorrectedSurvey(**corrected_fields(survey, control, check, finding, estimate))
-    others = result.warnings[len(finding.warnings) :]  # those of the finding were told meanwhile
     datum = (difference.sentence for difference in result.datum)
-    for sentence in (*others, *datum, *estimate.warnings):
+    # those of the finding were given when it was made
+    for sentence in (*control_warnings(survey, finding), *datum, *estimate.warnings):
         warnings.warn(sentence, stacklevel=2)
     return result
 
@@ -232,7 +232,6 @@ def corrected_fields(
         By the control points.
     """
     used = control[estimate.used]
-    others = *finding.uncovered, *reuse_warnings(survey)
     return {
         "survey": survey,
         "estimate": estimate,
@@ -242,6 +241,17 @@ def corrected_fields(
             survey, finding.matches.refusals, finding.candidates, finding.scanned
         ),
         "fitted": finding.fitted,
-        "warnings": (*finding.warnings, *others),
+        "warnings": (*finding.warnings, *control_warnings(survey, finding)),
         "datum": datum_differences(used, survey.trajectory, survey.pos, survey.crs),
     }
+
+
+def control_warnings(survey: Survey, finding: Finding) -> tuple[str, ...]:
+    """Warnings on control points that no cloud covers, or that corrected the survey before.
+
+    Parameters
+    ----------
+    survey : Survey
+    finding : Finding
+    """
+    return (*finding.uncovered, *reuse_warnings(survey))

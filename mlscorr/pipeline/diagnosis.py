@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +12,6 @@ import numpy as np
 
 from mlscorr.effects import Effect, known_effects
 from mlscorr.gap import (
-    NOTHING_TO_DO,
     assumed_document,
     contrast,
     gap_document,
@@ -25,13 +24,13 @@ from mlscorr.gap.evidence import Costs, Inference, infer_causes
 from mlscorr.gap.plan import NextData, next_data
 from mlscorr.gap.residuals import Absence, Rows, background
 from mlscorr.gap.signatures import Signature, as_believed, curvature, select, signatures, with_cause
-from mlscorr.io.store import document, output_folder, write_json
+from mlscorr.pipeline._result import KnownResult, ResultFiles
 from mlscorr.pipeline.compared_rows import compare_with_belief, compare_with_clouds
 from mlscorr.pipeline.finding import silent
 from mlscorr.pipeline.found_effects import cloud_rows
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.simulate import Simulator, beliefs_of, write_simulator
-from mlscorr.survey import Summary, Survey, check_rng, check_survey, rows_frame
+from mlscorr.survey import Survey, check_rng, check_survey, rows_frame
 
 if TYPE_CHECKING:
     import pandas
@@ -180,12 +179,13 @@ def _looks_again(absence):
 
 
 @dataclass(frozen=True, repr=False)
-class DiagnosedSurvey(Summary):
+class DiagnosedSurvey(KnownResult):
     """A survey with its diagnosis: the document of gap.json, and ``write``.
 
     ``scale`` is that on the sigmas of the POS that nobody stated.
     """
 
+    _name = "gap"
     survey: Survey
     simulator: Simulator
     effects: tuple[Effect, ...]
@@ -210,12 +210,14 @@ class DiagnosedSurvey(Summary):
         pos = with_scale(believed.pos, self.scale, open_sigmas(believed))
         return replace(believed, pos=pos)
 
-    @property
-    def document(self) -> dict:
-        """The document of gap.json."""
+    def _content(self):
         from mlscorr.report.gap import gap_screen
 
         believed = self._believed
+        if self._has_named_cause:
+            next_step = self._improvement[1] or self.next_run
+        else:
+            next_step = ""
         content = gap_document(
             survey=believed,
             rows=self.rows,
@@ -226,33 +228,35 @@ class DiagnosedSurvey(Summary):
             left_out=self.left_out,
             warnings=self.warnings,
             absence=self.absence,
+            contrasts=self.contrasts,
+            next_step=next_step,
         )
-        if self.inference.verdict.label not in ("none", "unknown"):
-            content["advice"].append(self._improvement[1] or self.next_run)
-        if any(contrast.sentences for contrast in self.contrasts):
-            content["advice"] = [s for s in content["advice"] if s != NOTHING_TO_DO]
-            content["advice"].append("See by what the clouds differ beside geometry: Channels.")
         content["assumed"] = assumed_document(believed, self.inference, self.scale)
         content["costs"] = vars(self.costs)
         content["contrasts"] = [contrast.document() for contrast in self.contrasts]
         content["distances"] = [distance.document() for distance in self.distances]
-        return document("gap", gap_screen(content) | content)
+        return gap_screen(content) | content
+
+    @property
+    def _has_named_cause(self):
+        """Whether an effect is named, which a simulator may take."""
+        return self.inference.verdict.label not in ("none", "unknown")
 
     @property
     def improved(self) -> Simulator:
         """The Simulator with the cause in it; the same where there is none that it could take."""
         return self._improvement[0]
 
-    @property
+    @cached_property
     def _improvement(self):
         """The Simulator with the cause in it, or the same and a sentence why it can't take that."""
-        if self.inference.verdict.label in ("none", "unknown"):
+        if not self._has_named_cause:
             return self.simulator, ""
-        pos = self._believed.pos
-        names = open_sigmas(self._believed)
+        believed = self._believed
+        names = open_sigmas(believed)
         try:
             improved = with_cause(
-                replace(self.simulator, pos=pos), self.survey, self.inference.cause
+                replace(self.simulator, pos=believed.pos), self.survey, self.inference.cause
             )
             if set(names) <= set(improved.pos.assumed):  # the next run finds their scale again
                 pos = with_scale(improved.pos, 1.0 / self.scale, names)
@@ -295,55 +299,27 @@ class DiagnosedSurvey(Summary):
         sentences = [content["verdict"]["sentence"], content["headline"], *content["advice"]]
         return [(sentence,) for sentence in (self.survey.name, *sentences)]
 
-    def write(self, out: Path, overwrite: bool = False) -> dict:
-        """Write gap.json, gap.html and simulator.toml into a folder, whole or not at all.
-
-        Parameters
-        ----------
-        out : Path
-        overwrite : bool
-            An older folder.
-
-        Returns
-        -------
-        document : dict
-            That of gap.json.
-
-        Raises
-        ------
-        Exception
-            As ``CorrectedSurvey.write`` does.
-        """
-        return write_diagnosis(out, self.document, self.survey, self.improved, overwrite)
+    def _files(self):
+        return gap_files(self.document, self.survey, self.improved)
 
 
-def write_diagnosis(
-    out: Path, content: dict, survey: Survey, simulator: Simulator, overwrite: bool
-) -> dict:
-    """Write gap.json, gap.html and simulator.toml, and return the document.
+def gap_files(content: dict, survey: Survey, simulator: Simulator) -> ResultFiles:
+    """gap.json, gap.html and simulator.toml.
 
     Parameters
     ----------
-    out : Path
     content : dict
         The document of gap.json.
     survey : Survey
     simulator : Simulator
         With what was found.
-    overwrite : bool
-        An older folder.
-
-    Raises
-    ------
-    Exception
-        As ``CorrectedSurvey.write`` does.
     """
     from mlscorr.report.gap import diagnosis_page
 
-    page = diagnosis_page(content, survey.name)
-    content = content | {"clouds": cloud_rows(survey)}
-    with output_folder(out, survey.inputs, overwrite) as folder:
-        write_json(folder / "gap.json", content)
-        page.write(folder / "gap.html")
-        write_simulator(simulator, folder / "simulator.toml")
-    return content
+    return ResultFiles.of(
+        "gap",
+        survey.inputs,
+        content | {"clouds": cloud_rows(survey)},
+        tables={"simulator.toml": lambda path: write_simulator(simulator, path)},
+        pages={"gap.html": lambda path, gap: diagnosis_page(gap, survey.name).write(path)},
+    )

@@ -6,18 +6,17 @@ import warnings
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mlscorr.io.clouds import read_chunks
-from mlscorr.io.store import document, output_folder, write_json
 from mlscorr.io.tables import write_extracted_csv
+from mlscorr.pipeline._result import KnownResult, ResultFiles
 from mlscorr.pipeline.beams import with_beam_origin
 from mlscorr.pipeline.finding import Finding, fit_while_reading, match_targets, silent, unmatched
 from mlscorr.pipeline.settings import SETTINGS
-from mlscorr.survey import Summary, Survey, TargetObservations, check_rng, check_survey, rows_frame
+from mlscorr.survey import Survey, TargetObservations, check_rng, check_survey, rows_frame
 from mlscorr.targets import BY_EDGES, distinct, search_targets, why_useless
 
 if TYPE_CHECKING:
@@ -132,7 +131,7 @@ def _sentences(survey, intensities, targets):
 
 
 @dataclass(frozen=True, repr=False)
-class ExtractedSurvey(Summary):
+class ExtractedSurvey(KnownResult):
     """What was found in a survey's cloud, and ``write``.
 
     Parameters
@@ -142,6 +141,7 @@ class ExtractedSurvey(Summary):
     warnings : tuple of str
     """
 
+    _name = "targets"
     survey: Survey
     finding: Finding
     warnings: tuple[str, ...]
@@ -198,44 +198,26 @@ class ExtractedSurvey(Summary):
             )
         return rows
 
-    def write(self, out: str | Path, overwrite: bool = False) -> dict:
-        """Write targets.csv, targets.json and the contact sheet targets.png into a folder.
+    def _content(self):
+        return {
+            "name": self.survey.name,
+            "crs": self.survey.crs,
+            "surveyed": len(self.survey.surveyed),
+            "targets": self.targets,
+            "unseen": self.missing,
+            "warnings": list(self.warnings),
+        }
 
-        The folder appears whole or not at all.
-
-        Parameters
-        ----------
-        out : path
-        overwrite : bool
-
-        Returns
-        -------
-        dict
-            The document of targets.json.
-
-        Raises
-        ------
-        ValueError
-            When the folder holds an input, or holds anything without overwrite.
-        OSError
-            When writing fails.
-        """
+    def _files(self):
+        """targets.csv, targets.json and the contact sheet targets.png."""
         from mlscorr.report import write_contact_sheet
 
         rows = self.targets
-        content = document(
-            "targets",
-            {
-                "name": self.survey.name,
-                "crs": self.survey.crs,
-                "surveyed": len(self.survey.surveyed),
-                "targets": rows,
-                "unseen": self.missing,
-                "warnings": list(self.warnings),
-            },
+        fitted = self.finding.fitted
+        return ResultFiles.of(
+            self._name,
+            self.survey.inputs,
+            self.document,
+            tables={"targets.csv": lambda path: write_extracted_csv(path, rows)},
+            pages={"targets.png": lambda path, _: write_contact_sheet(path, rows, fitted)},
         )
-        with output_folder(out, self.survey.inputs, overwrite) as folder:
-            write_extracted_csv(folder / "targets.csv", rows)
-            write_json(folder / "targets.json", content)
-            write_contact_sheet(folder / "targets.png", rows, self.finding.fitted)
-        return content

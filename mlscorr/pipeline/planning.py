@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,8 +15,8 @@ from mlscorr.gap.evidence import Observations, Separability, compare_signatures
 from mlscorr.gap.plan import NextData, event_sizes, next_data, planned_rows
 from mlscorr.gap.residuals import Rows, background
 from mlscorr.gap.signatures import signatures
-from mlscorr.io.store import document, output_folder, write_json
-from mlscorr.survey import Matched, Summary, Survey, TargetObservations, check_survey, rows_frame
+from mlscorr.pipeline._result import KnownResult, ResultFiles
+from mlscorr.survey import Matched, Survey, TargetObservations, check_survey, rows_frame
 
 if TYPE_CHECKING:
     import pandas
@@ -97,9 +96,10 @@ _NOISE = "Noise shows in the roughness of surfaces and the spread of residuals, 
 
 
 @dataclass(frozen=True, repr=False)
-class PlannedSurvey(Summary):
+class PlannedSurvey(KnownResult):
     """A survey before it is driven: the document of plan.json, and ``write``."""
 
+    _name = "plan"
     survey: Survey
     kinds: tuple[type[Effect], ...]
     rows: Rows
@@ -109,9 +109,7 @@ class PlannedSurvey(Summary):
     left_out: dict[str, str]
     accuracy: PlannedAccuracy | None = None
 
-    @property
-    def document(self) -> dict:
-        """The document of plan.json."""
+    def _content(self):
         content = separability_document(self.separability)
         for name, (parameters, units, sizes) in self.events.items():
             content["detectable"][name] = [
@@ -128,23 +126,20 @@ class PlannedSurvey(Summary):
         places = []
         if self.accuracy is not None:
             places = [place.document() for place in self.accuracy.next_control]
-        return document(
-            "plan",
-            {
-                "name": self.survey.name,
-                "looks": len(np.unique(self.rows.item)),
-                **content,
-                "next_data": [vars(addition) for addition in self.next_data],
-                "map": map_document(self.survey)
-                | {"next_control": [[p["easting"], p["northing"]] for p in places]},
-                "accuracy": self._accuracy_document(),
-                "next_control": places,
-                "advice": self._advice(content["detectable"]),
-                "left_out": self.left_out,
-                "notes": list(self.survey.notes),
-                "warnings": [],
-            },
-        )
+        return {
+            "name": self.survey.name,
+            "looks": len(np.unique(self.rows.item)),
+            **content,
+            "next_data": [vars(addition) for addition in self.next_data],
+            "map": map_document(self.survey)
+            | {"next_control": [[p["easting"], p["northing"]] for p in places]},
+            "accuracy": self._accuracy_document(),
+            "next_control": places,
+            "advice": self._advice(content["detectable"]),
+            "left_out": self.left_out,
+            "notes": list(self.survey.notes),
+            "warnings": [],
+        }
 
     def _accuracy_document(self):
         """Sigma of the corrected position along the drive: 3D, m."""
@@ -212,28 +207,18 @@ class PlannedSurvey(Summary):
         """What a notebook shows."""
         return [(sentence,) for sentence in (self.survey.name, *self.document["advice"])]
 
-    def write(self, out: str | Path, overwrite: bool = False) -> dict:
-        """Write plan.json and plan.html into a folder, whole or not at all: the document.
-
-        Parameters
-        ----------
-        out : path
-        overwrite : bool
-            Whether the folder may exist.
-
-        Raises
-        ------
-        FileExistsError, ValueError
-            As ``CorrectedSurvey.write`` does.
-        """
+    def _files(self):
+        """plan.json and plan.html."""
         from mlscorr.report.gap import plan_page
 
-        content = self.document
-        page = plan_page(content, self.survey.name)
-        with output_folder(out, self.survey.inputs, overwrite) as folder:
-            write_json(folder / "plan.json", content)
-            page.write(folder / "plan.html")
-        return content
+        name = self.survey.name
+        return ResultFiles.of(
+            self._name,
+            self.survey.inputs,
+            self.document,
+            tables={},
+            pages={"plan.html": lambda path, content: plan_page(content, name).write(path)},
+        )
 
 
 def check_enough(

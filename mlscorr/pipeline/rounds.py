@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
+from functools import cached_property
 
 import numpy as np
 
@@ -10,16 +10,15 @@ from mlscorr.effects import lowered, title
 from mlscorr.gap import cause_document, no_cause, windows_document
 from mlscorr.gap.closure import LoneEffect, lone_effects
 from mlscorr.gap.evidence import Costs
-from mlscorr.io.store import document
-from mlscorr.pipeline.compared_rows import NEXT_RUN
-from mlscorr.pipeline.diagnosis import DiagnosedSurvey, diagnose, write_diagnosis
+from mlscorr.pipeline._result import KnownResult
+from mlscorr.pipeline.diagnosis import DiagnosedSurvey, diagnose, gap_files
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.simulate import Simulator
 from mlscorr.survey import Survey
 
 
-@dataclass(frozen=True)
-class DiagnosedRounds:
+@dataclass(frozen=True, repr=False)
+class DiagnosedRounds(KnownResult):
     """Diagnoses of one survey, each with what those before it found in the simulator.
 
     Parameters
@@ -30,6 +29,7 @@ class DiagnosedRounds:
         Each effect by itself, in the first round.
     """
 
+    _name = "gap"
     rounds: tuple[DiagnosedSurvey, ...]
     lone: tuple[LoneEffect, ...]
 
@@ -57,38 +57,20 @@ class DiagnosedRounds:
             return f"Round {number}: {words} can't be put into the simulator once more."
         return f"After {number} rounds {words} is still found: the simulator has what was named."
 
-    @property
-    def document(self) -> dict:
-        """That of gap.json of the first round, with ``ablation``."""
+    def _content(self):
         rounds = [_round_document(*numbered) for numbered in enumerate(self.rounds, start=1)]
         lone = [vars(effect) | {"unit": "mm"} for effect in self.lone]
         ablation = {"rounds": rounds, "alone": lone, "ended": self.ended}
-        first = self.rounds[0].document
-        advice = [sentence for sentence in first["advice"] if sentence != NEXT_RUN]
-        return document("gap", first | {"ablation": ablation, "advice": advice})
+        return self._first.document | {"ablation": ablation}
 
-    def write(self, out: Path, overwrite: bool = False) -> dict:
-        """Write gap.json and gap.html of the first round, and the last simulator.toml.
+    @cached_property
+    def _first(self):
+        """The first round, which needs no advice to run once more: that was done."""
+        return replace(self.rounds[0], next_run="")
 
-        Parameters
-        ----------
-        out : Path
-        overwrite : bool
-            An older folder.
-
-        Returns
-        -------
-        document : dict
-            That of gap.json.
-
-        Raises
-        ------
-        Exception
-            As ``CorrectedSurvey.write`` does.
-        """
-        survey = self.rounds[0].survey
-        improved = self.rounds[-1].improved
-        return write_diagnosis(out, self.document, survey, improved, overwrite)
+    def _files(self):
+        """gap.json and gap.html of the first round, and the last simulator.toml."""
+        return gap_files(self.document, self._first.survey, self.rounds[-1].improved)
 
 
 def _round_document(number, diagnosed):

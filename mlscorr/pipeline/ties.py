@@ -5,17 +5,16 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mlscorr.evaluate import misfit
 from mlscorr.io.clouds import read_chunks
-from mlscorr.io.store import document, output_folder, write_json
 from mlscorr.io.tables import write_ties_csv
+from mlscorr.pipeline._result import KnownResult, ResultFiles
 from mlscorr.pipeline.finding import silent
-from mlscorr.survey import TIE_KINDS, Summary, Survey, TieFeatures, check_survey
+from mlscorr.survey import TIE_KINDS, Survey, TieFeatures, check_survey
 from mlscorr.ties import (
     SETTINGS,
     TieCollector,
@@ -75,7 +74,7 @@ def find_ties(survey: Survey, progress: Callable | None = None) -> TiedSurvey:
 
 
 @dataclass(frozen=True, repr=False)
-class TiedSurvey(Summary):
+class TiedSurvey(KnownResult):
     """What passes of a survey both saw, and ``write``.
 
     Parameters
@@ -85,6 +84,7 @@ class TiedSurvey(Summary):
     search : TieSearch
     """
 
+    _name = "ties"
     survey: Survey
     features: TieFeatures
     search: TieSearch
@@ -171,49 +171,33 @@ class TiedSurvey(Summary):
         sentences += [unheld_sentence(*unheld) for unheld in unheld_directions(ties)]
         return tuple(sentences)
 
-    def write(self, out: str | Path, overwrite: bool = False) -> dict:
-        """Write ties.csv and ties.json into a folder, whole or not at all.
-
-        Parameters
-        ----------
-        out : path
-        overwrite : bool
-
-        Returns
-        -------
-        dict
-            The document of ties.json.
-
-        Raises
-        ------
-        ValueError
-            When the folder holds an input, or holds anything without overwrite.
-        OSError
-            When writing fails.
-        """
+    def _content(self):
         kinds = self.features.kind
         passes = self.features.pass_number
-        content = document(
-            "ties",
-            {
-                "name": self.survey.name,
-                "crs": self.survey.crs,
-                "features": {
-                    **{kind: int((kinds == kind).sum()) for kind in TIE_KINDS},
-                    "passes": {str(p): int((passes == p).sum()) for p in np.unique(passes)},
-                },
-                "search_radius": self.search.radius,
-                "ties": len(self.search.ties),
-                "refused": len(self.search.refused),
-                "pairs": self.pairs,
-                "stretches": self.stretches,
-                "warnings": list(self.warnings),
+        return {
+            "name": self.survey.name,
+            "crs": self.survey.crs,
+            "features": {
+                **{kind: int((kinds == kind).sum()) for kind in TIE_KINDS},
+                "passes": {str(p): int((passes == p).sum()) for p in np.unique(passes)},
             },
+            "search_radius": self.search.radius,
+            "ties": len(self.search.ties),
+            "refused": len(self.search.refused),
+            "pairs": self.pairs,
+            "stretches": self.stretches,
+            "warnings": list(self.warnings),
+        }
+
+    def _files(self):
+        """ties.csv and ties.json."""
+        return ResultFiles.of(
+            self._name,
+            self.survey.inputs,
+            self.document,
+            tables={"ties.csv": lambda path: write_ties_csv(path, self.search.ties)},
+            pages={},
         )
-        with output_folder(out, self.survey.inputs, overwrite) as folder:
-            write_ties_csv(folder / "ties.csv", self.search.ties)
-            write_json(folder / "ties.json", content)
-        return content
 
 
 def _misfit(misclosure):

@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.gap import NOTHING_TO_DO
 from mlscorr.gap._agreement import Agreement
-from mlscorr.gap.advice import ADVICE, ONLY_DRIFT, advice_of, excess_of, sentence_of
+from mlscorr.gap.advice import ADVICE, NOTHING_TO_DO, ONLY_DRIFT, advice_of, excess_of, sentence_of
 from mlscorr.gap.closure import Closure
 from mlscorr.gap.closure._over_sigma import OverSigma
 from mlscorr.gap.closure.closure import Gap
@@ -128,3 +127,9 @@ def test_a_size_with_which_the_gap_grew_is_not_advised_alone(after, shrink, is_s
     advice = advice_of(found, closure("range_noise", 18.7, after, shrink), [], "")
     assert "as large as found" in advice[0]
     assert any("the gap grew (from 18.7 to -53.9 mm)" in sentence for sentence in advice) == is_said
+
+
+def test_where_clouds_differ_beside_geometry_something_needs_to_be_done():
+    "Geometry agrees, the intensity does not: that nothing needs to be done is not said"
+    assert advice_of(inference(), closure(), [], "", is_equal=False) == []
+    assert advice_of(inference(), closure(), [], "stated", is_equal=False) == [ADVICE["stated"]]

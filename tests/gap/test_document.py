@@ -13,6 +13,7 @@ from mlscorr.gap.advice import distinct_parameters
 from mlscorr.gap.evidence import Cause, CauseParameter, Separability
 from mlscorr.gap.evidence._error_models import STATED
 from mlscorr.gap.signatures import signatures
+from mlscorr.report.gap._labels import parameters_of
 
 
 def test_separability_is_told_in_plain_numbers():
