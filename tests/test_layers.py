@@ -14,6 +14,7 @@ import mlscorr
 PACKAGE = Path(mlscorr.__file__).parent
 FLOORS = (  # from the ground up; rooms on one floor do not know each other
     ("compiled_loops",),
+    ("wording",),
     ("survey",),
     ("frames",),
     ("correction", "collocation", "pos"),

@@ -9,6 +9,7 @@ import typer
 
 from mlscorr.cli import terminal
 from mlscorr.cli.work import print_json
+from mlscorr.wording import percent
 
 if TYPE_CHECKING:
     from mlscorr.evaluate import Gate
@@ -92,7 +93,7 @@ def status(
     for row in content["drives"]:
         stages = [f"{s['title'].lower()} {s['done']} of {s['tasks']}" for s in row["stages"]]
         terminal.say(f"{row['name']}: {', '.join(stages)}")
-    shares = [f"{stage['title'].lower()} {stage['share']:.0%}" for stage in content["all"]]
+    shares = [f"{stage['title'].lower()} {percent(stage['share'])}" for stage in content["all"]]
     terminal.say(f"All: {', '.join(shares)}")
     for line in content["failures"]:
         terminal.warn(line)

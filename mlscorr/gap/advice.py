@@ -4,11 +4,12 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from mlscorr.effects import effect_class, lowered, percent, size, title, with_articles
+from mlscorr.effects import effect_class, lowered, title
 from mlscorr.gap._agreement import Agreement
 from mlscorr.gap.closure import Closure
 from mlscorr.gap.evidence import SETTINGS, Cause, CauseParameter, Inference
 from mlscorr.gap.plan import NextData
+from mlscorr.wording import percent, size, with_articles
 
 NOTHING_TO_DO = "Nothing needs to be done: what is left agrees with what the simulator says."
 ONLY_DRIFT = (

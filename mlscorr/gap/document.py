@@ -6,7 +6,7 @@ from dataclasses import asdict
 
 import numpy as np
 
-from mlscorr.effects import Effect, with_articles
+from mlscorr.effects import Effect
 from mlscorr.gap._agreement import agreements
 from mlscorr.gap._headline import headline
 from mlscorr.gap.advice import advice_of, distinct_parameters, excess_of, sentence_of
@@ -16,6 +16,7 @@ from mlscorr.gap.open_scale import open_sigmas
 from mlscorr.gap.plan import NextData
 from mlscorr.gap.residuals import Absence, Rows, background
 from mlscorr.survey import Survey
+from mlscorr.wording import with_articles
 
 MAP_POINTS = 1500  # of trajectory and rows on the map: more can't be seen on a page
 LISTED = 1e-4  # probability from which on a pair is listed in the evidence

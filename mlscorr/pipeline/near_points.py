@@ -10,8 +10,9 @@ from mlscorr.evaluate import BeamCheck
 from mlscorr.io.surveys import ProjectParts
 from mlscorr.pipeline.beam_origin import with_beam_origin
 from mlscorr.pipeline.settings import SETTINGS
-from mlscorr.survey import CloudFile, PointCloud, Survey, SurveyFileError, counted
+from mlscorr.survey import CloudFile, PointCloud, Survey, SurveyFileError
 from mlscorr.targets import BY_EDGES, Candidates, search_radius, why_useless
+from mlscorr.wording import counted
 
 
 class NearPoints:

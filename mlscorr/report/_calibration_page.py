@@ -15,7 +15,7 @@ from mlscorr.report.headline import (
     warning_statements,
 )
 from mlscorr.report.pages import Page
-from mlscorr.report.tables import length_in_words, millimetres
+from mlscorr.wording import length_in_words, millimetres
 
 PARTS = ("lever_arm", "boresight")
 SECTIONS = {

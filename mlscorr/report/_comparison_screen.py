@@ -3,11 +3,10 @@
 from collections.abc import Iterator
 from typing import Any
 
-from mlscorr.effects import joined
 from mlscorr.evaluate import PointCounts, TargetRow
-from mlscorr.report import headline, tables
+from mlscorr.report import headline
 from mlscorr.report.settings import SETTINGS
-from mlscorr.survey import counted
+from mlscorr.wording import counted, joined, number
 
 OWN = "correct"  # the method that the command of this name uses
 UNTIED = "lsc"  # the same by control points alone
@@ -173,23 +172,21 @@ def verdict(document: dict) -> list[str]:
     value = {row["name"]: row[by]["rmse_3d"] for row in ranked}
     best = ranked[0]["name"]
     tied = [name for name in value if value[name] - value[best] < SETTINGS.difference]
-    raw = f"{tables.number(value['raw'])} m without any correction"
+    raw = f"{number(value['raw'])} m without any correction"
     if "raw" in tied:
-        text = f"The cloud as recorded, with {tables.number(value['raw'])} m, is as good as any"
+        text = f"The cloud as recorded, with {number(value['raw'])} m, is as good as any"
         return [
             f"No method improves this cloud by {1000 * SETTINGS.difference:.0f} mm or more. {text}."
         ]
-    sentences = [_winner(ranked[0], tied, tables.number(value[best]), raw)]
+    sentences = [_winner(ranked[0], tied, number(value[best]), raw)]
     for kind, words in OTHERS.items():
         rest = [row["name"] for row in ranked if row["kind"] == kind]
         if rest and rest[0] not in tied:
-            sentences.append(f"{words}: {rest[0]}, with {tables.number(value[rest[0]])} m.")
+            sentences.append(f"{words}: {rest[0]}, with {number(value[rest[0]])} m.")
     if OWN in value and OWN not in tied:
         own = value[OWN]
         behind = own - value[best]
-        sentences.append(
-            f"{OWN}, with {tables.number(own)} m, is {tables.number(behind)} m behind."
-        )
+        sentences.append(f"{OWN}, with {number(own)} m, is {number(behind)} m behind.")
     return sentences
 
 

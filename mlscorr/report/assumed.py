@@ -2,10 +2,8 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from mlscorr.effects import joined, known
 from mlscorr.report._statement import Statement
-from mlscorr.report.tables import length_in_words
-from mlscorr.survey import counted
+from mlscorr.wording import counted, joined, known, length_in_words
 
 NAMES = {  # of a key of survey.toml
     "pos.position_sigma": "Position of the POS",

@@ -10,8 +10,8 @@ from mlscorr.report._statement import RATINGS, Statement
 from mlscorr.report.assumed import assumed_statement
 from mlscorr.report.correction_report import CorrectionReport
 from mlscorr.report.settings import SETTINGS
-from mlscorr.report.tables import length_in_words, percent, verdict
-from mlscorr.survey import counted
+from mlscorr.report.tables import verdict
+from mlscorr.wording import counted, length_in_words, percent
 
 NAMED = 6  # points or stretches that stand on the first screen; the tables have all of them
 

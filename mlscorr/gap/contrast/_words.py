@@ -4,6 +4,7 @@ import numpy as np
 
 from mlscorr.gap.contrast._blocks import with_sigma
 from mlscorr.gap.contrast.tables import ContrastTable, Measure
+from mlscorr.wording import percent, value_and_sigma
 
 SILENT = {  # why a channel is not compared
     "intensity": "The simulator says nothing of intensity: without its clouds there is nothing to "
@@ -46,13 +47,14 @@ def sentence(measure: Measure, table: ContrastTable, sums: np.ndarray) -> str:
     if measure.channel == "density":
         return _density(value, sigma, where)
     if measure.channel == "dropout":
+        lost = value_and_sigma(100 * real, 100 * sigma)
         return (
-            f"{_pair(100 * real, 100 * sigma)} % of the beams on flat surfaces bring no return "
-            f"{where}, {100 * simulated:.1f} % in the simulation: the simulator "
+            f"{lost} % of the beams on flat surfaces bring no return "
+            f"{where}, {percent(simulated, 1)} in the simulation: the simulator "
             f"{'lacks lost returns' if value > 0 else 'loses too many returns'}."
         )
     return (
-        f"Depth edges are smeared over {_pair(abs(value), sigma)} mrad "
+        f"Depth edges are smeared over {value_and_sigma(abs(value), sigma)} mrad "
         f"{'more' if value > 0 else 'less'} than simulated {where} ({real:.2g} against "
         f"{simulated:.2g} mrad): the simulator's beam is {'too thin' if value > 0 else 'too wide'}."
     )
@@ -64,10 +66,10 @@ def _density(value, sigma, where):
     if value < 0:
         change = "fewer"
         hint = "lacks lost returns there, or what hides things"
-    percent = _pair(100 * abs(np.expm1(value)), 100 * sigma * np.exp(value))
+    change_in_percent = value_and_sigma(100 * abs(np.expm1(value)), 100 * sigma * np.exp(value))
     return (
-        f"The real cloud has {percent} % {change} points than the simulated one {where}: the "
-        f"simulator {hint}."
+        f"The real cloud has {change_in_percent} % {change} points than the simulated one {where}: "
+        f"the simulator {hint}."
     )
 
 
@@ -79,7 +81,7 @@ def _intensity(table, value, sigma, where):
     else:
         slope = value
     return (
-        f"Real returns are {_pair(factor, factor * sigma)} times "
+        f"Real returns are {value_and_sigma(factor, factor * sigma)} times "
         f"{'weaker' if value < 0 else 'stronger'} than simulated ones {where}, beside the usual "
         f"ratio of the two: the simulator{_lacks(table.by, slope < 0)}."
     )
@@ -96,12 +98,6 @@ def _lacks(by, falls):
     if falls:
         return f" lacks falloff {along}"
     return f"'s intensity falls off too fast {along}"
-
-
-def _pair(value, sigma):
-    """A figure ± its sigma, with as many decimals as the sigma's first figure asks for."""
-    places = int(np.clip(-np.floor(np.log10(max(sigma, 1e-9))), 0, 4))
-    return f"{value:.{places}f} ± {sigma:.{places}f}"
 
 
 def _largest_run(table):

@@ -21,6 +21,7 @@ from mlscorr.gap.evidence.measure import signed_root, simulated_variance
 from mlscorr.gap.evidence.observations import Observations
 from mlscorr.gap.evidence.settings import SETTINGS
 from mlscorr.gap.residuals import Background, Rows
+from mlscorr.wording import percent
 
 SPLITS = (
     *("time", "location", "range", "incidence", "scan_angle", "intensity"),
@@ -286,7 +287,7 @@ def _headline(before, band, splits, number, is_moved):
         return f"{of.capitalize()} lies everywhere alike. {size}."
     share, rows, words = best
     return (
-        f"{100 * min(share, 1.0):.0f} % of {of} lies {words}, where {100 * rows:.0f} % of the rows "
+        f"{percent(min(share, 1.0))} of {of} lies {words}, where {percent(rows)} of the rows "
         f"are. {size}."
     )
 

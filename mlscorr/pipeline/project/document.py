@@ -18,7 +18,7 @@ from mlscorr.pipeline.project.running import Run
 from mlscorr.pipeline.project.tasks import Written
 from mlscorr.report import RATINGS as ORDER
 from mlscorr.report import Statement, capped, statements_section
-from mlscorr.survey import counted
+from mlscorr.wording import counted
 
 COUNTS = "n_surveyed", "n_seen", "n_scored"
 RATINGS = {"controlled": "green", "tied": "green", "relative": "red", "uncorrected": "red"}

@@ -12,7 +12,7 @@ from typing import TextIO
 from mlscorr.io.store import appended, output_file, telling_space
 from mlscorr.pipeline.project.settings import SETTINGS
 from mlscorr.pipeline.project.tasks import Outcome, Task
-from mlscorr.survey import counted
+from mlscorr.wording import counted, percent
 
 TITLES = {
     "tiles": "Reading headers",
@@ -120,7 +120,7 @@ class Progress:
             whole = f"{counted(len(tasks), 'file')} of {counted(len(drives), 'drive')}"
         return (
             f"{TITLES[kind]}: {counts['done']} of {whole}, "
-            f"{100 * counts['points'] / total:.0f} %, {rate / 1e6:.3g} M points/s, {left}"
+            f"{percent(counts['points'] / total)}, {rate / 1e6:.3g} M points/s, {left}"
             f"{counted(counts['faults'], 'failure')} so far"
         )
 

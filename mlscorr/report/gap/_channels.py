@@ -7,12 +7,13 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from mlscorr.effects import joined, known, lowered
+from mlscorr.effects import lowered
 from mlscorr.report.gap._innovations import channel_style
 from mlscorr.report.gap._rows import bin_names
-from mlscorr.report.gap.numbers import numbers, plain
+from mlscorr.report.gap.numbers import numbers
 from mlscorr.report.headline import Statement
 from mlscorr.report.style import BLUE, GREY, VERMILLION, legend_above, new_figure, styled
+from mlscorr.wording import joined, known, plain
 
 WORDS = {  # of channels: what they are, their figure, how it is called on an axis
     "intensity": ("Intensity", "real over simulated, beside the usual ratio", "Ratio"),
