@@ -9,13 +9,20 @@ import numpy as np
 from mlscorr.effects import Effect
 from mlscorr.gap._agreement import agreements
 from mlscorr.gap._headline import headline
-from mlscorr.gap.advice import advice_of, distinct_parameters, excess_of, sentence_of
+from mlscorr.gap.advice import (
+    advice_of,
+    distinct_parameters,
+    excess_of,
+    sentence_of,
+    without_nothing_to_do,
+)
 from mlscorr.gap.closure import Closure
 from mlscorr.gap.evidence import NAMES, Cause, Inference, Separability
 from mlscorr.gap.open_scale import open_sigmas
 from mlscorr.gap.plan import NextData
 from mlscorr.gap.residuals import Absence, Rows, background
-from mlscorr.survey import Survey
+from mlscorr.gap.wording import advice_sentences
+from mlscorr.survey import Statement, Survey
 from mlscorr.wording import with_articles
 
 MAP_POINTS = 1500  # of trajectory and rows on the map: more can't be seen on a page
@@ -32,6 +39,7 @@ def gap_document(
     left_out: Mapping[str, str],
     warnings: Iterable[str],
     absence: Absence,
+    further_advice: Sequence[Statement] = (),
 ) -> dict:
     """Content of gap.json.
 
@@ -50,12 +58,17 @@ def gap_document(
     warnings : iterable of str
     absence : Absence
         Of surveyed targets that have no row.
+    further_advice : sequence of Statement
+        Of whoever knows more than the verdict.
     """
     verdict = inference.verdict
     where = inference.where
     agreement = agreements(rows, background(rows, survey))
     is_stated = not open_sigmas(survey)
     excess = excess_of(inference, closure, agreement, is_stated)
+    advice = advice_of(inference, closure, next_data, excess, is_stated)
+    if further_advice:
+        advice = [*without_nothing_to_do(advice), *further_advice]
     return {
         "name": survey.name,
         "verdict": {
@@ -72,7 +85,7 @@ def gap_document(
         "gap": vars(closure.gap) | {"unit": closure.unit, "kind": closure.kind},
         "headline": headline(where, verdict.label, verdict.lead, rows.reference.start),
         "agreement": [vars(part) for part in agreement],
-        "advice": advice_of(inference, closure, next_data, excess, is_stated),
+        "advice": advice_sentences(advice),
         "where": [_split(split) for split in where.splits],
         "causes": [cause_document(rows, cause) for cause in inference.causes],
         "separability": separability_document(inference.separability),

@@ -12,7 +12,6 @@ import numpy as np
 
 from mlscorr.effects import Effect, known_effects
 from mlscorr.gap import (
-    NOTHING_TO_DO,
     assumed_document,
     contrast,
     gap_document,
@@ -31,7 +30,7 @@ from mlscorr.pipeline.finding import silent
 from mlscorr.pipeline.found_effects import cloud_rows
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.simulate import Simulator, beliefs_of, write_simulator
-from mlscorr.survey import Summary, Survey, check_rng, check_survey, rows_frame
+from mlscorr.survey import Statement, Summary, Survey, check_rng, check_survey, rows_frame
 
 if TYPE_CHECKING:
     import pandas
@@ -200,7 +199,7 @@ class DiagnosedSurvey(Summary):
     costs: Costs = field(default_factory=Costs)
     contrasts: tuple[contrast.Contrast, ...] = ()
     distances: tuple[contrast.DistributionDistance, ...] = ()
-    next_run: str = ""
+    next_run: Statement | None = None
     scale: float = 1.0
 
     @property
@@ -226,17 +225,27 @@ class DiagnosedSurvey(Summary):
             left_out=self.left_out,
             warnings=self.warnings,
             absence=self.absence,
+            further_advice=self._further_advice,
         )
-        if self.inference.verdict.label not in ("none", "unknown"):
-            content["advice"].append(self._improvement[1] or self.next_run)
-        if any(contrast.sentences for contrast in self.contrasts):
-            content["advice"] = [s for s in content["advice"] if s != NOTHING_TO_DO]
-            content["advice"].append("See by what the clouds differ beside geometry: Channels.")
         content["assumed"] = assumed_document(believed, self.inference, self.scale)
         content["costs"] = vars(self.costs)
         content["contrasts"] = [contrast.document() for contrast in self.contrasts]
         content["distances"] = [distance.document() for distance in self.distances]
         return document("gap", gap_screen(content) | content)
+
+    @property
+    def _further_advice(self):
+        """Statements on what to run next, and on the channels beside geometry."""
+        advice = []
+        if self.inference.verdict.label not in ("none", "unknown"):
+            why = self._improvement[1]
+            if why:
+                advice.append(Statement("simulator as it was", "warning", {"why": why}))
+            elif self.next_run is not None:
+                advice.append(self.next_run)
+        if any(contrast.sentences for contrast in self.contrasts):
+            advice.append(Statement("channels"))
+        return advice
 
     @property
     def improved(self) -> Simulator:
@@ -245,7 +254,7 @@ class DiagnosedSurvey(Summary):
 
     @property
     def _improvement(self):
-        """The Simulator with the cause in it, or the same and a sentence why it can't take that."""
+        """The Simulator with the cause in it, or the same and why it can't take that."""
         if self.inference.verdict.label in ("none", "unknown"):
             return self.simulator, ""
         pos = self._believed.pos
@@ -259,8 +268,7 @@ class DiagnosedSurvey(Summary):
                 improved = replace(improved, pos=pos)
             return improved, ""
         except ValueError as error:  # larger than any survey can have
-            why = f"simulator.toml is as it was, since no simulator can take that: {error}"
-            return self.simulator, why
+            return self.simulator, str(error)
 
     def to_frame(self) -> pandas.DataFrame:
         """A row each parameter of the causes, the best first; pandas is needed for it."""

@@ -11,7 +11,6 @@ from mlscorr.gap import cause_document, no_cause, windows_document
 from mlscorr.gap.closure import LoneEffect, lone_effects
 from mlscorr.gap.evidence import Costs
 from mlscorr.io.store import document
-from mlscorr.pipeline.compared_rows import NEXT_RUN
 from mlscorr.pipeline.diagnosis import DiagnosedSurvey, diagnose, write_diagnosis
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.simulate import Simulator
@@ -63,9 +62,8 @@ class DiagnosedRounds:
         rounds = [_round_document(*numbered) for numbered in enumerate(self.rounds, start=1)]
         lone = [vars(effect) | {"unit": "mm"} for effect in self.lone]
         ablation = {"rounds": rounds, "alone": lone, "ended": self.ended}
-        first = self.rounds[0].document
-        advice = [sentence for sentence in first["advice"] if sentence != NEXT_RUN]
-        return document("gap", first | {"ablation": ablation, "advice": advice})
+        first = replace(self.rounds[0], next_run=None)  # it was run already
+        return document("gap", first.document | {"ablation": ablation})
 
     def write(self, out: Path, overwrite: bool = False) -> dict:
         """Write gap.json and gap.html of the first round, and the last simulator.toml.

@@ -43,7 +43,7 @@ def _best(document):
     first, *more = verdict(document)
     is_tested = document["scored_by"] != "control" and ranking(document)[0]["name"] != "raw"
     items = tuple(("", sentence) for sentence in more)
-    return headline.Statement("Result", "green" if is_tested else "amber", first, items)
+    return headline.StatementRow("Result", "green" if is_tested else "amber", first, items)
 
 
 def _scored(document):
@@ -52,10 +52,10 @@ def _scored(document):
         rating = "amber"
     else:
         rating = "green"
-    return headline.Statement("Scores", rating, basis(document))
+    return headline.StatementRow("Scores", rating, basis(document))
 
 
-def _ties(document) -> Iterator[headline.Statement]:
+def _ties(document) -> Iterator[headline.StatementRow]:
     """Which methods use ties between passes, where there are any."""
     own = next((row for row in document["methods"] if row["name"] == OWN), None)
     if own is None or own["status"] != "determined":
@@ -68,7 +68,7 @@ def _ties(document) -> Iterator[headline.Statement]:
     else:
         why = own["details"]["untied"] or ""
         sentence = f"{OWN} equals {UNTIED} here, for no ties were used. {why}".rstrip()
-    yield headline.Statement("Ties", "green", sentence)
+    yield headline.StatementRow("Ties", "green", sentence)
 
 
 def method_warnings(rows: list[dict]) -> list[str]:
@@ -86,12 +86,12 @@ def method_warnings(rows: list[dict]) -> list[str]:
     return [f"{joined(of_one)}: {sentence}" for sentence, of_one in names.items()]
 
 
-def _undetermined(document) -> Iterator[headline.Statement]:
+def _undetermined(document) -> Iterator[headline.StatementRow]:
     """Methods without a score."""
     absent = undetermined(document)
     if absent:
         count = f"{len(absent)} of {len(document['methods'])} methods have no score."
-        yield headline.Statement("Not determined", "amber", count, tuple(absent))
+        yield headline.StatementRow("Not determined", "amber", count, tuple(absent))
 
 
 def undetermined(document: dict) -> list[tuple[str, str]]:

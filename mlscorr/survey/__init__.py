@@ -15,6 +15,7 @@ from mlscorr.survey.recording import (
     check_rng,
     check_survey,
 )
+from mlscorr.survey.statement import Severity, Statement, Wording
 from mlscorr.survey.summary import Summary
 from mlscorr.survey.targets import KINDS, ControlPoints, Matched, TargetObservations
 from mlscorr.survey.ties import PAINTED, PAUSE, TIE_KINDS, TieFeatures, Ties, time_spans
