@@ -14,6 +14,7 @@ from mlscorr.wording import percent
 if TYPE_CHECKING:
     from mlscorr.evaluate import Gate
     from mlscorr.pipeline.project import Options
+    from mlscorr.survey import Statement
 
 RESUMPTION = "what was done stays, and the same command with --resume goes on"
 
@@ -63,18 +64,20 @@ def correct_drives(
     terminal.end(failed, result.is_whole)
 
 
-def tell(sentence: str) -> None:
-    """Say a sentence on the way; warnings and failures in any case.
+def tell(statement: Statement) -> None:
+    """Say a statement on the way; warnings and failures in any case.
 
     Parameters
     ----------
-    sentence : str
+    statement : Statement
     """
-    if sentence.startswith(("Warning:", "Failed:")):
-        speak = terminal.warn
+    from mlscorr.pipeline.project import progress_sentence
+
+    sentence = progress_sentence(statement)
+    if statement.severity == "note":
+        terminal.say(sentence)
     else:
-        speak = terminal.say
-    speak(sentence)
+        terminal.warn(sentence)
 
 
 def status(
