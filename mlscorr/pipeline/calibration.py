@@ -17,7 +17,7 @@ from mlscorr.pipeline.calibrated_survey import CalibratedSurvey, CalibrationResu
 from mlscorr.pipeline.near_points import remounting_fault, reuse_warnings
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.pipeline.tied_calibration import estimate_site
-from mlscorr.survey import Survey, SurveyFileError, check_survey
+from mlscorr.survey import Statement, Survey, SurveyFileError, check_survey
 
 
 def calibrate(
@@ -110,7 +110,8 @@ def _parts(survey, control, check, finding, calibration):
         ]
         known = {*matched[0].name, *matched[1].name, *(refusal.name for refusal in refusals)}
         others = [point for point in survey.surveyed.name if point not in known]
-        refusals += [Refusal(point, None, SEEN_BY_OTHERS) for point in others]
+        why = Statement("not matched", values={"why": SEEN_BY_OTHERS})
+        refusals += [Refusal(point, None, why) for point in others]
         scanned = finding.scanned.difference(others)
         missing = unseen_rows(part, refusals, finding.candidates, scanned)
         view = calibration.of(number, control.scanner)

@@ -11,7 +11,7 @@ from mlscorr.io.clouds import read_chunks
 from mlscorr.matching import Matches, match
 from mlscorr.pipeline.near_points import NearPoints, check_control, no_control, nothing_found
 from mlscorr.pipeline.settings import SETTINGS
-from mlscorr.survey import Matched, PointCloud, Survey, check_rng
+from mlscorr.survey import Matched, PointCloud, Statement, Survey, check_rng
 from mlscorr.targets import (
     NO_POINTS,
     Candidates,
@@ -227,8 +227,8 @@ def unmatched(targets: list[PassTarget], candidates: Candidates, reason: str = "
     """
     observations = as_observations(targets)
     nothing = observations[np.zeros(len(targets), bool)]
-    reasons = (reason,) * len(targets)
-    matches = Matches(nothing, observations, (), np.empty(0), reasons)
+    why = (Statement("not matched", values={"why": reason}),) * len(targets)
+    matches = Matches(nothing, observations, (), np.empty(0), why)
     return Finding(matches, candidates, _by_pass_and_time(targets))
 
 

@@ -24,7 +24,7 @@ class Statement:
 
     key: str
     severity: Severity = "note"
-    values: Mapping[str, Any] = field(default_factory=dict)
+    values: Mapping[str, Any] = field(default_factory=dict, hash=False)
 
     def sentence(self, wordings: Mapping[str, Wording]) -> str:
         """The sentence by the wordings of a room.
