@@ -12,6 +12,7 @@ The story, a room each:
   and words
 """
 
+from mlscorr.gap._headline import headline
 from mlscorr.gap.advice import no_cause
 from mlscorr.gap.document import (
     assumed_document,

@@ -28,7 +28,7 @@ def inference(label="none", whole=0.1, labels=("none",), lead=""):
     "Of a verdict, with the gap (mm) of all rows together"
     none = np.zeros(0)
     empty = np.zeros((0, 2))
-    where = Where(whole, whole, BAND, (), none, none, empty, none, "")
+    where = Where(whole, whole, BAND, (), none, none, empty, none)
     verdict = GapVerdict(label, 0.34, labels, 0.6, lead, False)
     cause = Cause(label, 0.34, (), (), np.zeros(3))
     return Inference(verdict, (cause,), (), where, None, {label: 0.34}, None, None)
