@@ -66,8 +66,9 @@ def _ties(document) -> Iterator[headline.StatementRow]:
             "both saw. All other methods use the control points alone."
         )
     else:
-        why = own["details"]["untied"] or ""
-        sentence = f"{OWN} equals {UNTIED} here, for no ties were used. {why}".rstrip()
+        sentence = f"{OWN} equals {UNTIED} here, for no ties were used."
+        if own["details"]["untied"]:
+            sentence += f" {own['details']['untied']}"
     yield headline.StatementRow("Ties", "green", sentence)
 
 
@@ -193,8 +194,7 @@ def verdict(document: dict) -> list[str]:
 def _winner(row, tied, value, raw):
     """The sentence on the best method, or on those that are too close to tell apart."""
     if len(tied) == 1:
-        about = row["about"][0].lower() + row["about"][1:].rstrip(".")
-        return f"Best is {row['name']} ({about}): 3D RMSE {value} m, against {raw}."
+        return f"Best is {row['name']}: 3D RMSE {value} m, against {raw}. {row['about']}"
     return (
         f"Best are {joined(tied)}: 3D RMSE {value} m, against {raw}. They differ by less than "
         f"{1000 * SETTINGS.difference:.0f} mm, which can't be told apart."

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from mlscorr.matching import match
+from mlscorr.survey import Statement
 from tests.matching.test_association import (
     EAST,
     ORIGIN,
@@ -238,3 +239,18 @@ def test_places_in_sentences_are_those_of_the_survey():
     assert refusal.why.values["misclosure"] == pytest.approx(1.31, abs=1e-6)
     assert "misclosure 1.31 m" in refusal.reason and refusal.name == "T09"
     assert np.abs(ORIGIN).max() > 1e6
+
+
+def test_reasons_are_told_apart_by_their_keys():
+    "Nothing found, no control, nothing of its kind, another point: a key each, and its values"
+    nothing = match(observations(np.empty((0, 3))), control_points(PLACES[:1]), trajectory())
+    assert [refusal.why for refusal in nothing.refusals] == [Statement("nothing found")]
+    uncontrolled = match(observations(PLACES[:1]), control_points(PLACES[:0]), trajectory())
+    (why,) = uncontrolled.why
+    assert why.key == "no control"
+    assert why.values == {"kind": "circle", "size": 0.6, "time": 357705.0}
+    unseen = match(observations(PLACES[:1]), control_points(PLACES[:2]), trajectory())
+    (refusal,) = unseen.refusals
+    assert refusal.why.key == "none of its kind"
+    assert refusal.why.values["away"] == pytest.approx(100.0)
+    assert refusal.why.values["found_name"] == "T01"
