@@ -18,6 +18,7 @@ from gap_mechanisms import sized
 from gap_study import Bed
 from gap_training.errors import process
 
+from mlscorr.gap import headline
 from mlscorr.gap.evidence import infer_causes
 from mlscorr.gap.residuals import background
 from mlscorr.gap.signatures import displacements
@@ -86,14 +87,21 @@ def case(bed, rng, kind, name, m):
     signs = bed.signs
     inference = infer_causes(rows, background(rows, g.survey), g.survey, signs, rng, 20)
     split = next(split for split in inference.where.splits if split.by == by)
-    words = {"scan_angle": "scan angle", "incidence": "incidence angle"}.get(by, by)
+    verdict = inference.verdict
+    words = {
+        "scan_angle": "scan angles",
+        "incidence": "incidence angles",
+        "time": "gps_time",
+        "location": "chainage",
+    }
+    said = headline(inference.where, verdict.label, verdict.lead, rows.reference.start)
     return {
-        "label": inference.verdict.label,
+        "label": verdict.label,
         "iou": overlap(split.extent, truth),
         "truth": truth,
         "extent": split.extent,
-        "headline": inference.where.headline,
-        "named": f"a {words} of" in inference.where.headline,
+        "headline": said,
+        "named": words.get(by, f"{by}s") in said,
     }
 
 

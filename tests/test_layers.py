@@ -14,6 +14,7 @@ PACKAGE = Path(mlscorr.__file__).parent
 TESTS = Path(__file__).parent
 FLOORS = (  # from the ground up; rooms on one floor do not know each other
     ("compiled_loops",),
+    ("wording",),
     ("survey",),
     ("frames",),
     ("correction", "collocation", "pos"),
@@ -55,7 +56,7 @@ MODULES = sorted(
     path for path in PACKAGE.rglob("*.py") if path.parent != PACKAGE or path.stem[0] != "_"
 )
 PROJECT_FLOORS = (  # of the modules within pipeline/project, which stands on top of one survey
-    ("settings", "engine", "tasks"),
+    ("settings", "engine", "tasks", "wording"),
     ("joint", "file_tasks", "running", "progress"),
     ("areas", "drive_estimate", "joint_estimate"),
     ("corrected",),

@@ -11,6 +11,7 @@ from mlscorr.baselines._settings import SETTINGS
 from mlscorr.baselines.pairs import CentredPairs
 from mlscorr.baselines.transformation import Transformation
 from mlscorr.survey import Matched, PointCloud
+from mlscorr.wording import percent
 
 
 @dataclass(frozen=True)
@@ -116,7 +117,7 @@ def _warn(registration):
     fitness = registration.fitness
     if fitness < SETTINGS.poor_fitness:
         warnings.warn(
-            f"ICP ({variant}) brings only {100 * fitness:.0f} % of the targets' points within "
+            f"ICP ({variant}) brings only {percent(fitness)} of the targets' points within "
             f"{SETTINGS.inlier} m of the surveyed surfaces (inlier RMSE "
             f"{registration.inlier_rmse:.4f} m): no rigid motion fits them.",
             stacklevel=3,

@@ -7,6 +7,7 @@ import typer
 
 import mlscorr
 from mlscorr.cli.terminal import Exit, Quiet, SurveyArgument, exit_code, say, warn
+from mlscorr.wording import counted, thousands
 
 CODES = {"survey.toml": Exit.USAGE, "data": Exit.BAD_DATA, "system": Exit.READ_OR_WRITE}
 
@@ -15,7 +16,6 @@ def check(survey: SurveyArgument, quiet: Quiet = False) -> None:
     """Tell in seconds all that is wrong with a survey or project, and what correcting it takes."""
     with exit_code(Exit.BAD_DATA):
         from mlscorr.io.surveys import is_project
-        from mlscorr.survey import counted
 
         if is_project(survey):
             from mlscorr.pipeline.project import check_project
@@ -55,5 +55,5 @@ def _amount(amount):
         digits = 0
     else:
         digits = 1
-    number = f"{amount.number:,.{digits}f}".replace(",", " ")
+    number = thousands(amount.number, digits)
     return f"{amount.what}: {number}{' ' * bool(amount.unit)}{amount.unit} ({amount.source})"

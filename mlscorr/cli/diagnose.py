@@ -8,6 +8,7 @@ import typer
 import mlscorr
 from mlscorr.cli import terminal
 from mlscorr.cli.work import print_json, work
+from mlscorr.wording import signed
 
 
 def diagnose(
@@ -118,7 +119,6 @@ def _tell(content):
 def _tell_rounds(ablation):
     """The gap with each effect by itself, and after each round."""
     from mlscorr.effects import title
-    from mlscorr.report.gap import signed
 
     terminal.say(f"{'In the simulator':34s}{'gap before':>12s}{'after':>10s}")
     for row in ablation["alone"]:

@@ -11,6 +11,7 @@ from mlscorr.cli.terminal import (
     say_results,
 )
 from mlscorr.cli.work import print_json, work
+from mlscorr.wording import counted
 
 
 def extract(
@@ -22,8 +23,6 @@ def extract(
 ) -> None:
     """List all target-like objects in the cloud of a survey, with or without control points."""
     with work(out, overwrite, survey) as progress:
-        from mlscorr.survey import counted
-
         recorded = mlscorr.read_survey(survey)
         content = mlscorr.extract(recorded, progress=progress).write(out, overwrite)
     print_json(content, as_json)

@@ -10,6 +10,7 @@ import typer
 
 import mlscorr
 from mlscorr.cli.terminal import Exit, Quiet, exit_code, say, warn
+from mlscorr.wording import counted
 
 NAMES = {"none": "not used", "table": "not used", "reference": "mesh"}
 
@@ -44,7 +45,6 @@ def init(
         warn(f"Question: {question}")
     for place in started.places:
         warn(f"Open: {place.key} ({place})")
-    from mlscorr.survey import counted
 
     number = counted(len(started.places), "open place")
     warn(f'Written: {started.path}, with {number}. Fill in each "?" in it, then: {check}')

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from time import monotonic
 
 from mlscorr.cli.terminal import is_quiet, say
+from mlscorr.wording import percent
 
 COMPILING = "Compiling loops: the first run of an installation takes minutes longer; they are kept."
 PATIENCE = 2.0  # s; quicker work shows nothing
@@ -81,6 +82,6 @@ def _lines(title, total):
         done += points
         if monotonic() > due:
             due = monotonic() + INTERVAL
-            say(f"{title}: {100 * done / max(total, 1):.0f} %")
+            say(f"{title}: {percent(done / max(total, 1))}")
 
     return advance

@@ -9,10 +9,12 @@ import typer
 
 from mlscorr.cli import terminal
 from mlscorr.cli.work import print_json
+from mlscorr.wording import percent
 
 if TYPE_CHECKING:
     from mlscorr.evaluate import Gate
     from mlscorr.pipeline.project import Options
+    from mlscorr.survey import Statement
 
 RESUMPTION = "what was done stays, and the same command with --resume goes on"
 
@@ -62,18 +64,20 @@ def correct_drives(
     terminal.end(failed, result.is_whole)
 
 
-def tell(sentence: str) -> None:
-    """Say a sentence on the way; warnings and failures in any case.
+def tell(statement: Statement) -> None:
+    """Say a statement on the way; warnings and failures in any case.
 
     Parameters
     ----------
-    sentence : str
+    statement : Statement
     """
-    if sentence.startswith(("Warning:", "Failed:")):
-        speak = terminal.warn
+    from mlscorr.pipeline.project import progress_sentence
+
+    sentence = progress_sentence(statement)
+    if statement.severity == "note":
+        terminal.say(sentence)
     else:
-        speak = terminal.say
-    speak(sentence)
+        terminal.warn(sentence)
 
 
 def status(
@@ -92,7 +96,7 @@ def status(
     for row in content["drives"]:
         stages = [f"{s['title'].lower()} {s['done']} of {s['tasks']}" for s in row["stages"]]
         terminal.say(f"{row['name']}: {', '.join(stages)}")
-    shares = [f"{stage['title'].lower()} {stage['share']:.0%}" for stage in content["all"]]
+    shares = [f"{stage['title'].lower()} {percent(stage['share'])}" for stage in content["all"]]
     terminal.say(f"All: {', '.join(shares)}")
     for line in content["failures"]:
         terminal.warn(line)

@@ -17,6 +17,7 @@ from mlscorr.cli.terminal import (
     say_results,
 )
 from mlscorr.cli.work import print_json, work
+from mlscorr.wording import counted
 
 
 def simulate(
@@ -35,7 +36,6 @@ def simulate(
         inputs = [scenario, *scenario_files(read_scenario(scenario))]
     with work(out, overwrite, inputs=inputs) as progress:
         from mlscorr.pipeline import simulate_survey
-        from mlscorr.survey import counted
 
         made = simulate_survey(scenario, out, seed, overwrite, progress)
     print_json(made, as_json)

@@ -11,6 +11,7 @@ from mlscorr.cli.terminal import (
     say_results,
 )
 from mlscorr.cli.work import print_json, work
+from mlscorr.wording import counted
 
 
 def ties(
@@ -21,8 +22,6 @@ def ties(
     quiet: Quiet = False,
 ) -> None:
     """Find walls, roads, poles and paint that two passes both saw, and how far apart they lie."""
-    from mlscorr.survey import counted
-
     with work(out, overwrite, survey) as progress:
         recorded = mlscorr.read_survey(survey)
         content = mlscorr.find_ties(recorded, progress=progress).write(out, overwrite)

@@ -11,7 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from mlscorr.correction._kernel import fill_increments, move_integers, require_times
 from mlscorr.frames import angle_sigma
-from mlscorr.survey import Mounting, PointCloud, Summary, Trajectory, counted
+from mlscorr.survey import Mounting, PointCloud, Summary, Trajectory
+from mlscorr.wording import counted
 
 
 @dataclass(frozen=True, repr=False)

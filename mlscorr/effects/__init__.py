@@ -25,6 +25,7 @@ one's own known.
 """
 
 from mlscorr.effects._quantity import quantity
+from mlscorr.effects._size_estimate import SizeEstimate
 from mlscorr.effects.catalogue import (
     EFFECTS,
     apply_effects,
@@ -43,14 +44,3 @@ from mlscorr.effects.own import register_file, run_file
 from mlscorr.effects.ranging import Dropout
 from mlscorr.effects.stages import STAGES, Reference, Returns
 from mlscorr.effects.vehicle import PositionNoise
-from mlscorr.effects.wording import (
-    DASH,
-    SizeEstimate,
-    figures,
-    joined,
-    known,
-    percent,
-    scale,
-    size,
-    with_articles,
-)

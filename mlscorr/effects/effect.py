@@ -9,8 +9,9 @@ import numpy as np
 
 from mlscorr.effects._guard import checked_change
 from mlscorr.effects._quantity import Quantity
+from mlscorr.effects._size_estimate import SizeEstimate, amplitude, vector
 from mlscorr.effects.stages import STAGES, Reference
-from mlscorr.effects.wording import SizeEstimate, amplitude, known, size, vector
+from mlscorr.wording import known, size
 
 
 @dataclass(frozen=True)

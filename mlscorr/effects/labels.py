@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 
 from mlscorr.effects.catalogue import effects_by_name
-from mlscorr.effects.wording import joined
+from mlscorr.wording import joined
 
 OTHERS = {
     "none": ("Nothing", "The simulator describes this survey as it is."),

@@ -7,9 +7,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mlscorr.effects._quantity import quantity
+from mlscorr.effects._size_estimate import SizeEstimate
 from mlscorr.effects.effect import Effect
 from mlscorr.effects.stages import EAST_NORTH_UP, MAP
-from mlscorr.effects.wording import DASH, SizeEstimate, joined, known, size
+from mlscorr.wording import DASH, joined, known, size
 
 GNSS_LOST = "a GNSS that far off is known to be lost"
 IN_TIME = "no survey is as long"

@@ -13,7 +13,8 @@ from mlscorr.estimate.posterior import Objective
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.signals import SignalParameters, pose_signals
 from mlscorr.frames import angle_sigma
-from mlscorr.survey import Trajectory, control_epochs, counted
+from mlscorr.survey import Trajectory, control_epochs
+from mlscorr.wording import counted
 
 COMPONENTS = ("easting", "northing", "height", "roll", "pitch", "heading")
 

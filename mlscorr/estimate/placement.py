@@ -20,6 +20,7 @@ from mlscorr.estimate.posterior import Objective
 from mlscorr.estimate.prior import position_prior
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.survey import Matched, Pos, Trajectory
+from mlscorr.wording import percent
 
 PLACES = 3  # that are named: what one more visit to the site can survey
 CANDIDATES = 20  # epochs that are tried, of even shares of the variance; twice as many gain < 1 %
@@ -192,10 +193,10 @@ def _reason(observed, names, time, drive, share, limit, passes):
     if share[0] == share[1]:
         before = "as before"
     else:
-        before = f"instead of {100 * share[0]:.1f} %"
+        before = f"instead of {percent(share[0], 1)}"
     return (
         f"{where}{often}: along the drive the 3D sigma falls from {1e3 * drive[0]:.1f} to "
-        f"{1e3 * drive[1]:.1f} mm (RMS), and {100 * share[1]:.1f} % of it, {before}, are "
+        f"{1e3 * drive[1]:.1f} mm (RMS), and {percent(share[1], 1)} of it, {before}, are "
         f"below {1e3 * limit:.1f} mm."
     )
 

@@ -8,9 +8,11 @@ The story, a room each:
 - evidence: the verdict, causes with their parameters, where the gap lies, what is separable
 - closure: the simulator with the cause in it, on data that were not used to find it
 - plan: what to measure next, and what a survey will show before it is driven
-- advice, document: what to do about it, and all of it as plain numbers and words
+- advice, wording, document: what to do about it, its sentences, and all of it as plain numbers
+  and words
 """
 
+from mlscorr.gap._headline import headline
 from mlscorr.gap.advice import no_cause
 from mlscorr.gap.document import (
     assumed_document,

@@ -8,8 +8,8 @@ alone; without a cause, by what exceeds its null band.
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
-from mlscorr.effects import figures
 from mlscorr.gap.evidence import CHANNELS, NAMES, SETTINGS, Split, Where
+from mlscorr.wording import figures, percent
 
 ACTS_ON = {  # covariates by which the size of an effect differs, by the effect's name
     "time_offset": ("speed", "turn_rate"),
@@ -94,8 +94,8 @@ def headline(where: Where, label: str, lead: str, start: float) -> str:
     if best is None:
         return f"No part of the survey stands out. {size}."
     return (
-        f"{100 * min(best.share, 1.0):.0f} % of {whole} lies {best.words}, where "
-        f"{100 * best.rows:.0f} % of the residuals are. {size}."
+        f"{percent(min(best.share, 1.0))} of {whole} lies {best.words}, where "
+        f"{percent(best.rows)} of the residuals are. {size}."
     )
 
 

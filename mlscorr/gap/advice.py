@@ -5,22 +5,19 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
-from mlscorr.effects import effect_class, lowered, percent, size, title, with_articles
+from mlscorr.effects import title
 from mlscorr.gap._agreement import Agreement
 from mlscorr.gap.closure import Closure
 from mlscorr.gap.evidence import SETTINGS, Cause, CauseParameter, Inference
 from mlscorr.gap.plan import NextData
 from mlscorr.gap.signatures import NO_MOUNTING
+from mlscorr.survey import Statement
+from mlscorr.wording import size
 
-NOTHING_TO_DO = "Nothing needs to be done: what is left agrees with what the simulator says."
-ONLY_DRIFT = (
-    "Run mlscorr correct: what is left looks like drift of the POS, whose sigma nobody stated."
-)
-SEE_CHANNELS = "See by what the clouds differ beside geometry: Channels."
-ADVICE = {  # where no cause is named, by what is left is more than
-    "": NOTHING_TO_DO,
-    "stated": "Errors are larger than stated: run mlscorr correct, or state POS sigmas larger.",
-    "chance": "More control points, or a second pass, may show why the two differ.",
+OF_EXCESS = {  # key of the advice where no cause is named, by what is left is more than
+    "": "nothing to do",
+    "stated": "errors above stated",
+    "chance": "gap above chance",
 }
 
 
@@ -121,9 +118,8 @@ def advice_of(
     excess: str,
     is_stated: bool = True,
     left_out: Mapping[str, str] = MappingProxyType({}),
-    is_equal: bool = True,
-) -> list[str]:
-    """What to do about a verdict, in sentences.
+) -> list[Statement]:
+    """What to do about a verdict.
 
     Parameters
     ----------
@@ -137,51 +133,44 @@ def advice_of(
         Whether somebody stated the sigmas of the POS.
     left_out : mapping of str to str
         Why effects were not judged.
-    is_equal : bool
-        Whether the clouds are equal beside geometry, so that nothing may need to be done.
     """
     verdict = inference.verdict
-    labels = (*verdict.set, *inference.same)
-    open_question = [lowered(title(n)) for n in labels if n not in ("none", verdict.label)]
-    is_open = bool(open_question and next_data)
-    sentences = []
+    advice = []
     if verdict.label == "none":
-        if not is_stated and not excess:
-            sentences.append(ONLY_DRIFT)
-        elif excess or (is_equal and not is_open):
-            sentences.append(ADVICE[excess])
+        is_default = not is_stated and not excess
+        advice.append(Statement("drift of a default" if is_default else OF_EXCESS[excess]))
     elif verdict.is_hidden:
-        sentences.append(
-            "Find out why the targets of that stretch could not be matched before the survey is "
-            "trusted there: the warnings give each one's reason."
-        )
+        advice.append(Statement("unmatched targets"))
     elif verdict.label == "unknown":
-        if unjudged := sum(NO_MOUNTING in why for why in left_out.values()):
-            sentences.append(
-                f"State [mounting] in survey.toml and diagnose again: {unjudged} kinds of error "
-                "can't be judged without it, and one of them may be the cause."
-            )
-        sentences.append(f"Look for what makes a {verdict.lead}: no effect that was judged does.")
+        unjudged = sum(NO_MOUNTING in why for why in left_out.values())
+        if unjudged:
+            advice.append(Statement("unstated mounting", values={"effects": unjudged}))
+        advice.append(Statement("unknown error", values={"lead": verdict.lead}))
         if closure.effect != "none":  # it impersonates the cause
-            share = f"closes {percent(max(0.0, closure.shrink))} of the squared gap, but "
-            if closure.is_within_noise:
-                share = ""
-            sentences.append(
-                f"The nearest known effect, {lowered(title(closure.effect))}, {share}does not "
-                "explain it: don't use it."
-            )
+            share = None if closure.is_within_noise else max(0.0, closure.shrink)
+            values = {"effect": closure.effect, "share": share}
+            advice.append(Statement("nearest effect", "warning", values))
     else:
-        remedies = [effect_class(part).remedy for part in verdict.label.split("+")]
-        sentences += dict.fromkeys(remedies)
-        (low, high), before, after = closure.null_band, closure.before, closure.after
-        if closure.shrink < 0 and not low <= after <= high:
-            sentences.append(
-                f"But with that size in the simulator the gap grew (from {before:.1f} to "
-                f"{after:.1f} {closure.unit}): trust what was found, not how large it is."
-            )
-    if is_open:
-        sentences.append(
-            f"To settle what is open ({', '.join(dict.fromkeys(open_question))}), measure "
-            f"{next_data[0].survey}: {next_data[0].why}"
-        )
-    return [with_articles(sentence) for sentence in sentences]
+        parts = verdict.label.split("+")
+        advice += [Statement("remedy", values={"effect": part}) for part in parts]
+        low, high = closure.null_band
+        if closure.shrink < 0 and not low <= closure.after <= high:
+            values = {"before": closure.before, "after": closure.after, "unit": closure.unit}
+            advice.append(Statement("grown gap", "warning", values))
+    labels = (*verdict.set, *inference.same)
+    open_question = tuple(name for name in labels if name not in ("none", verdict.label))
+    if open_question and next_data:
+        advice = without_nothing_to_do(advice)
+        addition = {"survey": next_data[0].survey, "why": next_data[0].why}
+        advice.append(Statement("addition", values={"labels": open_question} | addition))
+    return advice
+
+
+def without_nothing_to_do(advice: Iterable[Statement]) -> list[Statement]:
+    """An advice to which something is added.
+
+    Parameters
+    ----------
+    advice : iterable of Statement
+    """
+    return [statement for statement in advice if statement.key != "nothing to do"]

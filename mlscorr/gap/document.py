@@ -6,17 +6,24 @@ from dataclasses import asdict
 
 import numpy as np
 
-from mlscorr.effects import Effect, with_articles
+from mlscorr.effects import Effect
 from mlscorr.gap._agreement import agreements
 from mlscorr.gap._headline import headline
-from mlscorr.gap.advice import SEE_CHANNELS, advice_of, distinct_parameters, excess_of, sentence_of
+from mlscorr.gap.advice import (
+    advice_of,
+    distinct_parameters,
+    excess_of,
+    sentence_of,
+    without_nothing_to_do,
+)
 from mlscorr.gap.closure import Closure
-from mlscorr.gap.contrast import Contrast
 from mlscorr.gap.evidence import NAMES, Cause, Inference, Separability
 from mlscorr.gap.open_scale import open_sigmas
 from mlscorr.gap.plan import NextData
 from mlscorr.gap.residuals import Absence, Rows, background
-from mlscorr.survey import Survey
+from mlscorr.gap.wording import advice_sentences
+from mlscorr.survey import Statement, Survey
+from mlscorr.wording import with_articles
 
 MAP_POINTS = 1500  # of trajectory and rows on the map: more can't be seen on a page
 LISTED = 1e-4  # probability from which on a pair is listed in the evidence
@@ -32,8 +39,7 @@ def gap_document(
     left_out: Mapping[str, str],
     warnings: Iterable[str],
     absence: Absence,
-    contrasts: Sequence[Contrast] = (),
-    next_step: str = "",
+    further_advice: Sequence[Statement] = (),
 ) -> dict:
     """Content of gap.json.
 
@@ -52,22 +58,17 @@ def gap_document(
     warnings : iterable of str
     absence : Absence
         Of surveyed targets that have no row.
-    contrasts : sequence of Contrast
-        Of the clouds beside geometry.
-    next_step : str
-        A sentence on what to run next, where there is any.
+    further_advice : sequence of Statement
+        Of whoever knows more than the verdict.
     """
     verdict = inference.verdict
     where = inference.where
     agreement = agreements(rows, background(rows, survey))
     is_stated = not open_sigmas(survey)
     excess = excess_of(inference, closure, agreement, is_stated)
-    is_equal = not any(contrast.sentences for contrast in contrasts)
-    advice = advice_of(inference, closure, next_data, excess, is_stated, left_out, is_equal)
-    if next_step:
-        advice.append(next_step)
-    if not is_equal:
-        advice.append(SEE_CHANNELS)
+    advice = advice_of(inference, closure, next_data, excess, is_stated, left_out)
+    if further_advice:
+        advice = [*without_nothing_to_do(advice), *further_advice]
     return {
         "name": survey.name,
         "verdict": {
@@ -84,7 +85,7 @@ def gap_document(
         "gap": vars(closure.gap) | {"unit": closure.unit, "kind": closure.kind},
         "headline": headline(where, verdict.label, verdict.lead, rows.reference.start),
         "agreement": [vars(part) for part in agreement],
-        "advice": advice,
+        "advice": advice_sentences(advice),
         "where": [_split(split) for split in where.splits],
         "causes": [cause_document(rows, cause) for cause in inference.causes],
         "separability": separability_document(inference.separability),

@@ -7,6 +7,7 @@ import numpy as np
 from mlscorr.matching._beliefs import build_chain
 from mlscorr.matching._marginals import marginals
 from mlscorr.matching._pairs import find_pairs
+from mlscorr.matching._wording import sentence_of
 from mlscorr.matching.decision import decide, moved_share_by_others
 from mlscorr.matching.reasons import Refusal, explain
 from mlscorr.pos import stated_sigma
@@ -15,6 +16,7 @@ from mlscorr.survey import (
     ControlPoints,
     Matched,
     Pos,
+    Statement,
     Survey,
     TargetObservations,
     Trajectory,
@@ -35,8 +37,8 @@ class Matches:
         Of surveyed points without an observation.
     probability : (n,) array
         Of each match, given all others.
-    reasons : tuple of m str
-        Why each unmatched observation has no name.
+    why : tuple of m Statement
+        Why each unmatched observation has no name; ``reasons`` are their sentences.
     moved : TargetObservations, optional
         Those unmatched that show where a surveyed point's target stands instead, with its name.
     """
@@ -45,8 +47,13 @@ class Matches:
     unmatched: TargetObservations
     refusals: tuple[Refusal, ...]
     probability: np.ndarray
-    reasons: tuple[str, ...]
+    why: tuple[Statement, ...]
     moved: TargetObservations | None = None
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Why each unmatched observation has no name, in a sentence each."""
+        return tuple(sentence_of(statement) for statement in self.why)
 
     def by_role(self, survey: Survey) -> tuple[Matched, Matched]:
         """The matched control points, and the matched check points.

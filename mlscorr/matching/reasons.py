@@ -7,9 +7,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mlscorr.matching._pairs import CandidatePairs, same_appearance
+from mlscorr.matching._wording import sentence_of
 from mlscorr.matching.decision import Decision
 from mlscorr.matching.settings import SETTINGS
-from mlscorr.survey import ControlPoints, TargetObservations
+from mlscorr.survey import ControlPoints, Statement, TargetObservations
 
 
 @dataclass(frozen=True)
@@ -21,21 +22,26 @@ class Refusal:
     name : str
     pass_number : int or None
         None where it is so in all passes.
-    reason : str
-        A sentence.
+    why : Statement
+        The reason; ``reason`` is its sentence.
     gps_time : float, optional
         Of the observation that was refused. Units: s.
     """
 
     name: str
     pass_number: int | None
-    reason: str
+    why: Statement
     gps_time: float | None = None
+
+    @property
+    def reason(self) -> str:
+        """Why it has none, in a sentence."""
+        return sentence_of(self.why)
 
 
 @dataclass(frozen=True)
 class _Case:
-    """What the sentences are made of: observations in order of time, and what was decided."""
+    """What the reasons are made of: observations in order of time, and what was decided."""
 
     observations: TargetObservations
     control: ControlPoints
@@ -70,13 +76,8 @@ class _Case:
         pairs = self.by_control[slice(*span)]
         return pairs, np.searchsorted(self.pairs.first, pairs, side="right") - 1
 
-    def when(self, row):
-        return f"{self.observations.gps_time[row]:.1f} s"
-
-    @property
-    def limit(self):
-        """How far was searched, in words."""
-        return f"search radius {self.search_radius:.2f} m"
+    def time(self, row):
+        return float(self.observations.gps_time[row])
 
     def name(self, column):
         return self.control.name[column]
@@ -97,18 +98,37 @@ class _Case:
         expected = self.decision.marginals.expected[row]
         return float(np.linalg.norm(self.misclosure(row, column) - expected))
 
+    def distance(self, row, column):
+        """Length of the misclosure (m)."""
+        return float(np.linalg.norm(self.misclosure(row, column)))
+
     def corrected(self, row):
-        """By which neighbours an observation was corrected, and how well, in words."""
+        """By which neighbours an observation was corrected: names, how much later, and sigma."""
         time = self.observations.gps_time
         column = self.decision.column
         matched = self.matched
         at = np.searchsorted(matched, row)
         near = [matched[i] for i in (at - 1, at) if 0 <= i < len(matched)]
-        sigma = np.linalg.norm(self.decision.marginals.sigma[row])
-        if not near:
-            return f"no other target tells the misclosure there (sigma {sigma:.2f} m)"
-        words = [f"{self.name(column[i])} ({time[i] - time[row]:+.1f} s)" for i in near]
-        return f"its neighbours {' and '.join(words)} tell it to {sigma:.2f} m (one sigma)"
+        return {
+            "neighbours": tuple((self.name(column[i]), float(time[i] - time[row])) for i in near),
+            "sigma": float(np.linalg.norm(self.decision.marginals.sigma[row])),
+        }
+
+    def appearance(self, row):
+        """Kind and size of an observation."""
+        return {
+            "kind": self.observations.kind[row],
+            "size": float(self.observations.size[row]),
+        }
+
+    def whereabouts(self, point, row):
+        """When an observation was made, how far from a control point, and its name if any."""
+        away = np.linalg.norm(self.observations.position[row] - self.control.position[point])
+        column = self.decision.column[row]
+        name = None
+        if column >= 0:
+            name = self.name(column)
+        return {"time": self.time(row), "away": float(away), "found_name": name}
 
 
 def explain(
@@ -117,7 +137,7 @@ def explain(
     pairs: CandidatePairs,
     decision: Decision,
     search_radius: float,
-) -> tuple[tuple[Refusal, ...], list[str | None]]:
+) -> tuple[tuple[Refusal, ...], list[Statement | None]]:
     """Say why control points have no observation, and observations no name.
 
     Parameters
@@ -133,12 +153,12 @@ def explain(
     Returns
     -------
     refusals : tuple of Refusal
-    reasons : list of n str
+    reasons : list of n Statement
         None for an observation with a name.
     """
     case = _Case(observations, control, pairs, decision, search_radius)
     tree = cKDTree(control.position) if len(control) else None
-    reasons: list[str | None] = [None] * len(observations)
+    reasons: list[Statement | None] = [None] * len(observations)
     claims = []
     unnamed = np.flatnonzero(decision.column < 0)
     kinds = {row: _of_another_kind(case, row) for row in unnamed}
@@ -172,73 +192,73 @@ def _of_another_kind(case, row):
 
 
 def _exchanged(case, row, other_kind):
-    """The sentence for a position that fits and a kind or size that doesn't."""
+    """The reason for a position that fits and a kind or size that doesn't."""
     observed = case.observations
     surveyed = case.control
     column = other_kind[row]
-    kind = observed.kind[row]
-    size = observed.size[row]
-    sentence = (
-        f"The observation at {case.when(row)} is a {kind} of {size:.2f} m and "
-        f"{case.name(column)} a {surveyed.kind[column]} of {surveyed.size[column]:.2f} m, but they "
-        f"lie {case.off(row, column):.2f} m apart once corrected; {case.corrected(row)}"
-    )
     others, columns = np.array(list(other_kind.items())).T
     crossed = same_appearance(observed[[row]], 0, surveyed[columns], ...) & (columns != column)
     crossed &= same_appearance(observed[others], ..., surveyed[[column]], 0)
-    partners = {case.name(partner) for partner in columns[crossed]}
-    if not partners:
-        return sentence + ". Kind or size is wrong in the survey or in the extraction."
-    return sentence + f". {case.name(column)} and {' or '.join(sorted(partners))} look exchanged."
+    values = {
+        "name": case.name(column),
+        "time": case.time(row),
+        "surveyed_kind": surveyed.kind[column],
+        "surveyed_size": float(surveyed.size[column]),
+        "off": case.off(row, column),
+        "exchanged": tuple(sorted({case.name(partner) for partner in columns[crossed]})),
+    }
+    return Statement(
+        "other appearance", "warning", values | case.appearance(row) | case.corrected(row)
+    )
 
 
 def _wrong_place(case, row):
-    """(control points, sentence) of an observation whose surveyed point lies elsewhere."""
+    """(control points, reason) of an observation whose surveyed point lies elsewhere."""
     column, probability, _ = case.of_pairs(row)
     wrong = case.decision.wrong
     if len(column) == 0 or probability[0] < 0.5 or wrong[column[0]] <= 0.5:
         return None
     point = column[0]
-    misclosure = np.linalg.norm(case.misclosure(row, point))
-    passes = case.decision.passes[point]
-    return [point], (
-        f"{case.name(point)} lies {case.off(row, point):.2f} m from where the observation at "
-        f"{case.when(row)} says once corrected; {case.corrected(row)}. Its surveyed point is "
-        f"wrong, or this is another object (probability {wrong[point]:.3f} by {passes} "
-        f"observation{'' if passes == 1 else 's'}; misclosure {misclosure:.2f} m, {case.limit}): "
-        "compare its coordinates with the surveyor's record, or leave it out."
-    )
+    values = {
+        "name": case.name(point),
+        "time": case.time(row),
+        "off": case.off(row, point),
+        "probability": float(wrong[point]),
+        "observations": int(case.decision.passes[point]),
+        "misclosure": case.distance(row, point),
+        "search_radius": case.search_radius,
+    }
+    return [point], Statement("wrong point", "warning", values | case.corrected(row))
 
 
 def _doubt(case, row):
-    """(control points, sentence) where an observation may be one of them, but isn't surely."""
+    """(control points, reason) where an observation may be one of them, but isn't surely."""
     column, probability, _ = case.of_pairs(row)
     if probability.max(initial=0.0) < 2 * (1.0 - SETTINGS.smallest_probability):
         return None
     point = column[0]
-    chance = probability[0]
-    end = f"({case.limit}, probability {chance:.3f}"
+    values = {"search_radius": case.search_radius} | case.corrected(row)
     if len(column) > 1 and probability[1] >= SETTINGS.smallest_rival:
         apart = np.linalg.norm(case.control.position[point] - case.control.position[column[1]])
-        return column[:2], (
-            f"{case.name(point)} and {case.name(column[1])} lie {apart:.2f} m apart and both claim "
-            f"the observation at {case.when(row)} {end} and {probability[1]:.3f}); "
-            f"{case.corrected(row)}."
-        )
+        values |= {
+            "names": (case.name(point), case.name(column[1])),
+            "apart": float(apart),
+            "time": case.time(row),
+            "probabilities": (float(probability[0]), float(probability[1])),
+        }
+        return column[:2], Statement("two points", "warning", values)
+    values |= {"name": case.name(point), "probability": float(probability[0])}
     rival = _rival(case, row, point)
     if rival is not None:
         apart = np.linalg.norm(np.diff(case.observations.position[[row, rival]], axis=0))
-        return [point], (
-            f"Two observations {apart:.2f} m apart, at {case.when(row)} and {case.when(rival)}, "
-            f"both claim {case.name(point)} {end} of the first); {case.corrected(row)}."
-        )
-    misclosure = np.linalg.norm(case.misclosure(row, point))
-    wrong = case.decision.wrong[point]
-    return [point], (
-        f"{case.name(point)}, {misclosure:.2f} m from the observation at {case.when(row)}, isn't "
-        f"surely its target {end}, and {wrong:.3f} that the surveyed point is wrong); "
-        f"{case.corrected(row)}."
-    )
+        values |= {"apart": float(apart), "times": (case.time(row), case.time(rival))}
+        return [point], Statement("two observations", "warning", values)
+    values |= {
+        "misclosure": case.distance(row, point),
+        "time": case.time(row),
+        "wrong": float(case.decision.wrong[point]),
+    }
+    return [point], Statement("doubtful match", "warning", values)
 
 
 def _rival(case, row, column):
@@ -254,7 +274,7 @@ def _rival(case, row, column):
 
 
 def _not_there(case, row):
-    """(control points, sentence) where a free one is near, but not where the neighbours say.
+    """(control points, reason) where a free one is near, but not where the neighbours say.
 
     An object as far from it as no target is moved says nothing of it.
     """
@@ -267,30 +287,31 @@ def _not_there(case, row):
         claimed = [point]
     else:
         claimed = []
-    return claimed, (
-        f"{case.name(point)} lies {case.off(row, point):.2f} m from where the observation at "
-        f"{case.when(row)} says once corrected; {case.corrected(row)}. This is another object "
-        f"(misclosure {np.linalg.norm(case.misclosure(row, point)):.2f} m, "
-        f"{case.limit})."
-    )
+    values = {
+        "name": case.name(point),
+        "time": case.time(row),
+        "off": case.off(row, point),
+        "misclosure": case.distance(row, point),
+        "search_radius": case.search_radius,
+    }
+    return claimed, Statement("another object", values=values | case.corrected(row))
 
 
 def _without_point(case, row, tree):
-    """The sentence for an observation that no free surveyed point is near to."""
-    observed = case.observations
-    what = f"{observed.kind[row]} of {observed.size[row]:.2f} m at {case.when(row)}"
+    """The reason for an observation that no free surveyed point is near to."""
+    values = {"time": case.time(row)} | case.appearance(row)
     if tree is None:
-        return f"There is no surveyed point for the {what}."
-    distance, nearest = tree.query(observed.position[row])
-    if case.free(row, [nearest])[0]:
-        role = ""
-    else:
-        role = ", another observation of this pass,"
-    return (
-        f"No surveyed point is left for the {what} ({case.limit}); the nearest, "
-        f"{case.name(nearest)}{role} a {case.control.kind[nearest]} of "
-        f"{case.control.size[nearest]:.2f} m, lies {distance:.2f} m away."
-    )
+        return Statement("no control", values=values)
+    distance, nearest = tree.query(case.observations.position[row])
+    values |= {
+        "search_radius": case.search_radius,
+        "nearest": case.name(nearest),
+        "nearest_kind": case.control.kind[nearest],
+        "nearest_size": float(case.control.size[nearest]),
+        "distance": float(distance),
+        "is_taken": not case.free(row, [nearest])[0],
+    }
+    return Statement("no point left", values=values)
 
 
 def _without_observation(case, refused, reasons):
@@ -299,16 +320,16 @@ def _without_observation(case, refused, reasons):
     known = {case.name(c) for c in column[column >= 0]} | {refusal.name for refusal in refused}
     missing = [i for i, name in enumerate(case.control.name) if name not in known]
     if len(case.observations) == 0:
-        return [Refusal(case.name(i), None, "No target was found in the cloud.") for i in missing]
+        return [Refusal(case.name(i), None, Statement("nothing found")) for i in missing]
     tree = cKDTree(case.observations.position)
     return [Refusal(case.name(i), None, _why_missing(case, i, reasons, tree)) for i in missing]
 
 
 def _why_missing(case, point, reasons, tree):
-    """The sentences for a control point: of its like, what is near was refused, has another name,
-    or isn't there.
+    """The reason for a control point: of its like, what is near was refused, has another name, or
+    isn't there.
     """
-    like = f"{case.control.kind[point]} of {case.control.size[point]:.2f} m"
+    values = {"kind": case.control.kind[point], "size": float(case.control.size[point])}
     pairs, rows = case.pairs_of(point)
     rows = rows[case.pairs.same[pairs]]
     away = np.linalg.norm(case.observations.position[rows] - case.control.position[point], axis=1)
@@ -316,23 +337,14 @@ def _why_missing(case, point, reasons, tree):
     refused = [row for row in rows if case.decision.column[row] < 0]
     if refused:
         row = refused[0]
-        return f"The nearest {like} without a name {_whereabouts(case, point, row)}. {reasons[row]}"
+        values |= case.whereabouts(point, row) | {"why": reasons[row]}
+        return Statement("only refused", values=values)
+    values["search_radius"] = case.search_radius
     if len(rows):
-        return (
-            f"Each {like} found near it ({case.limit}) is another surveyed point; the nearest "
-            f"{_whereabouts(case, point, rows[0])}."
-        )
+        return Statement("only others", values=values | case.whereabouts(point, rows[0]))
     row = tree.query(case.control.position[point])[1]
-    return (
-        f"No {like} was found near it ({case.limit}). The nearest target, a "
-        f"{case.observations.kind[row]} of {case.observations.size[row]:.2f} m, "
-        f"{_whereabouts(case, point, row)}."
-    )
-
-
-def _whereabouts(case, point, row):
-    """When an observation was made, how far from a control point, and its name if it has one."""
-    away = np.linalg.norm(case.observations.position[row] - case.control.position[point])
-    column = case.decision.column[row]
-    name = f" and is {case.name(column)}" if column >= 0 else ""
-    return f"was found at {case.when(row)}, {away:.2f} m away{name}"
+    values |= {
+        "nearest_kind": case.observations.kind[row],
+        "nearest_size": float(case.observations.size[row]),
+    }
+    return Statement("none of its kind", values=values | case.whereabouts(point, row))

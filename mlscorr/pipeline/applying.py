@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.correction import Correction
-from mlscorr.effects import Effect, joined
+from mlscorr.effects import Effect
 from mlscorr.estimate import corrected_mounting
 from mlscorr.io.clouds import written_name
 from mlscorr.io.surveys import FILE_NAME, write_survey_copy
@@ -21,6 +21,7 @@ from mlscorr.pipeline.control_checks import remounting_fault
 from mlscorr.pipeline.finding import silent
 from mlscorr.pipeline.found_effects import CLOCK, DATUM, MOUNTING, TAKEN_OUT, FoundEffects
 from mlscorr.survey import Summary, Survey, SurveyFileError, check_survey
+from mlscorr.wording import joined
 
 
 def apply(

@@ -110,8 +110,10 @@ def choose_crs(clouds: list[Cloud], drive: Drive, given: str | None) -> tuple[st
         _check_clouds(clouds, drive.recorded.trajectory, "map coordinates", "no file states a CRS")
         return None, "no file states it"
     projected = check_crs(crs)
-    for conflict in filter(None, (crs_conflict(cloud.layout, crs) for cloud in clouds)):
-        raise ValueError(conflict.replace("crs of survey.toml", f"the crs {reason}"))
+    for cloud in clouds:
+        conflict = crs_conflict(cloud.layout, crs, f"the crs {reason}")
+        if conflict:
+            raise ValueError(conflict)
     trajectory = drive.read(crs)
     with warnings.catch_warnings(action="error"):
         try:

@@ -16,17 +16,11 @@ from mlscorr.gap.signatures import expected, without_effects
 from mlscorr.io.surveys import simulated_survey
 from mlscorr.pipeline.finding import Finding, find_or_compare_surfaces, read_into
 from mlscorr.pipeline.planning import check_enough
-from mlscorr.survey import Matched, Survey, TargetObservations
+from mlscorr.survey import Matched, Statement, Survey, TargetObservations
 
-NEXT_RUN = (
-    "Run mlscorr diagnose once more with --simulator simulator.toml of this folder: it has the "
-    "cause in it, and the next run finds what is left, or nothing."
-)
-NEXT_CLOUDS = (
-    "Put the cause into your simulator, and give the clouds that it makes then as a second "
-    "--simulated: they tell how far the gap shrinks, and by themselves what is left."
-)
-SECOND_CLOUDS = "Run mlscorr diagnose with your second clouds alone: they tell what is left."
+NEXT_RUN = Statement("next run")
+NEXT_CLOUDS = Statement("next clouds")
+SECOND_CLOUDS = Statement("second clouds")
 LINEAR = (
     "How far the gap would shrink is reckoned to the first order: your simulator ran only once."
 )
@@ -50,8 +44,8 @@ class ComparedRows:
         Of the channels beside geometry.
     distances : tuple of DistributionDistance
         Between the clouds, where there are simulated ones.
-    next_run : str
-        What to run once the simulator has the cause, in a sentence.
+    next_run : Statement
+        What to run once the simulator has the cause.
     """
 
     rows: residuals.Rows
@@ -61,7 +55,7 @@ class ComparedRows:
     notes: tuple[str, ...]
     contrasts: tuple[contrast.Contrast, ...] = ()
     distances: tuple[contrast.DistributionDistance, ...] = ()
-    next_run: str = NEXT_CLOUDS
+    next_run: Statement = NEXT_CLOUDS
 
 
 def compare_with_belief(

@@ -3,7 +3,8 @@
 from collections.abc import Iterator
 
 from mlscorr.io.surveys import ProjectParts
-from mlscorr.survey import Survey, SurveyFileError, counted
+from mlscorr.survey import Survey, SurveyFileError
+from mlscorr.wording import counted
 
 
 def check_control(survey: Survey | ProjectParts) -> None:

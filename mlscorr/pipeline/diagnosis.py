@@ -30,7 +30,7 @@ from mlscorr.pipeline.finding import silent
 from mlscorr.pipeline.found_effects import cloud_rows
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.simulate import Simulator, beliefs_of, write_simulator
-from mlscorr.survey import Survey, check_rng, check_survey, rows_frame
+from mlscorr.survey import Statement, Survey, check_rng, check_survey, rows_frame
 
 if TYPE_CHECKING:
     import pandas
@@ -200,7 +200,7 @@ class DiagnosedSurvey(KnownResult):
     costs: Costs = field(default_factory=Costs)
     contrasts: tuple[contrast.Contrast, ...] = ()
     distances: tuple[contrast.DistributionDistance, ...] = ()
-    next_run: str = ""
+    next_run: Statement | None = None
     scale: float = 1.0
 
     @property
@@ -214,10 +214,6 @@ class DiagnosedSurvey(KnownResult):
         from mlscorr.report.gap import gap_screen
 
         believed = self._believed
-        if self._has_named_cause:
-            next_step = self._improvement[1] or self.next_run
-        else:
-            next_step = ""
         content = gap_document(
             survey=believed,
             rows=self.rows,
@@ -228,8 +224,7 @@ class DiagnosedSurvey(KnownResult):
             left_out=self.left_out,
             warnings=self.warnings,
             absence=self.absence,
-            contrasts=self.contrasts,
-            next_step=next_step,
+            further_advice=self._further_advice,
         )
         content["assumed"] = assumed_document(believed, self.inference, self.scale)
         content["costs"] = vars(self.costs)
@@ -243,13 +238,27 @@ class DiagnosedSurvey(KnownResult):
         return self.inference.verdict.label not in ("none", "unknown")
 
     @property
+    def _further_advice(self):
+        """Statements on what to run next, and on the channels beside geometry."""
+        advice = []
+        if self._has_named_cause:
+            why = self._improvement[1]
+            if why:
+                advice.append(Statement("simulator as it was", "warning", {"why": why}))
+            elif self.next_run is not None:
+                advice.append(self.next_run)
+        if any(contrast.sentences for contrast in self.contrasts):
+            advice.append(Statement("channels"))
+        return advice
+
+    @property
     def improved(self) -> Simulator:
         """The Simulator with the cause in it; the same where there is none that it could take."""
         return self._improvement[0]
 
     @cached_property
     def _improvement(self):
-        """The Simulator with the cause in it, or the same and a sentence why it can't take that."""
+        """The Simulator with the cause in it, or the same and why it can't take that."""
         if not self._has_named_cause:
             return self.simulator, ""
         believed = self._believed
@@ -263,8 +272,7 @@ class DiagnosedSurvey(KnownResult):
                 improved = replace(improved, pos=pos)
             return improved, ""
         except ValueError as error:  # larger than any survey can have
-            why = f"simulator.toml is as it was, since no simulator can take that: {error}"
-            return self.simulator, why
+            return self.simulator, str(error)
 
     def to_frame(self) -> pandas.DataFrame:
         """A row each parameter of the causes, the best first; pandas is needed for it."""

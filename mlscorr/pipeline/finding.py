@@ -14,7 +14,7 @@ from mlscorr.matching import Matches, match
 from mlscorr.pipeline.beams import with_beam_origin
 from mlscorr.pipeline.control_checks import check_control
 from mlscorr.pipeline.settings import SETTINGS
-from mlscorr.survey import CloudFile, PointCloud, Survey, check_rng, counted
+from mlscorr.survey import CloudFile, PointCloud, Statement, Survey, check_rng
 from mlscorr.targets import (
     BY_EDGES,
     NO_POINTS,
@@ -28,6 +28,7 @@ from mlscorr.targets import (
     search_radius,
     why_useless,
 )
+from mlscorr.wording import counted
 
 
 @dataclass(frozen=True)
@@ -448,8 +449,8 @@ def unmatched(targets: list[PassTarget], candidates: Candidates, reason: str = "
     """
     observations = as_observations(targets)
     nothing = observations[np.zeros(len(targets), bool)]
-    reasons = (reason,) * len(targets)
-    matches = Matches(nothing, observations, (), np.empty(0), reasons)
+    why = (Statement("not matched", values={"why": reason}),) * len(targets)
+    matches = Matches(nothing, observations, (), np.empty(0), why)
     return Finding(matches, candidates, _by_pass_and_time(targets))
 
 

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.effects import Effect, effect_class, joined, make_effect
+from mlscorr.effects import Effect, effect_class, make_effect
 from mlscorr.estimate import sigma_note
 from mlscorr.io.store import FileIdentity
 from mlscorr.survey import Survey
+from mlscorr.wording import joined
 
 CLOCK = "time_offset"
 MOUNTING = ("lever_arm", "boresight")

@@ -9,7 +9,8 @@ from mlscorr.io import SETTINGS as IO
 from mlscorr.io.clouds import read_chunks, recorded_points
 from mlscorr.pipeline.quick_look import QuickLook
 from mlscorr.pipeline.settings import SETTINGS
-from mlscorr.survey import CloudFile, PointCloud, Survey, counted
+from mlscorr.survey import CloudFile, PointCloud, Survey
+from mlscorr.wording import counted
 
 
 @dataclass(frozen=True)

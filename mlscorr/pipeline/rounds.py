@@ -66,7 +66,7 @@ class DiagnosedRounds(KnownResult):
     @cached_property
     def _first(self):
         """The first round, which needs no advice to run once more: that was done."""
-        return replace(self.rounds[0], next_run="")
+        return replace(self.rounds[0], next_run=None)
 
     def _files(self):
         """gap.json and gap.html of the first round, and the last simulator.toml."""

@@ -40,7 +40,8 @@ from mlscorr.pipeline.choice import choose_control, choose_crs
 from mlscorr.pipeline.drives import Cloud, choose_accuracy, choose_trajectory
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.pipeline.survey_text import SurveyText
-from mlscorr.survey import PointCloud, Trajectory, counted
+from mlscorr.survey import PointCloud, Trajectory
+from mlscorr.wording import counted
 
 
 @dataclass(frozen=True)

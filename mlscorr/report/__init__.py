@@ -14,7 +14,7 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
         "figures": ["correction_figures", "write_pictures"],
         "headline": ["RATINGS", "capped", "first_screen", "statements_section"],
         "project_page": ["write_project"],
-        "_statement": ["Statement"],
+        "_statement": ["StatementRow"],
         "style": ["draw"],
         "target_figures": ["write_contact_sheet"],
         "tie_words": ["tie_sentences"],

@@ -8,14 +8,14 @@ import numpy as np
 from mlscorr.estimate import MOUNTING_COMPONENTS, SETTINGS
 from mlscorr.evaluate import PointCounts, TargetRow
 from mlscorr.report.headline import (
-    Statement,
+    StatementRow,
     check_statement,
     control_statement,
     statements_section,
     warning_statements,
 )
 from mlscorr.report.pages import Page
-from mlscorr.report.tables import length_in_words, millimetres
+from mlscorr.wording import length_in_words, millimetres
 
 PARTS = ("lever_arm", "boresight")
 SECTIONS = {
@@ -58,7 +58,7 @@ def scanners_screen(content: dict[str, Any]) -> dict[str, object]:
     return statements_section(facts)
 
 
-def _relative(content) -> Iterator[Statement]:
+def _relative(content) -> Iterator[StatementRow]:
     """How well it is known how each further scanner stands beside the first."""
     for name, row in content["relative"].items():
         first = row["beside"]
@@ -76,7 +76,7 @@ def _relative(content) -> Iterator[Statement]:
             f"{'/'.join(f'{sigma:.3f}' for sigma in turn)} deg about them (one sigma)."
         )
         is_held = fit is not None and fit < SETTINGS.determined_sigma[0]
-        yield Statement("Together", "green" if is_held else "amber", sentence)
+        yield StatementRow("Together", "green" if is_held else "amber", sentence)
 
 
 def component_rows(content: dict[str, Any]) -> list[dict[str, Any]]:
@@ -123,14 +123,14 @@ def _lack(content):
     lacks = _lacks(content)
     if not lacks and not any(content["determined"]):
         sentence = "This geometry does not tell whether the recorded mounting holds."
-        return Statement("Mounting", "amber", sentence)
+        return StatementRow("Mounting", "amber", sentence)
     if not lacks:
         sigmas = f"it lacks nothing beyond {SETTINGS.setup_sigmas:g} sigmas"
         if all(content["determined"]):
-            return Statement("Mounting", "green", f"The recorded mounting holds: {sigmas}.")
+            return StatementRow("Mounting", "green", f"The recorded mounting holds: {sigmas}.")
         sentence = f"The recorded mounting holds in the parts that are determined: {sigmas}."
-        return Statement("Mounting", "green", sentence)
-    return Statement("Mounting", "amber", f"The recorded mounting lacks {', '.join(lacks)}.")
+        return StatementRow("Mounting", "green", sentence)
+    return StatementRow("Mounting", "amber", f"The recorded mounting lacks {', '.join(lacks)}.")
 
 
 def _size(value, sigma, unit):
@@ -149,13 +149,13 @@ def _determined(content):
     ]
     count = len(MOUNTING_COMPONENTS)
     if not open_parts:
-        return Statement("Determined", "green", f"All {count} parts by this geometry.")
+        return StatementRow("Determined", "green", f"All {count} parts by this geometry.")
     sentence = (
         f"{count - len(open_parts)} of {count} parts by this geometry. Not determined, and changed "
         "only as far as the accuracy of the POS tells it from what looks the same: "
         f"{', '.join(open_parts)}."
     )
-    return Statement("Determined", "amber", sentence)
+    return StatementRow("Determined", "amber", sentence)
 
 
 def _remainder(content):
@@ -163,19 +163,21 @@ def _remainder(content):
     role = "check" if content["lsc"]["check"]["n"] else "control"
     group = content["lsc"][role]
     if group["n"] == 0:
-        return Statement("Result", "amber", "No target tells how good the calibration is.")
+        return StatementRow("Result", "amber", "No target tells how good the calibration is.")
     before, after = (group[state]["rmse_3d"] for state in ("before", "after"))
     sentence = f"3D RMSE of {role} points {length_in_words(before)} → {length_in_words(after)}"
     if role == "control":
-        return Statement("Result", "amber", f"{sentence}: the fit alone, which proves little.")
+        return StatementRow("Result", "amber", f"{sentence}: the fit alone, which proves little.")
     sentence = f"{sentence}; they took no part"
     if after <= before:
-        return Statement("Result", "green", f"{sentence}.")
+        return StatementRow("Result", "green", f"{sentence}.")
     if _is_off(content["scanner_errors"]):
-        return Statement("Result", "amber", f"{sentence}, and keep what the scanner itself lacks.")
+        return StatementRow(
+            "Result", "amber", f"{sentence}, and keep what the scanner itself lacks."
+        )
     if not _lacks(content):
-        return Statement("Result", "amber", f"{sentence}. No part changed significantly.")
-    return Statement("Result", "red", f"{sentence}.")
+        return StatementRow("Result", "amber", f"{sentence}. No part changed significantly.")
+    return StatementRow("Result", "red", f"{sentence}.")
 
 
 def _is_off(errors):
@@ -183,7 +185,7 @@ def _is_off(errors):
     return any(row["significant"] for row in (errors or {}).values())
 
 
-def _scanner(content) -> Iterator[Statement]:
+def _scanner(content) -> Iterator[StatementRow]:
     """What the scanner's own ranges and encoder lack."""
     errors = content["scanner_errors"]
     if errors is None:
@@ -200,14 +202,14 @@ def _scanner(content) -> Iterator[Statement]:
         f"{1e3 * encoder['sigma']:.2f} mrad per rad{open_encoder}"
     )
     if _is_off(errors):
-        yield Statement("Scanner", "amber", f"{sentence}; the mounting is free of it.")
+        yield StatementRow("Scanner", "amber", f"{sentence}; the mounting is free of it.")
     elif all(row["determined"] for row in errors.values()):
-        yield Statement("Scanner", "green", f"{sentence}: nothing significant.")
+        yield StatementRow("Scanner", "green", f"{sentence}: nothing significant.")
     else:
-        yield Statement("Scanner", "green", f"{sentence}; this geometry hardly tells it.")
+        yield StatementRow("Scanner", "green", f"{sentence}; this geometry hardly tells it.")
 
 
-def _ties(content) -> Iterator[Statement]:
+def _ties(content) -> Iterator[StatementRow]:
     """How far apart the passes lie where both saw the same."""
     ties = content["ties"]
     if ties is not None and ties["used"]:
@@ -224,7 +226,7 @@ def _ties(content) -> Iterator[Statement]:
         if "with_drift" in content:
             median = content["with_drift"]["ties"]["after"]["median"]
             sentence += f", {length_in_words(median)} without the drift"
-        yield Statement("Two passes", "green", f"{sentence}.")
+        yield StatementRow("Two passes", "green", f"{sentence}.")
 
 
 def calibration_page(content: dict[str, Any]) -> Page:

@@ -3,11 +3,10 @@
 from collections.abc import Iterator
 from typing import Any
 
-from mlscorr.effects import joined
 from mlscorr.evaluate import PointCounts, TargetRow
-from mlscorr.report import headline, tables
+from mlscorr.report import headline
 from mlscorr.report.settings import SETTINGS
-from mlscorr.survey import counted
+from mlscorr.wording import counted, joined, number
 
 OWN = "correct"  # the method that the command of this name uses
 UNTIED = "lsc"  # the same by control points alone
@@ -44,7 +43,7 @@ def _best(document):
     first, *more = verdict(document)
     is_tested = document["scored_by"] != "control" and ranking(document)[0]["name"] != "raw"
     items = tuple(("", sentence) for sentence in more)
-    return headline.Statement("Result", "green" if is_tested else "amber", first, items)
+    return headline.StatementRow("Result", "green" if is_tested else "amber", first, items)
 
 
 def _scored(document):
@@ -53,10 +52,10 @@ def _scored(document):
         rating = "amber"
     else:
         rating = "green"
-    return headline.Statement("Scores", rating, basis(document))
+    return headline.StatementRow("Scores", rating, basis(document))
 
 
-def _ties(document) -> Iterator[headline.Statement]:
+def _ties(document) -> Iterator[headline.StatementRow]:
     """Which methods use ties between passes, where there are any."""
     own = next((row for row in document["methods"] if row["name"] == OWN), None)
     if own is None or own["status"] != "determined":
@@ -67,9 +66,10 @@ def _ties(document) -> Iterator[headline.Statement]:
             "both saw. All other methods use the control points alone."
         )
     else:
-        why = own["details"]["untied"] or ""
-        sentence = f"{OWN} equals {UNTIED} here, for no ties were used. {why}".rstrip()
-    yield headline.Statement("Ties", "green", sentence)
+        sentence = f"{OWN} equals {UNTIED} here, for no ties were used."
+        if own["details"]["untied"]:
+            sentence += f" {own['details']['untied']}"
+    yield headline.StatementRow("Ties", "green", sentence)
 
 
 def method_warnings(rows: list[dict]) -> list[str]:
@@ -87,12 +87,12 @@ def method_warnings(rows: list[dict]) -> list[str]:
     return [f"{joined(of_one)}: {sentence}" for sentence, of_one in names.items()]
 
 
-def _undetermined(document) -> Iterator[headline.Statement]:
+def _undetermined(document) -> Iterator[headline.StatementRow]:
     """Methods without a score."""
     absent = undetermined(document)
     if absent:
         count = f"{len(absent)} of {len(document['methods'])} methods have no score."
-        yield headline.Statement("Not determined", "amber", count, tuple(absent))
+        yield headline.StatementRow("Not determined", "amber", count, tuple(absent))
 
 
 def undetermined(document: dict) -> list[tuple[str, str]]:
@@ -173,31 +173,28 @@ def verdict(document: dict) -> list[str]:
     value = {row["name"]: row[by]["rmse_3d"] for row in ranked}
     best = ranked[0]["name"]
     tied = [name for name in value if value[name] - value[best] < SETTINGS.difference]
-    raw = f"{tables.number(value['raw'])} m without any correction"
+    raw = f"{number(value['raw'])} m without any correction"
     if "raw" in tied:
-        text = f"The cloud as recorded, with {tables.number(value['raw'])} m, is as good as any"
+        text = f"The cloud as recorded, with {number(value['raw'])} m, is as good as any"
         return [
             f"No method improves this cloud by {1000 * SETTINGS.difference:.0f} mm or more. {text}."
         ]
-    sentences = [_winner(ranked[0], tied, tables.number(value[best]), raw)]
+    sentences = [_winner(ranked[0], tied, number(value[best]), raw)]
     for kind, words in OTHERS.items():
         rest = [row["name"] for row in ranked if row["kind"] == kind]
         if rest and rest[0] not in tied:
-            sentences.append(f"{words}: {rest[0]}, with {tables.number(value[rest[0]])} m.")
+            sentences.append(f"{words}: {rest[0]}, with {number(value[rest[0]])} m.")
     if OWN in value and OWN not in tied:
         own = value[OWN]
         behind = own - value[best]
-        sentences.append(
-            f"{OWN}, with {tables.number(own)} m, is {tables.number(behind)} m behind."
-        )
+        sentences.append(f"{OWN}, with {number(own)} m, is {number(behind)} m behind.")
     return sentences
 
 
 def _winner(row, tied, value, raw):
     """The sentence on the best method, or on those that are too close to tell apart."""
     if len(tied) == 1:
-        about = row["about"][0].lower() + row["about"][1:].rstrip(".")
-        return f"Best is {row['name']} ({about}): 3D RMSE {value} m, against {raw}."
+        return f"Best is {row['name']}: 3D RMSE {value} m, against {raw}. {row['about']}"
     return (
         f"Best are {joined(tied)}: 3D RMSE {value} m, against {raw}. They differ by less than "
         f"{1000 * SETTINGS.difference:.0f} mm, which can't be told apart."

@@ -4,8 +4,8 @@ import numpy as np
 
 from mlscorr.correction import Correction
 from mlscorr.report.correction_report import CorrectionReport, FileRow
-from mlscorr.report.tables import number, thousands
 from mlscorr.survey import WEEK, Survey
+from mlscorr.wording import number, percent, thousands
 
 FRAMES = {
     "Frame: map": "easting, northing, height in m, as the files have them",
@@ -97,7 +97,7 @@ def coverage(correction: Correction, report: CorrectionReport) -> list[tuple[str
         return f"{first:.3f} to {last:.3f} s ({last - first:.1f} s)"
 
     def points(n):
-        return thousands(n) + (f" ({100 * n / total:.2f} %)" if n and total else "")
+        return thousands(n) + (f" ({percent(n / total, 2)})" if n and total else "")
 
     if report.control.n:
         control = span(*covered.control_span)

@@ -6,7 +6,7 @@ RATINGS = ("green", "amber", "red")  # as it should be; mind it; not whole, or w
 
 
 @dataclass(frozen=True)
-class Statement:
+class StatementRow:
     """A fact on the first screen.
 
     Parameters

@@ -2,10 +2,8 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from mlscorr.effects import joined, known
-from mlscorr.report._statement import Statement
-from mlscorr.report.tables import length_in_words
-from mlscorr.survey import counted
+from mlscorr.report._statement import StatementRow
+from mlscorr.wording import counted, joined, known, length_in_words
 
 NAMES = {  # of a key of survey.toml
     "pos.position_sigma": "Position of the POS",
@@ -30,7 +28,7 @@ def has_assumed_sigma(rows: Iterable[dict]) -> bool:
 
 def assumed_statement(
     rows: list[dict], purpose: str, rating: str, uses: Mapping[str, str] | None = None
-) -> Iterator[Statement]:
+) -> Iterator[StatementRow]:
     """The accuracies that nobody stated, with the defaults that stand in; nothing without any.
 
     Parameters
@@ -58,7 +56,7 @@ def assumed_statement(
         f"what you know under {joined(sections)} in survey.toml{columns}."
     )
     items = tuple(_item(row, uses or {}) for row in rows)
-    yield Statement("Assumed", rating if is_sigma else "green", sentence, items)
+    yield StatementRow("Assumed", rating if is_sigma else "green", sentence, items)
 
 
 def _item(row, uses):

@@ -29,6 +29,7 @@ from mlscorr.report.render import (
 from mlscorr.report.sample import gather
 from mlscorr.report.settings import SETTINGS
 from mlscorr.survey import Survey
+from mlscorr.wording import thousands
 
 Progress = Callable[[str, int], Callable[[int], None]]
 
@@ -146,7 +147,7 @@ def cloud_content(views: CloudViews, targets: list[TargetRow]) -> dict:
         "step": views.step,
         "walls_whole": views.walls_whole,
         "scene": views.scene,
-        "scene_points": tables.thousands(len(base64.b64decode(views.scene["intensity"]))),
+        "scene_points": thousands(len(base64.b64decode(views.scene["intensity"]))),
     }
 
 

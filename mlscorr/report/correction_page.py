@@ -18,6 +18,7 @@ from mlscorr.report.target_figures import target_drawings
 from mlscorr.report.tie_words import tie_sentences
 from mlscorr.survey import Survey
 from mlscorr.targets import FittedTarget
+from mlscorr.wording import number, thousands
 
 SECTIONS = {  # in their order; one without anything to show is left out
     "statistics": "How far off",
@@ -161,7 +162,7 @@ def key_figures(correction: Correction, report: CorrectionReport) -> list[tuple[
             "leave-one-out": "3D RMSE of control points, each left out in turn",
             "fit": "3D RMSE of control points (fit only)",
         }[kind]
-        pair = [tables.number(statistics.rmse[4]) for statistics in (before, after)]
+        pair = [number(statistics.rmse[4]) for statistics in (before, after)]
         facts.append((f"{pair[0]} → {pair[1]} m", title))
     deeds = {
         "control": ("made the correction", "took part"),
@@ -177,9 +178,9 @@ def key_figures(correction: Correction, report: CorrectionReport) -> list[tuple[
         else:
             share = str(points)
         facts.append((share, f"{role} point{'s' * (points != 1)} {deed}{often}"))
-    facts.append((f"{tables.number(float(change.max()))} m", "largest correction of the position"))
+    facts.append((f"{number(float(change.max()))} m", "largest correction of the position"))
     sigma = report.position_sigma
     if sigma is not None:
-        median = f"{tables.number(sigma['median'])} m"
+        median = f"{number(sigma['median'])} m"
         facts.append((median, "3D sigma of the corrected position, median"))
-    return [*facts, (tables.thousands(report.cloud_points), "points in the cloud files")]
+    return [*facts, (thousands(report.cloud_points), "points in the cloud files")]

@@ -6,12 +6,12 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from mlscorr.evaluate import SEEN_BY_OTHERS, PointCounts
-from mlscorr.report._statement import RATINGS, Statement
+from mlscorr.report._statement import RATINGS, StatementRow
 from mlscorr.report.assumed import assumed_statement
 from mlscorr.report.correction_report import CorrectionReport
 from mlscorr.report.settings import SETTINGS
-from mlscorr.report.tables import length_in_words, percent, verdict
-from mlscorr.survey import counted
+from mlscorr.report.tables import verdict
+from mlscorr.wording import counted, length_in_words, percent
 
 NAMED = 6  # points or stretches that stand on the first screen; the tables have all of them
 
@@ -26,18 +26,18 @@ def first_screen(report: CorrectionReport) -> dict[str, object]:
     return {"headline": headline(report), **statements_section(statements(report))}
 
 
-def statements_section(facts: list[Statement]) -> dict[str, object]:
+def statements_section(facts: list[StatementRow]) -> dict[str, object]:
     """``statements`` of a document, and ``rating``: the worst of them.
 
     Parameters
     ----------
-    facts : list of Statement
+    facts : list of StatementRow
     """
     rating = max((statement.rating for statement in facts), key=RATINGS.index)
     return {"rating": rating, "statements": [statement.document() for statement in facts]}
 
 
-def statements(report: CorrectionReport) -> list[Statement]:
+def statements(report: CorrectionReport) -> list[StatementRow]:
     """All that stands on the first screen, in its order.
 
     Parameters
@@ -85,7 +85,7 @@ def _result(report):
         rating = "red"
     else:
         rating = "green" if is_tested else "amber"
-    return Statement("Result", rating, sentences[0], tuple(("", text) for text in sentences[1:]))
+    return StatementRow("Result", rating, sentences[0], tuple(("", text) for text in sentences[1:]))
 
 
 def _points_moved(report):
@@ -101,10 +101,10 @@ def _points_moved(report):
     )
     if left:
         sentence += f" {left} of {total} points lie outside the trajectory or in its gaps."
-    return Statement("Points", "red" if left or not held else "green", sentence)
+    return StatementRow("Points", "red" if left or not held else "green", sentence)
 
 
-def check_statement(points: PointCounts) -> Statement:
+def check_statement(points: PointCounts) -> StatementRow:
     """The check points that were scored, and those that were not.
 
     Parameters
@@ -114,12 +114,12 @@ def check_statement(points: PointCounts) -> Statement:
     """
     if points.surveyed == 0:
         sentence = "No check point was surveyed, so nothing independent tests this result."
-        return Statement("Check points", "amber", sentence)
+        return StatementRow("Check points", "amber", sentence)
     if points.missing:
         rating = "red"
     else:
         rating = "green" if points.scored else "amber"
-    return Statement("Check points", rating, " ".join(_scored(points)), _named(points))
+    return StatementRow("Check points", rating, " ".join(_scored(points)), _named(points))
 
 
 def _scored(points):
@@ -149,11 +149,11 @@ def _control(report):
         return control_statement(points)
     if report.is_held_by_others:
         sentence = "No point of its own takes part: those of other drives hold it, through ties."
-        return Statement("Control points", "amber", sentence)
-    return Statement("Control points", "red", _uncontrolled(report))
+        return StatementRow("Control points", "amber", sentence)
+    return StatementRow("Control points", "red", _uncontrolled(report))
 
 
-def control_statement(points: PointCounts) -> Statement:
+def control_statement(points: PointCounts) -> StatementRow:
     """The control points that were used, refused and not seen.
 
     Parameters
@@ -169,10 +169,10 @@ def control_statement(points: PointCounts) -> Statement:
         rating = "amber"
     else:
         rating = "green"
-    return Statement("Control points", rating, ", ".join(parts) + ".", _named(points))
+    return StatementRow("Control points", rating, ", ".join(parts) + ".", _named(points))
 
 
-def _datum(report) -> Iterator[Statement]:
+def _datum(report) -> Iterator[StatementRow]:
     """What the control as a whole differs by from the cloud."""
     if report.datum:
         terms = ", ".join(f"{each.term} {length_in_words(each.length)}" for each in report.datum)
@@ -181,7 +181,7 @@ def _datum(report) -> Iterator[Statement]:
             "the same survey cannot show."
         )
         items = tuple((each.term, each.sentence) for each in report.datum)
-        yield Statement("Datum", "amber", sentence, items)
+        yield StatementRow("Datum", "amber", sentence, items)
 
 
 def _uncontrolled(report):
@@ -203,9 +203,9 @@ def _extrapolated(report):
     weak = report.support.weak
     if not weak and report.is_held_by_others:
         sentence = "Control points of other drives hold the whole drive, through ties."
-        return Statement("Extrapolated", "amber", sentence)
+        return StatementRow("Extrapolated", "amber", sentence)
     if not weak:
-        return Statement("Extrapolated", "green", "Control points hold the whole drive.")
+        return StatementRow("Extrapolated", "green", "Control points hold the whole drive.")
     largest = max(stretch.sigma for stretch in weak)
     after = report.judgement[1]
     sentence = (
@@ -223,7 +223,7 @@ def _extrapolated(report):
         rating = "green"
     else:
         rating = "amber"
-    return Statement("Extrapolated", rating, sentence, capped(_stretches(weak)))
+    return StatementRow("Extrapolated", rating, sentence, capped(_stretches(weak)))
 
 
 def _stretches(weak):
@@ -236,7 +236,7 @@ def _stretches(weak):
         )
 
 
-def _left_out(report) -> Iterator[Statement]:
+def _left_out(report) -> Iterator[StatementRow]:
     """What remains at control points that the others alone correct."""
     left_out = report.control.left_out
     if left_out is not None and left_out.n and report.judgement[2] == "check":
@@ -245,13 +245,13 @@ def _left_out(report) -> Iterator[Statement]:
             f"RMSE {length_in_words(left_out.rmse[4])} in 3D ({axes} in E, N, H) at control points "
             "that the others alone correct."
         )
-        yield Statement("Left out in turn", "green", sentence)
+        yield StatementRow("Left out in turn", "green", sentence)
     elif left_out is not None and not left_out.n and report.points("control").scored == 1:
         sentence = "A single control point has no others: the POS's own sigmas alone check it."
-        yield Statement("Left out in turn", "amber", sentence)
+        yield StatementRow("Left out in turn", "amber", sentence)
 
 
-def _sigma(report) -> Iterator[Statement]:
+def _sigma(report) -> Iterator[StatementRow]:
     """What the estimate itself believes of its result."""
     sigma = report.position_sigma
     if sigma is not None:
@@ -264,10 +264,10 @@ def _sigma(report) -> Iterator[Statement]:
         is_larger = sigma["median"] > stated
         if is_larger:
             sentence += f" The POS states {length_in_words(stated)} of the recorded one."
-        yield Statement("Sigma", "amber" if is_larger else "green", sentence)
+        yield StatementRow("Sigma", "amber" if is_larger else "green", sentence)
 
 
-def warning_statements(warnings: Iterable[str]) -> Iterator[Statement]:
+def warning_statements(warnings: Iterable[str]) -> Iterator[StatementRow]:
     """What was doubtful on the way, if anything was.
 
     Parameters
@@ -277,7 +277,7 @@ def warning_statements(warnings: Iterable[str]) -> Iterator[Statement]:
     doubts = dict.fromkeys(warnings)
     if doubts:
         count = counted(len(doubts), "warning")
-        yield Statement("Warnings", "amber", f"{count}:", tuple(("", text) for text in doubts))
+        yield StatementRow("Warnings", "amber", f"{count}:", tuple(("", text) for text in doubts))
 
 
 def _named(points):
@@ -291,7 +291,7 @@ def capped(items: Iterable[tuple[str, str]]) -> tuple[tuple[str, str], ...]:
     Parameters
     ----------
     items : iterable of (str, str)
-        As of a Statement.
+        As of a StatementRow.
     """
     items = tuple(items)
     more = len(items) - NAMED

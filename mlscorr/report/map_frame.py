@@ -8,6 +8,7 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 from mlscorr.report.settings import SETTINGS
 from mlscorr.report.style import break_at_gaps, new_figure, thin
 from mlscorr.survey import Trajectory
+from mlscorr.wording import thousands
 
 
 def map_panels(count: int, share: float) -> tuple[Figure, np.ndarray]:
@@ -76,6 +77,6 @@ def frame(axes: Axes, low: np.ndarray, high: np.ndarray, ticks: int = 5) -> None
     for axis, name in ((axes.xaxis, "Easting (m)"), (axes.yaxis, "Northing (m)")):
         axis.set_major_locator(MaxNLocator(ticks, steps=[1, 2, 5, 10], min_n_ticks=2))
         decimals = 0 if np.ptp(axis.get_view_interval()) > 5 else 1
-        metres = FuncFormatter(lambda v, _, d=decimals: f"{v:,.{d}f}".replace(",", " "))
+        metres = FuncFormatter(lambda v, _, d=decimals: thousands(v, d))
         axis.set_major_formatter(metres)
         axis.set_label_text(name)

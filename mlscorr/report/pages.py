@@ -12,6 +12,7 @@ from markupsafe import Markup
 
 from mlscorr.report import tables
 from mlscorr.report.style import Figures, svg
+from mlscorr.wording import millimetres, number
 
 TEMPLATES = Path(__file__).parent / "page"  # each section is a file there
 LIBRARIES = ("numpy", "scipy", "laspy", "lazrs", "numba", "pyproj", "matplotlib")
@@ -74,8 +75,8 @@ def environment(folder: Path = TEMPLATES) -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    templates.filters |= {"number": tables.number, "norm": tables.norm, "show": show}
-    templates.filters["millimetres"] = tables.millimetres
+    templates.filters |= {"number": number, "norm": tables.norm, "show": show}
+    templates.filters["millimetres"] = millimetres
     templates.globals |= {"raw": raw, "AXES": tables.AXES}
     return templates
 

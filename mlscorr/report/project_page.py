@@ -12,7 +12,7 @@ from mlscorr.report.map_frame import corners, frame
 from mlscorr.report.pages import Page, data_uri
 from mlscorr.report.style import new_figure, nice, styled, svg
 from mlscorr.report.target_map import write_names
-from mlscorr.survey import counted
+from mlscorr.wording import counted
 
 SECTIONS = {"drives": "Drives", "map": "Map"}
 

@@ -10,7 +10,7 @@ from mlscorr.estimate import SETTINGS as ESTIMATE
 from mlscorr.evaluate import Statistics
 from mlscorr.report.correction_report import CorrectionReport
 from mlscorr.report.settings import SETTINGS
-from mlscorr.survey import counted
+from mlscorr.wording import counted, length_in_words, number
 
 AXES = ("E", "N", "H")
 QUANTITIES = ("Easting", "Northing", "Height (vertical)", "Horizontal distance", "3D distance")
@@ -46,58 +46,6 @@ def norm(vector: Sequence[float] | np.ndarray, axes: int = 3) -> float:
         2 is horizontal, 3 is 3D.
     """
     return float(np.linalg.norm(vector[:axes]))
-
-
-def number(value: float | None, decimals: int = 3) -> str:
-    """A number with fixed decimals, a dash where there is none, and no negative zero.
-
-    >>> number(-0.00004), number(None), number(531400.25, 1)
-    ('0.000', '–', '531400.2')
-    """
-    if value is None or not np.isfinite(value):
-        return "–"
-    text = f"{value:.{decimals}f}"
-    if float(text) == 0:
-        return text.lstrip("-")
-    return text
-
-
-def millimetres(value: float | None) -> str:
-    """A length in m as millimetres, with a decimal where it is short.
-
-    >>> millimetres(0.00288), millimetres(0.42302), millimetres(None)
-    ('2.9', '423', '–')
-    """
-    if value is None:
-        return "–"
-    return number(1000 * value, int(abs(value) < 0.01))
-
-
-def thousands(value: int) -> str:
-    """A whole number with narrow spaces between thousands.
-
-    >>> thousands(1847911)
-    '1 847 911'
-    """
-    return f"{value:,}".replace(",", " ")
-
-
-def percent(share: float) -> str:
-    """A share in percent, never rounded to nothing or to all.
-
-    Parameters
-    ----------
-    share : float
-        0 to 1.
-
-    >>> percent(0.0), percent(0.002), percent(0.5), percent(0.999)
-    ('0 %', 'less than 1 %', '50 %', 'more than 99 %')
-    """
-    if 0 < share < 0.01:
-        return "less than 1 %"
-    if 0.99 < share < 1:
-        return "more than 99 %"
-    return f"{100 * share:.0f} %"
 
 
 def rmse_rows(report: CorrectionReport) -> list[RmseRow]:
@@ -241,24 +189,6 @@ def _plainly(before, after, kind, holds_everywhere, is_worse):
     else:
         times = ""
     return f"The correction brought the cloud {pair}{times}, {by}."
-
-
-def length_in_words(value: float) -> str:
-    """A length in words: '7 mm', '4.6 cm', '1.23 m'.
-
-    Parameters
-    ----------
-    value : float
-        Units: m.
-
-    >>> length_in_words(0.0071), length_in_words(0.046), length_in_words(1.234)
-    ('7 mm', '4.6 cm', '1.23 m')
-    """
-    if value < 0.0095:
-        return f"{1000 * value:.0f} mm"
-    if value < 0.995:
-        return f"{100 * value:.1f} cm"
-    return f"{value:.2f} m"
 
 
 def _result(report, before, after, kind):

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from mlscorr.report.tables import length_in_words, percent, thousands
+from mlscorr.wording import length_in_words, percent, thousands
 
 
 def tie_sentences(section: dict[str, Any] | None, control: int) -> list[str]:

@@ -23,7 +23,8 @@ from mlscorr.survey.recording import (
     check_rng,
     check_survey,
 )
-from mlscorr.survey.summary import Summary, counted
+from mlscorr.survey.statement import Severity, Statement, Wording
+from mlscorr.survey.summary import Summary
 from mlscorr.survey.targets import KINDS, ControlPoints, Matched, TargetObservations
 from mlscorr.survey.ties import PAINTED, PAUSE, TIE_KINDS, TieFeatures, Ties, time_spans
 from mlscorr.survey.trajectory import GAP_FACTOR, SAME_EPOCH, Mounting, Trajectory, control_epochs

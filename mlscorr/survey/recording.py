@@ -12,9 +12,10 @@ from scipy.spatial.transform import Rotation
 
 from mlscorr.survey.beliefs import SEARCH_RADIUS, Assumption, Pos, Scanner
 from mlscorr.survey.clouds import CloudFile
-from mlscorr.survey.summary import Summary, counted
+from mlscorr.survey.summary import Summary
 from mlscorr.survey.targets import ControlPoints
 from mlscorr.survey.trajectory import Mounting, Trajectory
+from mlscorr.wording import counted
 
 
 @dataclass(frozen=True)

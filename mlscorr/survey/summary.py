@@ -36,25 +36,6 @@ position_sigma=None, attitude_sigma=None, session=None, scanned=None, weeks=None
         return [(field.name, _short(getattr(self, field.name))) for field in fields(self)]
 
 
-def counted(number: int, noun: str) -> str:
-    """A number of things in words.
-
-    Parameters
-    ----------
-    number : int
-    noun : str
-        Of one of them.
-
-    >>> counted(1, "pass"), counted(2, "pass"), counted(3, "entry"), counted(0, "cloud file")
-    ('1 pass', '2 passes', '3 entries', '0 cloud files')
-    >>> counted(4, "dash"), counted(5, "epoch")
-    ('4 dashes', '5 epochs')
-    """
-    ends = {"s": f"{noun}es", "sh": f"{noun}es", "y": f"{noun[:-1]}ies"}
-    plural = ends.get(noun[-1]) or ends.get(noun[-2:], f"{noun}s")
-    return f"{number} {noun if number == 1 else plural}"
-
-
 def _short(value):
     """A field's value in a few words."""
     if isinstance(value, np.ndarray):

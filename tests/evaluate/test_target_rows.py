@@ -11,9 +11,13 @@ from mlscorr.estimate import TargetTest
 from mlscorr.evaluate import PointCounts, surveyed_rows, unseen_rows
 from mlscorr.evaluate.target_rows import target_rows
 from mlscorr.matching import Refusal
-from mlscorr.survey import PointCloud, Survey
+from mlscorr.survey import PointCloud, Statement, Survey
 from mlscorr.targets import NO_POINTS, Candidates
 from tests.beds.streets import SHIFT, SIGMA, TIME, observed, targets, trajectory
+
+
+def reason(why):
+    return Statement("not matched", values={"why": why})
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +80,7 @@ def candidates(unplaced=None):
 def test_unseen_points_have_the_reason_of_the_matching(matched):
     "Role and place from the survey; whether points of the cloud lie about it"
     survey = survey_of(matched)
-    refusals = [Refusal("T02", 1, "hidden"), Refusal("T14", None, "not there")]
+    refusals = [Refusal("T02", 1, reason("hidden")), Refusal("T14", None, reason("not there"))]
     first, second = unseen_rows(survey, refusals, candidates(), {"T14"})
     assert (first.name, first.role, first.pass_number) == ("T02", "control", 1)
     assert not first.scanned
@@ -88,7 +92,10 @@ def test_unseen_points_have_the_reason_of_the_matching(matched):
 
 def test_an_observation_that_was_refused_leaves_its_time(matched):
     "So that what was found, and does not fit, is told apart from what nobody saw"
-    refusals = [Refusal("T02", 1, "too far off", TIME + 3.0), Refusal("T03", None, "not there")]
+    refusals = [
+        Refusal("T02", 1, reason("too far off"), TIME + 3.0),
+        Refusal("T03", None, reason("not there")),
+    ]
     refused, unseen = unseen_rows(survey_of(matched), refusals, candidates(), {"T02", "T03"})
     assert (refused.gps_time, unseen.gps_time) == (TIME + 3.0, None)
     assert not refused.is_observed and not refused.used
@@ -106,7 +113,10 @@ def test_points_without_a_pose_are_the_better_reason(matched):
     far = PointCloud(place + 500.0, time + 10.0, np.zeros(25))
     near = PointCloud(place, time, np.zeros(25))
     both = PointCloud.concatenate([near, far])
-    refusals = [Refusal("T05", None, "not there"), Refusal("T09", None, "not there")]
+    refusals = [
+        Refusal("T05", None, reason("not there")),
+        Refusal("T09", None, reason("not there")),
+    ]
     lost, other = unseen_rows(survey, refusals, candidates(both), ())
     begin = f"25 points near it, at {TIME + 41:.1f} to {TIME + 43.5:.1f} s, were measured in a gap"
     assert lost.reason.startswith(begin) and lost.scanned

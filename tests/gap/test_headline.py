@@ -27,7 +27,7 @@ def split(by, low, high, share=0.2, rows=0.2):
 def where(*splits, before=17.0):
     none = np.zeros(0)
     empty = np.zeros((0, 2))
-    return Where(before, 0.1, (-3.0, 4.0), splits, none, none, empty, none, "")
+    return Where(before, 0.1, (-3.0, 4.0), splits, none, none, empty, none)
 
 
 BRIGHT = split("intensity", 4.239, 4.653, share=0.48, rows=0.1)

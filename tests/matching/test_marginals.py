@@ -99,7 +99,7 @@ def test_a_moved_control_point_is_found():
     assert refusal.name == "T11"
     assert "T10 (-2.5 s) and T12 (+2.5 s)" in refusal.reason
     assert "Its surveyed point is wrong" in refusal.reason
-    assert float(refusal.reason.split("T11 lies ")[1].split(" m")[0]) == pytest.approx(0.8, abs=0.1)
+    assert refusal.why.values["off"] == pytest.approx(0.8, abs=0.1)
 
 
 @pytest.mark.parametrize("away", [0.02, 0.05])

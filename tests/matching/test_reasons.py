@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from mlscorr.matching import match
+from mlscorr.survey import Statement
 from tests.matching.test_association import (
     EAST,
     ORIGIN,
@@ -101,8 +102,9 @@ def test_exchanged_points_of_two_kinds_are_named():
     assert len(found.matched) == 28
     assert {refusal.name for refusal in found.refusals} == {"T06", "T21"}
     for refusal in found.refusals:
+        assert refusal.why.key == "other appearance"
+        assert {refusal.name, *refusal.why.values["exchanged"]} == {"T06", "T21"}
         assert "look exchanged" in refusal.reason
-        assert "T06" in refusal.reason and "T21" in refusal.reason
 
 
 def test_a_wrong_size_is_told():
@@ -201,10 +203,12 @@ def test_neighbours_are_named_with_their_times():
     surveyed[0] += [2.0, 0.0, 0.0]
     surveyed[15] += [2.0, 0.0, 0.0]
     found = match(observations(places + 0.1), control_points(surveyed), stated(0.05))
-    first, middle = (refusal.reason for refusal in found.refusals)
-    assert "its neighbours T02 (+2.5 s) tell it to 0." in first
-    assert "its neighbours T15 (-2.5 s) and T17 (+2.5 s) tell it to 0." in middle
-    assert all("m (one sigma)" in reason for reason in (first, middle))
+    first, middle = (refusal.why.values for refusal in found.refusals)
+    assert first["neighbours"] == (("T02", 2.5),)
+    assert middle["neighbours"] == (("T15", -2.5), ("T17", 2.5))
+    assert first["sigma"] < 1.0 and middle["sigma"] < 1.0
+    words = "its neighbours T15 (-2.5 s) and T17 (+2.5 s) tell it to 0."
+    assert words in found.refusals[1].reason
 
 
 def test_a_wrong_point_gives_probability_and_passes():
@@ -218,11 +222,11 @@ def test_a_wrong_point_gives_probability_and_passes():
     again = type(again)(**{**vars(again), "gps_time": observations(later).gps_time})
     both = type(seen).concatenate([seen, again])
     found = match(both, control_points(surveyed), stated(0.2))
-    reasons = [refusal.reason for refusal in found.refusals if refusal.name == "T07"]
-    assert len(reasons) == 2
-    for reason in reasons:
-        assert "by 2 observations" in reason and "T07 lies 1.0" in reason
-        assert float(reason.split("(probability ")[1].split()[0]) > 0.99
+    reasons = [refusal.why for refusal in found.refusals if refusal.name == "T07"]
+    assert [why.key for why in reasons] == ["wrong point"] * 2
+    for why in reasons:
+        assert why.values["observations"] == 2 and why.values["probability"] > 0.99
+        assert why.values["off"] == pytest.approx(1.0, abs=0.1)
 
 
 def test_places_in_sentences_are_those_of_the_survey():
@@ -232,5 +236,21 @@ def test_places_in_sentences_are_those_of_the_survey():
     surveyed[8] += [0.0, 0.0, 1.31]
     found = match(observations(places), control_points(surveyed), stated(0.05))
     (refusal,) = found.refusals
+    assert refusal.why.values["misclosure"] == pytest.approx(1.31, abs=1e-6)
     assert "misclosure 1.31 m" in refusal.reason and refusal.name == "T09"
     assert np.abs(ORIGIN).max() > 1e6
+
+
+def test_reasons_are_told_apart_by_their_keys():
+    "Nothing found, no control, nothing of its kind, another point: a key each, and its values"
+    nothing = match(observations(np.empty((0, 3))), control_points(PLACES[:1]), trajectory())
+    assert [refusal.why for refusal in nothing.refusals] == [Statement("nothing found")]
+    uncontrolled = match(observations(PLACES[:1]), control_points(PLACES[:0]), trajectory())
+    (why,) = uncontrolled.why
+    assert why.key == "no control"
+    assert why.values == {"kind": "circle", "size": 0.6, "time": 357705.0}
+    unseen = match(observations(PLACES[:1]), control_points(PLACES[:2]), trajectory())
+    (refusal,) = unseen.refusals
+    assert refusal.why.key == "none of its kind"
+    assert refusal.why.values["away"] == pytest.approx(100.0)
+    assert refusal.why.values["found_name"] == "T01"

@@ -11,6 +11,8 @@ from mlscorr.io.store import TaskStore
 from mlscorr.pipeline.project import project_status
 from mlscorr.pipeline.project.progress import logged
 from mlscorr.pipeline.project.tasks import Outcome, Task, carry_out
+from mlscorr.pipeline.project.wording import PROGRESS, progress_sentence
+from mlscorr.survey import Statement
 
 
 def tiles(folder, *names):
@@ -59,9 +61,40 @@ def test_time_left_is_told_by_what_is_worked_on(tmp_path):
             progress.ended(Outcome(task, seconds=1.0))
         progress.due = 0.0
         progress.ended(Outcome(tasks[94], seconds=1.0))
+    (progress,) = told
+    assert progress.key == "stage progress"
+    counts = {"stage": "tiles", "done": 95, "tasks": 100, "drives": 1, "failures": 0}
+    assert counts.items() <= progress.values.items()
+    assert progress.values["share"] == 0.95
+    assert progress.values["rate"] == pytest.approx(1.0, rel=0.05)  # points/s
+    assert progress.values["left"] == pytest.approx(5.0, rel=0.05)  # s
+
+
+SAID = {
+    "stage": "tiles",
+    "done": 95,
+    "tasks": 100,
+    "drives": 1,
+    "share": 0.95,
+    "rate": 1.0,
+    "left": 5.0,
+    "failures": 0,
+}
+
+
+def test_all_that_a_run_says_has_its_sentence():
+    "With titles, plurals and times; nothing is said of the time left before it is known"
+    values = {"task": "a.laz", "text": "It is empty.", "drives": 2}
+    values |= {"scheduler": "tcp://a:1", "patience": "30s"}
+    for key in PROGRESS.keys() - {"stage progress"}:
+        assert progress_sentence(Statement(key, values=values)).endswith((".", "It is empty."))
     rate = "95 %, 1e-06 M points/s"
-    left = "5 s left of this stage, 0 failures so far"
-    assert told == [f"Reading headers: 95 of 100 files of 1 drive, {rate}, {left}"]
+    whole = (
+        f"Reading headers: 95 of 100 files of 1 drive, {rate}, 5 s left of this stage, 0 failures"
+    )
+    assert progress_sentence(Statement("stage progress", values=SAID)) == f"{whole} so far"
+    unknown = Statement("stage progress", values=SAID | {"left": None})
+    assert "left" not in progress_sentence(unknown)
 
 
 def test_progress_is_told_beside_the_last_line(tmp_path):

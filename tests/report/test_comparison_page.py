@@ -42,7 +42,7 @@ def fake(scores, **changes):
 @pytest.mark.parametrize(
     ("scores", "words"),
     [
-        ({"raw": 0.5, "shift": 0.2, "lsc": 0.02}, "Best is lsc (about lsc <&>): 3D RMSE 0.020 m"),
+        ({"raw": 0.5, "shift": 0.2, "lsc": 0.02}, "Best is lsc: 3D RMSE 0.020 m"),
         ({"raw": 0.5, "shift": 0.0215, "lsc": 0.02}, "Best are lsc and shift: 3D RMSE 0.020 m"),
         ({"raw": 0.5, "ls-2": 0.02, "correct": 0.03}, "correct, with 0.030 m, is 0.010 m behind."),
         ({"raw": 0.021, "shift": 0.02, "lsc": 0.03}, "No method improves this cloud by 2 mm"),

@@ -10,6 +10,7 @@ from mlscorr.correction import Correction
 from mlscorr.evaluate import TargetRow
 from mlscorr.report import tables
 from mlscorr.report.correction_page import write_report
+from mlscorr.wording import millimetres, number
 from tests.beds.reports import Links, drive, fabricate, page, report_of, words
 from tests.beds.tied_reports import tied_report
 
@@ -37,10 +38,10 @@ def test_every_target_stands_in_the_table_with_its_numbers(tmp_path):
     text = words(page(tmp_path, survey, correction, report))
     for row in report.targets:
         start = f"{row.name} {row.pass_number} {row.gps_time:.3f} {row.role} "
-        before = " ".join(tables.number(v, 3) for v in row.before)
-        after = " ".join(tables.number(v, 3) for v in row.after)
+        before = " ".join(number(v, 3) for v in row.before)
+        after = " ".join(number(v, 3) for v in row.after)
         assert start + before in text
-        assert after + " " + tables.number(tables.norm(row.after, 2), 3) in text
+        assert after + " " + number(tables.norm(row.after, 2), 3) in text
 
 
 def test_the_report_tells_what_report_json_tells(tmp_path):
@@ -49,7 +50,7 @@ def test_the_report_tells_what_report_json_tells(tmp_path):
     text = words(page(tmp_path, survey, correction, report))
     for score in (report.control, report.check):
         for statistics in (score.before, score.after):
-            assert " ".join(tables.number(v) for v in statistics.rmse) in text
+            assert " ".join(number(v) for v in statistics.rmse) in text
     expected = [
         "0.061 0.044 0.038",
         "0.075 0.084",
@@ -156,9 +157,7 @@ def test_the_page_tells_what_two_passes_both_saw(tmp_path):
     text, (pair,) = words(html), report.ties["pairs"]
     assert 'href="#ties"' in html and "What was seen twice" in text
     cells = [
-        tables.millimetres(pair[state][key])
-        for state in ("before", "after")
-        for key in ("median", "rms")
+        millimetres(pair[state][key]) for state in ("before", "after") for key in ("median", "rms")
     ]
     assert " ".join(["1 and 2", str(pair["n"]), str(pair["used"]), *cells]) in text
     assert "Grey crosses are not used" in text

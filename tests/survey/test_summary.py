@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mlscorr.survey import Matched, Summary, Survey, counted
+from mlscorr.survey import Matched, Summary, Survey
 from mlscorr.survey.summary import html_table
+from mlscorr.wording import counted
 from tests.beds.tied_passes import tied_passes
 
 

@@ -4,6 +4,7 @@ import numpy as np
 
 from mlscorr.gap.contrast._blocks import with_sigma
 from mlscorr.gap.contrast.tables import ContrastTable, Measure
+from mlscorr.wording import percent, value_and_sigma
 
 SILENT = {  # why a channel is not compared
     "intensity": "The simulator says nothing of intensity: without its clouds there is nothing to "
@@ -21,7 +22,9 @@ SILENT = {  # why a channel is not compared
 PLACES = {"range": ("range", " m"), "incidence": ("angle of incidence", "°")}
 
 
-def sentence(measure: Measure, table: ContrastTable, sums: np.ndarray) -> str:
+def sentence(
+    measure: Measure, table: ContrastTable, sums: np.ndarray, is_further: bool = False
+) -> str:
     """Where a table shows the largest difference beyond chance, with its figure; else nothing.
 
     Parameters
@@ -31,6 +34,8 @@ def sentence(measure: Measure, table: ContrastTable, sums: np.ndarray) -> str:
     table : ContrastTable
     sums : (b, bins, k) array
         Over blocks, which made the table.
+    is_further : bool
+        Whether a sentence on another table of the channel stands before it.
     """
     run = _largest_run(table)
     if run is None:
@@ -42,44 +47,54 @@ def sentence(measure: Measure, table: ContrastTable, sums: np.ndarray) -> str:
     if measure.channel == "intensity":
         if where == "everywhere":
             return ""
-        return _intensity(table, value, sigma, where)
+        return _intensity(table, value, sigma, where, is_further)
     if measure.channel == "density":
-        return _density(value, sigma, where)
+        return _density(value, sigma, where, is_further)
     if measure.channel == "dropout":
+        lost = f"{value_and_sigma(100 * real, 100 * sigma)} % of the beams"
         return (
-            f"{_pair(100 * real, 100 * sigma)} % of the beams on flat surfaces bring no return "
-            f"{where}, {100 * simulated:.1f} % in the simulation: the simulator "
+            f"{_opening(lost, is_further)} on flat surfaces bring no return "
+            f"{where}, {percent(simulated, 1)} in the simulation: the simulator "
             f"{'lacks lost returns' if value > 0 else 'loses too many returns'}."
         )
     return (
-        f"Depth edges are smeared over {_pair(abs(value), sigma)} mrad "
+        f"{_opening('depth edges', is_further)} are smeared over "
+        f"{value_and_sigma(abs(value), sigma)} mrad "
         f"{'more' if value > 0 else 'less'} than simulated {where} ({real:.2g} against "
         f"{simulated:.2g} mrad): the simulator's beam is {'too thin' if value > 0 else 'too wide'}."
     )
 
 
-def _density(value, sigma, where):
+def _opening(subject, is_further):
+    """The subject of a sentence, which may follow another one on the same channel."""
+    if is_further:
+        return f"Beyond that, {subject}"
+    return subject.capitalize()
+
+
+def _density(value, sigma, where, is_further):
     change = "more"
     hint = "loses too many returns there, or its scene lacks things"
     if value < 0:
         change = "fewer"
         hint = "lacks lost returns there, or what hides things"
-    percent = _pair(100 * abs(np.expm1(value)), 100 * sigma * np.exp(value))
+    change_in_percent = value_and_sigma(100 * abs(np.expm1(value)), 100 * sigma * np.exp(value))
     return (
-        f"The real cloud has {percent} % {change} points than the simulated one {where}: the "
-        f"simulator {hint}."
+        f"{_opening('the real cloud', is_further)} has {change_in_percent} % {change} points than "
+        f"the simulated one {where}: the simulator {hint}."
     )
 
 
-def _intensity(table, value, sigma, where):
+def _intensity(table, value, sigma, where, is_further):
     factor = np.exp(abs(value))
     known = np.flatnonzero(np.isfinite(table.value))
     if len(known) > 1:
         slope = np.polyfit(known, table.value[known], 1)[0]
     else:
         slope = value
+    times = value_and_sigma(factor, factor * sigma)
     return (
-        f"Real returns are {_pair(factor, factor * sigma)} times "
+        f"{_opening('real returns', is_further)} are {times} times "
         f"{'weaker' if value < 0 else 'stronger'} than simulated ones {where}, beside the usual "
         f"ratio of the two: the simulator{_lacks(table.by, slope < 0)}."
     )
@@ -96,12 +111,6 @@ def _lacks(by, falls):
     if falls:
         return f" lacks falloff {along}"
     return f"'s intensity falls off too fast {along}"
-
-
-def _pair(value, sigma):
-    """A figure ± its sigma, with as many decimals as the sigma's first figure asks for."""
-    places = int(np.clip(-np.floor(np.log10(max(sigma, 1e-9))), 0, 4))
-    return f"{value:.{places}f} ± {sigma:.{places}f}"
 
 
 def _largest_run(table):

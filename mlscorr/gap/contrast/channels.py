@@ -95,8 +95,7 @@ def _contrast(measure, tables, tests):
         for other in measure.splits:
             if other is not split:
                 table, sums = rest.table(other)
-                text = sentence(rest, table.judged(tests), sums)
-                sentences.append(f"Beyond that, {text[:1].lower()}{text[1:]}" if text else "")
+                sentences.append(sentence(rest, table.judged(tests), sums, is_further=True))
     return Contrast(measure.channel, "", whole, tuple(judged), tuple(filter(None, sentences)))
 
 

@@ -36,7 +36,6 @@ NAMES = {  # what a number of a split is called, and its unit
     "speed": ("speed", "m/s"),
     "turn_rate": ("turn rate", "deg/s"),
 }
-PLACES = {"pass": "in pass {}", "axis": "along the axis {}", "channel": "{}"}
 CHANNELS = {
     "target": "on the targets",
     "surface": "on the reference surface",
@@ -101,7 +100,6 @@ class Where:
         u before and after.
     sigma : (n,) array
         Of the innovations. Units: m.
-    headline : str
     """
 
     before: float
@@ -112,7 +110,6 @@ class Where:
     gps_time: np.ndarray
     innovation: np.ndarray
     sigma: np.ndarray
-    headline: str
 
 
 def locate(
@@ -189,7 +186,6 @@ def locate(
         observed.errors.gps_time[keep],
         u[keep, :2],
         sigma[keep],
-        _headline(before, band, _of_headline(splits, acts), len(row), is_moved),
     )
 
 
@@ -256,55 +252,3 @@ def _bins(rows, row, by):
         return None, (), None
     number = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
     return edges, tuple(f"{a:.4g} to {b:.4g}" for a, b in pairwise(edges)), number
-
-
-def _of_headline(splits, acts):
-    """The splits of which the headline may speak: of an event that of time alone."""
-    if acts is None:
-        return splits
-    return tuple(split for split in splits if split.by == "time")
-
-
-def _headline(before, band, splits, number, is_moved):
-    """One sentence: how large, and where most of it is."""
-    low, high = band
-    measurable = before > high
-    chance = f"{low:.1f} to {high:.1f} mm when nothing is wrong"
-    size = f"All rows together differ by {before:.1f} mm more than predicted ({chance})"
-    if not measurable:
-        size = f"All rows together differ by no more than chance makes them ({chance})"
-    if not measurable and not is_moved:
-        return f"Nothing stands out. {size}."
-    best = None
-    largest = 0.0
-    for share, rows, words in _places(splits, number):
-        if share > SETTINGS.plain * rows and share - rows > largest:
-            best = (share, rows, words)
-            largest = share - rows
-    of = "what the cause moves" if is_moved else "the gap"
-    if best is None:
-        return f"{of.capitalize()} lies everywhere alike. {size}."
-    share, rows, words = best
-    return (
-        f"{100 * min(share, 1.0):.0f} % of {of} lies {words}, where {100 * rows:.0f} % of the rows "
-        f"are. {size}."
-    )
-
-
-def _places(splits, number):
-    """Share, share of the rows and words of each stretch, and of each bin where none is known."""
-    for split in splits:
-        if split.extent is not None:
-            name, unit = NAMES[split.by]
-            low = split.extent.low
-            high = split.extent.high
-            words = f"at a {name} of {low:.4g} to {high:.4g} {unit}"
-            yield split.extent.share, split.extent.rows, words
-            continue
-        for share, count, bin_name in zip(split.share, split.count, split.bins, strict=True):
-            if split.edges is None:
-                words = PLACES[split.by].format(CHANNELS.get(bin_name, bin_name))
-            else:
-                name, unit = NAMES[split.by]
-                words = f"at a {name} of {bin_name} {unit}"
-            yield share, count / number, words

@@ -72,7 +72,7 @@ def _code(keys):
     return f"EPSG:{plan}"
 
 
-def crs_conflict(layout: LasLayout, crs: str) -> str:
+def crs_conflict(layout: LasLayout, crs: str, source: str = "crs of survey.toml") -> str:
     """A sentence where a file's own CRS is not that of the survey; empty where it is, or none.
 
     What counts is where the file's middle lies: two names of one CRS are no conflict.
@@ -81,7 +81,9 @@ def crs_conflict(layout: LasLayout, crs: str) -> str:
     ----------
     layout : LasLayout
     crs : str
-        Of survey.toml; one that can be used.
+        Of the survey; one that can be used.
+    source : str
+        Where that is from.
     """
     stated = stated_crs(layout)
     survey_crs = CRS.from_user_input(crs)
@@ -92,7 +94,7 @@ def crs_conflict(layout: LasLayout, crs: str) -> str:
     if not what:
         return ""
     return (
-        f"The VLRs of {layout.cloud.name} state {crs_name(stated)}, crs of survey.toml is "
+        f"The VLRs of {layout.cloud.name} state {crs_name(stated)}, {source} is "
         f"{crs_name(survey_crs)}: {what}. Set crs to that of the cloud, or bring the cloud into it."
     )
 

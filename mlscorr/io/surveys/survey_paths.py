@@ -14,7 +14,7 @@ from mlscorr.io.store import beside, files_like, is_folder, is_remote, is_there,
 from mlscorr.io.surveys.folder_roles import RESULTS
 from mlscorr.io.surveys.survey_sections import PlannedSurveyFile
 from mlscorr.io.trajectories import SessionFile, TrajectorySection
-from mlscorr.survey import counted
+from mlscorr.wording import counted
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.trajectories._leap_seconds import EPOCH, leap_seconds
 from mlscorr.survey import WEEK, Trajectory, counted_on
+from mlscorr.wording import percent
 
 DAY = 86400.0  # s
 ADJUSTMENT = 1e9  # s
@@ -386,7 +387,7 @@ def _nothing_fits(name, times, span, setting):
         f"the sampled times of {name}, [{times.min():.3f}, {times.max():.3f}] s, lie inside the "
         f"trajectory [{span[0]:.3f}, {span[1]:.3f}] s"
     )
-    share = f"Only {largest:.0%} of" if largest > 0 else "None of"
+    share = f"Only {percent(largest)} of" if largest > 0 else "None of"
     constants = [constant for constant, cloud, _ in candidates if setting in ("auto", cloud)]
     systems = _other_systems(utc_lag(span, times), min(times.max(), span[1]))
     for constant, (later, system) in product(constants, systems):

@@ -39,6 +39,7 @@ from mlscorr.pipeline.project.file_tasks import ReportInput
 from mlscorr.pipeline.project.progress import Progress, logged
 from mlscorr.pipeline.project.running import Run
 from mlscorr.pipeline.project.tasks import VERSION
+from mlscorr.survey import Statement
 
 STORE = "tasks"  # of the folder within the results
 
@@ -76,7 +77,7 @@ def correct_project(
     path: str | Path | ProjectParts,
     out: str | Path,
     options: Options | None = None,
-    tell: Callable[[str], object] = lambda _: None,
+    tell: Callable[[Statement], object] = lambda _: None,
 ) -> ProjectResult:
     """Correct all drives of a project together, and write the results of each.
 
@@ -88,8 +89,8 @@ def correct_project(
         Folder for the results: a folder of each drive, project.json, project.html, log.txt, and
         the results of tasks.
     options : Options, optional
-    tell : function of a sentence
-        Is told how far it has come.
+    tell : function of a Statement
+        Is told how far it has come; ``progress_sentence`` words that.
 
     Returns
     -------
@@ -228,7 +229,7 @@ class _Work:
 
     def _estimate(self, planned, tasks, findings, keys, origin):
         """Put each drive's results into the store."""
-        self.progress.say(f"Estimating {len(planned)} drives together.")
+        self.progress.say(Statement("drives estimated", values={"drives": len(planned)}))
         drives = []
         for drive in planned:
             own = [findings[task.name] for task in tasks if task.drive == drive.survey.name]

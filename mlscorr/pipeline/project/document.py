@@ -17,8 +17,8 @@ from mlscorr.pipeline.project.corrected import STATES, DriveState
 from mlscorr.pipeline.project.running import Run
 from mlscorr.pipeline.project.tasks import Written
 from mlscorr.report import RATINGS as ORDER
-from mlscorr.report import Statement, capped, statements_section
-from mlscorr.survey import counted
+from mlscorr.report import StatementRow, capped, statements_section
+from mlscorr.wording import counted
 
 COUNTS = "n_surveyed", "n_seen", "n_scored"
 RATINGS = {"controlled": "green", "tied": "green", "relative": "red", "uncorrected": "red"}
@@ -194,7 +194,7 @@ def _statements(project, rows, drives, faults):
     count = {state: [row["name"] for row in rows if row["state"] == state] for state in STATES}
     held = len(count["controlled"]) + len(count["tied"])
     others = [(s, names) for s, names in count.items() if names and s != "controlled"]
-    yield Statement(
+    yield StatementRow(
         "Drives",
         "green" if held == len(project.drives) else "red",
         f"Held by control points: {held} of {counted(len(project.drives), 'drive')}, "
@@ -207,13 +207,13 @@ def _statements(project, rows, drives, faults):
         for target in report["targets"]
         if target["role"] == "control" and target["used"]
     }
-    yield Statement(
+    yield StatementRow(
         "Control points",
         "green" if len(used) == len(project.control) else "amber",
         f"{len(used)} of {len(project.control)} surveyed control points are used.",
     )
     if noise := sum(report["coverage"]["points_noise"] for _, report in drives):
-        yield Statement(
+        yield StatementRow(
             "Noise",
             "green",
             f"{noise} of {sum(row['points'] for row in rows)} points are flagged as noise. They "
@@ -221,7 +221,7 @@ def _statements(project, rows, drives, faults):
         )
     yield from _minded(rows, [report for _, report in drives])
     if faults:
-        yield Statement(
+        yield StatementRow(
             "Failures",
             "red",
             f"{counted(len(faults), 'failure')}: what is named was not corrected, and all else "
@@ -241,7 +241,7 @@ def _minded(rows, reports):
         doubts.sort(key=lambda doubt: -ORDER.index(doubt[0]))
         sentence = f"There is something to mind in {len(doubts)} of {counted(len(rows), 'drive')}."
         items = capped(doubt[1:] for doubt in doubts)
-        yield Statement("Doubts", doubts[0][0], sentence, items)
+        yield StatementRow("Doubts", doubts[0][0], sentence, items)
 
 
 def _reason(row, report):
@@ -270,7 +270,7 @@ def _lost(number):
     """A statement on lost workers and schedulers, where there were any."""
     if number:
         sentence = f"Lost workers or schedulers: {number}; what they were at was done again."
-        yield Statement("Workers", "amber", sentence)
+        yield StatementRow("Workers", "amber", sentence)
 
 
 def _left(older):
@@ -282,4 +282,4 @@ def _left(older):
             "for again. Delete what is old."
         )
         items = capped((name, "not of this run") for name in older)
-        yield Statement("Older results", "amber", sentence, items)
+        yield StatementRow("Older results", "amber", sentence, items)

@@ -13,6 +13,7 @@ from contextlib import contextmanager, suppress
 from weakref import WeakSet
 
 from mlscorr.io.store import temporary_folder
+from mlscorr.survey import Statement
 
 THREADS = ("RAYON_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS")
 LONGER = "DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT=10min"
@@ -112,7 +113,7 @@ class Cluster:
     ----------
     scheduler : str
         Its address.
-    tell : function of a sentence
+    tell : function of a Statement
         Is told when there is something to wait for.
 
     Raises
@@ -123,7 +124,7 @@ class Cluster:
         Without the extra ``cluster``.
     """
 
-    def __init__(self, scheduler: str, tell: Callable[[str], object]) -> None:
+    def __init__(self, scheduler: str, tell: Callable[[Statement], object]) -> None:
         try:
             from dask import config
             from distributed import Client, KilledWorker
@@ -131,7 +132,7 @@ class Cluster:
             raise ImportError("A cluster needs dask: pip install 'mlscorr[cluster]'") from None
         patience = config.get("distributed.comm.timeouts.connect")  # with its unit, as "30s"
         self._tell = tell
-        self._waiting = f"waiting at {scheduler}, {patience} at most."
+        self._waiting = {"scheduler": scheduler, "patience": patience}
         try:
             self._client = Client(scheduler)
         except (OSError, ValueError) as error:
@@ -141,7 +142,7 @@ class Cluster:
             ) from None
         try:  # a batch system may start the first worker later than the scheduler
             if not self._client.nthreads():
-                tell(f"The cluster has no worker yet: {self._waiting}")
+                tell(Statement("no worker yet", values=self._waiting))
             self._client.wait_for_workers(1, patience)
         except OSError as error:
             self.close()
@@ -171,7 +172,7 @@ class Cluster:
         while self._client.status in ("running", "connecting"):
             if not is_lost and self._client.status == "connecting":
                 is_lost = True
-                self._tell(f"The scheduler is lost, and may start again: {self._waiting}")
+                self._tell(Statement("scheduler lost", values=self._waiting))
             # That it ended may not be known yet, else this waits for it; or dask just gives up
             with suppress(OSError, AttributeError, RuntimeError):
                 threads = sum(self._client.nthreads().values())
@@ -189,7 +190,7 @@ class Cluster:
             self._connection = self._client.scheduler_comm
             self._client.subscribe_topic("all", self._count)
             self.lost += 1
-            self._tell("A scheduler answers again, and is given what the lost one was given.")
+            self._tell(Statement("scheduler back"))
 
     def submit(self, function: Callable, *arguments: object) -> Future:
         """The Future of a call; cancelled where the connection to the scheduler ends before it."""
@@ -213,7 +214,7 @@ Engine = Loop | Processes | Cluster
 
 @contextmanager
 def engine(
-    workers: int = 1, scheduler: str | None = None, tell: Callable[[str], object] = str
+    workers: int = 1, scheduler: str | None = None, tell: Callable[[Statement], object] = str
 ) -> Iterator[Engine]:
     """The engine that is asked for.
 
@@ -223,7 +224,7 @@ def engine(
         Processes of this machine; one is this process itself.
     scheduler : str, optional
         Address of a cluster's.
-    tell : function of a sentence
+    tell : function of a Statement
         As of Cluster.
 
     Raises

@@ -12,15 +12,8 @@ from typing import TextIO
 from mlscorr.io.store import appended, output_file, telling_space
 from mlscorr.pipeline.project.settings import SETTINGS
 from mlscorr.pipeline.project.tasks import Outcome, Task
-from mlscorr.survey import counted
-
-TITLES = {
-    "tiles": "Reading headers",
-    "findings": "Reading the clouds",
-    "areas": "Estimating areas",
-    "clouds": "Writing the clouds",
-    "reports": "Reporting",
-}
+from mlscorr.pipeline.project.wording import TITLES, progress_sentence
+from mlscorr.survey import Statement
 
 
 @dataclass
@@ -32,12 +25,12 @@ class Progress:
     log : text stream
     plan : Path
         Where the tasks of each stage are listed, for status.
-    tell : function of a sentence
+    tell : function of a Statement
     """
 
     log: TextIO
     plan: Path
-    tell: Callable[[str], object]
+    tell: Callable[[Statement], object]
     stages: dict[str, list[dict]] = field(default_factory=dict)
     counts: dict[str, float] = field(default_factory=lambda: {"faults": 0})  # of all stages
     due: float = 0.0
@@ -52,15 +45,16 @@ class Progress:
         now = datetime.now(UTC).strftime("%Y-%m-%d %H:%M:%S")
         print(now, " ".join(text.split()), file=self.log, flush=True)
 
-    def say(self, text: str) -> None:
-        """Tell a sentence, and write it into the log.
+    def say(self, statement: Statement) -> None:
+        """Tell a statement, and write its sentence into the log.
 
         Parameters
         ----------
-        text : str
+        statement : Statement
+            Of a key of PROGRESS.
         """
-        self.note(text)
-        self.tell(text)
+        self.note(progress_sentence(statement))
+        self.tell(statement)
 
     def begin(self, kind: str, tasks: Sequence[Task]) -> None:
         """Begin a stage.
@@ -95,38 +89,40 @@ class Progress:
         counts["worked"] += max(task.points, 1) * is_new
         counts["faults"] += bool(outcome.fault)
         for text in outcome.warnings:
-            self.say(f"Warning: {task.name}: {text}")
+            self.say(Statement("task warning", "warning", {"task": task.name, "text": text}))
         if outcome.fault:
-            self.say(f"Failed: {task.name}: {outcome.fault}")
+            values = {"task": task.name, "text": outcome.fault}
+            self.say(Statement("task failed", "fault", values))
         elif is_new:
             self.note(f"{task.kind}: {task.name} in {outcome.seconds:.1f} s")
         if monotonic() >= self.due:
             self.due = monotonic() + SETTINGS.interval
-            self.say(self._sentence(task.kind))
+            self.say(self._stage_progress(task.kind))
 
-    def _sentence(self, kind):
+    def _stage_progress(self, kind):
         """How far a stage has come, its rate, and the time that is left."""
         counts = self.counts
         tasks = self.stages[kind]
         total = sum(max(task["points"], 1) for task in tasks)
         rate = counts["worked"] / (monotonic() - counts["start"])  # what was there took no time
+        left = None
         if rate:
-            left = f"{duration((total - counts['points']) / rate)} left of this stage, "
-        else:
-            left = ""
-        drives = {task["drive"] for task in tasks} - {""}
-        whole = str(len(tasks))
-        if drives:
-            whole = f"{counted(len(tasks), 'file')} of {counted(len(drives), 'drive')}"
-        return (
-            f"{TITLES[kind]}: {counts['done']} of {whole}, "
-            f"{100 * counts['points'] / total:.0f} %, {rate / 1e6:.3g} M points/s, {left}"
-            f"{counted(counts['faults'], 'failure')} so far"
-        )
+            left = (total - counts["points"]) / rate
+        values = {
+            "stage": kind,
+            "done": counts["done"],
+            "tasks": len(tasks),
+            "drives": len({task["drive"] for task in tasks} - {""}),
+            "share": counts["points"] / total,
+            "rate": rate,
+            "left": left,
+            "failures": counts["faults"],
+        }
+        return Statement("stage progress", values=values)
 
 
 @contextmanager
-def logged(log: Path, plan: Path, tell: Callable[[str], object]) -> Iterator[Progress]:
+def logged(log: Path, plan: Path, tell: Callable[[Statement], object]) -> Iterator[Progress]:
     """Progress with its log; what ends the run early stands there, too.
 
     Parameters
@@ -142,17 +138,3 @@ def logged(log: Path, plan: Path, tell: Callable[[str], object]) -> Iterator[Pro
         except BaseException as error:
             progress.note(f"Ended early: {type(error).__name__} {error}")
             raise
-
-
-def duration(seconds: float) -> str:
-    """A time in words.
-
-    >>> duration(59.6), duration(3725)
-    ('1 min', '1 h 2 min')
-    """
-    if seconds < 59.5:
-        return f"{seconds:.0f} s"
-    minutes = round(seconds / 60)
-    if minutes >= 60:
-        return f"{minutes // 60} h {minutes % 60} min"
-    return f"{minutes} min"

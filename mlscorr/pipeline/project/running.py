@@ -10,6 +10,7 @@ from mlscorr.io.store import TaskStore
 from mlscorr.pipeline.project.engine import Engine
 from mlscorr.pipeline.project.settings import SETTINGS
 from mlscorr.pipeline.project.tasks import Outcome, Task, Written, carry_out
+from mlscorr.survey import Statement
 
 LOSS = (
     "its worker was lost {} times while nothing else was at work: the system may have ended it for "
@@ -46,7 +47,7 @@ class Run:
     engine : Engine
     watch : function of an Outcome
         Is told of each task that ended.
-    tell : function of a sentence
+    tell : function of a Statement
         Is told of tasks that lost their worker.
     faults : list of Outcome
         Of tasks without a result.
@@ -55,7 +56,7 @@ class Run:
     store: TaskStore
     engine: Engine
     watch: Callable[[Outcome], object]
-    tell: Callable[[str], object] = str
+    tell: Callable[[Statement], object] = str
     faults: list[Outcome] = field(default_factory=list)
 
     def results(self, tasks: Sequence[Task]) -> dict[str, Any]:
@@ -123,10 +124,10 @@ class Run:
                 try:
                     yield Outcome(task, *future.result())
                 except CancelledError:  # with the connection to a scheduler: no task is to blame
-                    self.tell(f"{task.name} was lost with the scheduler, and is done again.")
+                    self.tell(Statement("task lost with scheduler", values={"task": task.name}))
                     (suspects if was_single else waiting).appendleft(task)
                 except self.engine.losses:
-                    self.tell(f"{task.name} lost its worker, and is done again.")
+                    self.tell(Statement("task lost with worker", values={"task": task.name}))
                     losses[task.name, was_single] += 1
                     is_first = losses[task.name, False] == 1 and not was_single
                     if losses[task.name, True] >= SETTINGS.losses:

@@ -15,8 +15,9 @@ from mlscorr.pipeline.project import file_tasks
 from mlscorr.pipeline.project.city import AreaInput, stored_results
 from mlscorr.pipeline.project.corrected import bare_survey
 from mlscorr.pipeline.project.tasks import VERSION, Task
-from mlscorr.survey import CloudFile, ControlPoints, Survey, counted
+from mlscorr.survey import CloudFile, ControlPoints, Survey
 from mlscorr.targets import search_radius
+from mlscorr.wording import counted
 
 
 def tile_tasks(project: ProjectParts) -> list[Task]:

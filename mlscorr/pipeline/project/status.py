@@ -5,8 +5,9 @@ from pathlib import Path
 
 from mlscorr.io.store import TaskStore, as_path, document, is_remote, is_there, read_bytes
 from mlscorr.pipeline.project.correction import STORE
-from mlscorr.pipeline.project.progress import TITLES
 from mlscorr.pipeline.project.running import present
+from mlscorr.pipeline.project.wording import TITLES, progress_sentence
+from mlscorr.survey import Statement
 
 
 def project_status(out: str | Path) -> dict:
@@ -80,10 +81,13 @@ def _is_left(store, task):
 
 def _failures(tasks, lines):
     """The last failure of each file or area of which a task isn't done; none of repaired ones."""
-    failed = [line for line in lines if " Failed: " in line]
     left = dict.fromkeys(" ".join(task["name"].split()) for task in tasks if not task["is_done"])
-    own = [[line for line in failed if f" Failed: {name}: " in line] for name in left]
-    return [some[-1] for some in own if some]
+    failures = []
+    for name in left:
+        beginning = progress_sentence(Statement("task failed", values={"task": name, "text": ""}))
+        own = [line for line in lines if f" {beginning}" in line]
+        failures += own[-1:]
+    return failures
 
 
 def _stages(tasks):

@@ -3,5 +3,4 @@
 from mlscorr.report.gap.accuracy import accuracy_sentence
 from mlscorr.report.gap.figures import diagnosis_figures, plan_figures
 from mlscorr.report.gap.first_screen import gap_screen
-from mlscorr.report.gap.numbers import signed
 from mlscorr.report.gap.page import diagnosis_page, plan_page

@@ -7,12 +7,13 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from mlscorr.effects import joined, known, lowered
+from mlscorr.effects import lowered
 from mlscorr.report.gap._innovations import channel_style
 from mlscorr.report.gap._rows import bin_names
-from mlscorr.report.gap.numbers import numbers, plain
-from mlscorr.report.headline import Statement
+from mlscorr.report.gap.numbers import numbers
+from mlscorr.report.headline import StatementRow
 from mlscorr.report.style import BLUE, GREY, VERMILLION, legend_above, new_figure, styled
+from mlscorr.wording import joined, known, plain
 
 WORDS = {  # of channels: what they are, their figure, how it is called on an axis
     "intensity": ("Intensity", "real over simulated, beside the usual ratio", "Ratio"),
@@ -63,7 +64,7 @@ class DistanceRow(NamedTuple):
     stands_out: bool
 
 
-def channel_statements(document: dict) -> Iterator[Statement]:
+def channel_statements(document: dict) -> Iterator[StatementRow]:
     """Whether channels beside geometry differ, where any could be compared.
 
     Parameters
@@ -81,11 +82,11 @@ def channel_statements(document: dict) -> Iterator[Statement]:
     rest = f" Not compared: {rest}." if silent else ""
     sentences = [text for each in compared for text in each["sentences"]]
     if not sentences:
-        yield Statement("Channels", "green", f"No difference beyond chance in {names}.{rest}")
+        yield StatementRow("Channels", "green", f"No difference beyond chance in {names}.{rest}")
         return
     more = len(sentences) - 1
     rest = f" {more} more on the page." * bool(more) + rest
-    yield Statement("Channels", "amber", f"{sentences[0]}{rest}")
+    yield StatementRow("Channels", "amber", f"{sentences[0]}{rest}")
 
 
 def channel_rows(document: dict) -> list[ChannelRow]:

@@ -10,6 +10,7 @@ from matplotlib.patches import Patch
 from mlscorr.report import style
 from mlscorr.report.gap._settings import SETTINGS
 from mlscorr.report.gap.numbers import numbers
+from mlscorr.wording import percent
 
 WINDOW = "#f3d9e6"
 STRIPE = "#efefef"
@@ -139,10 +140,11 @@ def _outside(values):
     stripe = SETTINGS.stripe_sigmas
     if len(values) == 0:
         return "nothing to show"
-    share = 100 * np.mean(np.abs(values) > stripe)
-    usual = 100 * erfc(stripe / sqrt(2))
+    share = np.mean(np.abs(values) > stripe)
+    usual = erfc(stripe / sqrt(2))
     rms = np.sqrt(np.mean(values**2))
-    return f"RMS {rms:.2f} (expected 1), {share:.1f} % beyond ±{stripe:.0f} sigma ({usual:.1f} %)"
+    beyond = f"{percent(share, 1)} beyond ±{stripe:.0f} sigma ({percent(usual, 1)})"
+    return f"RMS {rms:.2f} (expected 1), {beyond}"
 
 
 def _draw_windows(panel, windows, start, end):

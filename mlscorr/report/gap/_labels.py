@@ -2,7 +2,8 @@
 
 from collections.abc import Callable
 
-from mlscorr.effects import Effect, SizeEstimate, effects_by_name, known, meaning, title
+from mlscorr.effects import Effect, SizeEstimate, effects_by_name, meaning, title
+from mlscorr.wording import known
 
 
 def sentences_of(

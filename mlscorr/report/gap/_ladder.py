@@ -4,9 +4,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from mlscorr.effects import OTHERS, family, known, title
+from mlscorr.effects import OTHERS, family, title
 from mlscorr.report.gap._settings import SETTINGS
 from mlscorr.report.style import BLUE, GREEN, GREY, ORANGE, label, legend_above, new_figure, styled
+from mlscorr.wording import known, percent
 
 FAMILIES = {  # colour, hatch, words
     "none": (GREY, "", "nothing wrong"),
@@ -77,7 +78,7 @@ def _write_probability(panel, place, value, probability):
     if not known(probability) or probability < 0.005:  # 0 %
         return
     panel.annotate(
-        f"{100 * probability:.0f} %",
+        percent(probability),
         (max(value, 0.0), place),
         xytext=(4, 0),
         fontsize=7.5,

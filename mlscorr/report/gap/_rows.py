@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 
-from mlscorr.effects import DASH, known, meaning, percent, title
+from mlscorr.effects import meaning, title
 from mlscorr.report.gap._labels import place_of, sentences_of
-from mlscorr.report.gap.numbers import column, plain, signed
+from mlscorr.wording import DASH, column, known, percent, plain, signed
 
 COVARIATES = {
     "time": "Time since the start",

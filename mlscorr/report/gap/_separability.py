@@ -4,12 +4,13 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from mlscorr.effects import known, parameter_title
+from mlscorr.effects import parameter_title
 from mlscorr.gap.evidence import SETTINGS as INFERENCE
 from mlscorr.report.gap._rows import DetectableRow
 from mlscorr.report.gap._settings import SETTINGS
 from mlscorr.report.gap.numbers import numbers
 from mlscorr.report.style import BLUE, VERMILLION, legend_above, mark_handle, new_figure, styled
+from mlscorr.wording import known
 
 
 def classes_in_order(separability: dict) -> tuple[list[int], list[tuple[int, int]]]:

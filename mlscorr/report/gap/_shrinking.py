@@ -2,8 +2,8 @@
 
 from typing import NamedTuple
 
-from mlscorr.effects import DASH, joined, known, lowered, percent, title
-from mlscorr.report.gap.numbers import signed
+from mlscorr.effects import lowered, title
+from mlscorr.wording import DASH, joined, known, percent, signed
 
 GAPS = {  # by the kind of gap that a closure measures
     "systematic": "Systematic part of the gap (a mean over all rows)",

@@ -11,6 +11,7 @@ from mlscorr.report.gap._rows import split_title
 from mlscorr.report.gap._settings import SETTINGS
 from mlscorr.report.gap.numbers import numbers
 from mlscorr.report.style import AFTER, BEFORE, GREY, label, legend_above, new_figure, styled
+from mlscorr.wording import percent
 
 BAND = "#dcdcdc"
 
@@ -117,7 +118,7 @@ def _write_share(panel, split, edges, high, is_explained):
     middle = edges[i : i + 2].mean()
     place = (middle - edges[0]) / (edges[-1] - edges[0])
     panel.annotate(
-        f"{100 * min(share[i], 1.0):.0f} %",
+        percent(min(share[i], 1.0)),
         (middle, np.nanmax([before[i], high[i], 0.0])),
         xytext=(0, 3),
         textcoords="offset points",

@@ -2,11 +2,12 @@
 
 from typing import NamedTuple
 
-from mlscorr.effects import DASH, family, joined, known, lowered, meaning, size, title
+from mlscorr.effects import family, lowered, meaning, title
 from mlscorr.gap import no_cause
 from mlscorr.report.assumed import has_assumed_sigma
 from mlscorr.report.gap._labels import place_of, sentences_of
 from mlscorr.report.gap._shrinking import Fact, is_closed, is_within, shrinking
+from mlscorr.wording import DASH, joined, known, size, thousands
 
 CERTAINTY = (  # probability from which on one says so
     (0.99, "practically certain"),
@@ -264,7 +265,7 @@ def chance(p_value: float | None) -> str:
     else:
         count = "not one"
     if number > 1000:
-        words = f"{number:,}".replace(",", " ")
+        words = thousands(number)
     else:
         words = number
     return (

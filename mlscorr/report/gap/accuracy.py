@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from mlscorr.report.gap._innovations import passes_of
 from mlscorr.report.gap.numbers import numbers
 from mlscorr.report.style import BLUE, GREY, VERMILLION, legend_above, new_figure, styled
-from mlscorr.report.tables import length_in_words
+from mlscorr.wording import length_in_words
 
 
 def accuracy_sentence(accuracy: dict) -> str:

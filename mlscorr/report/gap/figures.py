@@ -2,7 +2,6 @@
 
 from functools import partial
 
-from mlscorr.effects import known
 from mlscorr.report.gap._channels import channels_figure
 from mlscorr.report.gap._innovations import innovations_figure
 from mlscorr.report.gap._ladder import ladder, ladder_figure
@@ -13,6 +12,7 @@ from mlscorr.report.gap._site_map import site_map
 from mlscorr.report.gap._splits import closure_figure, where_figure
 from mlscorr.report.gap.accuracy import accuracy_figure
 from mlscorr.report.style import Figures
+from mlscorr.wording import known
 
 
 def diagnosis_figures(document: dict) -> Figures:

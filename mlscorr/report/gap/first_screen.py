@@ -3,14 +3,14 @@
 from collections.abc import Iterator
 from itertools import groupby
 
-from mlscorr.effects import joined, lowered, title
+from mlscorr.effects import lowered, title
 from mlscorr.gap.evidence import SETTINGS
 from mlscorr.gap.signatures import NO_MOUNTING, UNSTATED
 from mlscorr.report.assumed import assumed_statement, has_assumed_sigma
 from mlscorr.report.gap._channels import channel_statements
 from mlscorr.report.gap._verdict import facts, is_named, verdict
-from mlscorr.report.headline import Statement, statements_section, warning_statements
-from mlscorr.report.tables import length_in_words
+from mlscorr.report.headline import StatementRow, statements_section, warning_statements
+from mlscorr.wording import joined, length_in_words
 
 RATINGS = {"good": "green", "open": "amber", "bad": "red"}  # by the tone of a verdict
 TIMES = [time for _, time, _ in SETTINGS.shapes]
@@ -41,7 +41,7 @@ def gap_screen(document: dict) -> dict[str, object]:
     items += [
         (fact.title, f"{fact.number.rstrip('.')}. {fact.more}".strip()) for fact in facts(document)
     ]
-    answer = Statement("Unmodelled", RATINGS[box.tone], f"{box.kicker}. {first}", tuple(items))
+    answer = StatementRow("Unmodelled", RATINGS[box.tone], f"{box.kicker}. {first}", tuple(items))
     warnings = warning_statements(document["warnings"])
     beside = (*channel_statements(document), *unjudged(document))
     judged = ", and nothing is judged by that"
@@ -49,7 +49,7 @@ def gap_screen(document: dict) -> dict[str, object]:
     return statements_section([*accuracy(document), answer, *assumed, *beside, *warnings])
 
 
-def accuracy(document: dict) -> Iterator[Statement]:
+def accuracy(document: dict) -> Iterator[StatementRow]:
     """Whether the recorded cloud is as accurate as POS, scanner and survey state.
 
     Parameters
@@ -80,7 +80,7 @@ def accuracy(document: dict) -> Iterator[Statement]:
         sizes.append((THINGS[part["channel"]], f"off by {residual} (RMS per axis), {states}"))
     rating = "amber" if any(is_worse) else "green"
     items = (*sizes, *_moved(document))
-    yield Statement("Accuracy", rating, f"The recorded cloud{less} is {answer} stated.", items)
+    yield StatementRow("Accuracy", rating, f"The recorded cloud{less} is {answer} stated.", items)
 
 
 def _unstated_accuracy(document, less):
@@ -93,7 +93,7 @@ def _unstated_accuracy(document, less):
         f"The recorded cloud{less} can't be compared with a stated accuracy: no sigma of the POS "
         "is stated."
     )
-    return Statement("Accuracy", "amber", sentence, (*sizes, *_moved(document)))
+    return StatementRow("Accuracy", "amber", sentence, (*sizes, *_moved(document)))
 
 
 def _moved(document):
@@ -105,7 +105,7 @@ def _moved(document):
     return ((title(causes[0]["effect"]), f"moves what was compared by {size} (RMS)"),)
 
 
-def unjudged(document: dict) -> Iterator[Statement]:
+def unjudged(document: dict) -> Iterator[StatementRow]:
     """The effects that this survey can say nothing of, by reason.
 
     Parameters
@@ -123,4 +123,4 @@ def unjudged(document: dict) -> Iterator[Statement]:
         total = len(left) + len({*judged} - {"none", "unknown"})
         sentence = f"{len(left)} of {total} kinds of error can be neither named nor ruled out here."
         is_mendable = any(NO_MOUNTING in why or UNSTATED in why for _, why in left)
-        yield Statement("Not judged", "amber" if is_mendable else "green", sentence, items)
+        yield StatementRow("Not judged", "amber" if is_mendable else "green", sentence, items)

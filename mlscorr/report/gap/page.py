@@ -1,6 +1,6 @@
 """The pages of a diagnosis, and of what a survey could diagnose before it is driven."""
 
-from mlscorr.effects import DASH, family, joined, lowered, percent, title, titles
+from mlscorr.effects import family, lowered, title, titles
 from mlscorr.report.gap import _rows as rows
 from mlscorr.report.gap._channels import WORDS, channel_rows, channel_statements, distance_rows
 from mlscorr.report.gap._innovations import channel_style
@@ -18,8 +18,8 @@ from mlscorr.report.gap._verdict import (
 from mlscorr.report.gap.accuracy import accuracy_sentence
 from mlscorr.report.gap.figures import diagnosis_figures, plan_figures
 from mlscorr.report.gap.first_screen import accuracy, unjudged
-from mlscorr.report.gap.numbers import signed
 from mlscorr.report.pages import Page, drawn
+from mlscorr.wording import DASH, joined, percent, signed
 
 SECTIONS = {  # in their order; one without anything to show is left out
     "where": "Where it shows",

@@ -3,10 +3,10 @@
 import numpy as np
 
 from mlscorr.evaluate import TargetRow
-from mlscorr.report import tables
 from mlscorr.report.render.view import Mark, PictureOptions, View
 from mlscorr.report.settings import SETTINGS
 from mlscorr.survey import ControlPoints, Trajectory
+from mlscorr.wording import length_in_words
 
 
 def target_view(
@@ -73,8 +73,8 @@ def _target_title(rows):
     else:
         made = ""
     at_most = " at most" if len(rows) > 1 else ""
-    were = tables.length_in_words(before)
-    are = tables.length_in_words(after)
+    were = length_in_words(before)
+    are = length_in_words(after)
     return f"{rows[0].name}, {role}{often}:{at_most} {were} off before, {are} after{made}"
 
 

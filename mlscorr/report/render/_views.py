@@ -6,13 +6,12 @@ import numpy as np
 
 from mlscorr.estimate import TieResiduals
 from mlscorr.evaluate import TargetRow
-from mlscorr.report import tables
 from mlscorr.report.render._scout import Scouted
 from mlscorr.report.render.section import find_place
 from mlscorr.report.render.view import Mark, PictureOptions, View
 from mlscorr.report.settings import SETTINGS
 from mlscorr.report.style import nice
-from mlscorr.survey import counted
+from mlscorr.wording import counted, length_in_words
 
 VIEWS = ("overview", "targets", "section")
 
@@ -77,7 +76,7 @@ def _overview_title(rows):
     state, words = ("after", "after") if role == "check" else ("left_out", "when left out in turn")
     rows = left_out if role == "control" and left_out else rows
     were, are = (
-        tables.length_in_words(np.sqrt(np.mean([np.sum(getattr(row, name) ** 2) for row in rows])))
+        length_in_words(np.sqrt(np.mean([np.sum(getattr(row, name) ** 2) for row in rows])))
         for name in ("before", state)
     )
     points = len({row.name for row in rows})
@@ -129,10 +128,10 @@ def section(
     if place.splits:
         number = len(place.splits) + 1
         often = "twice" if number == 2 else f"{number} times"
-        before, after = (tables.length_in_words(value) for value in (place.before, place.after))
+        before, after = (length_in_words(value) for value in (place.before, place.after))
         title = f"Cross-section of a wall scanned {often}: {before} apart before, {after} after"
     else:
-        moved = tables.length_in_words(place.moved)
+        moved = length_in_words(place.moved)
         title = f"Cross-section of a wall: the correction moves it by {moved}"
     half_slab = float(np.clip(half / 5, 0.25, 0.5))  # m: enough points, and little of a curve
     east, north = place.focus[:2]

@@ -53,7 +53,7 @@ def said(channel, factors):
         (
             "intensity",
             [1, 1, 0.5, 0.5],
-            r"1\.99\d ± 0.00\d times weaker than simulated ones beyond 20 m",
+            r"1\.99\d+ ± 0.00\d+ times weaker than simulated ones beyond 20 m",
         ),
         (
             "intensity",

@@ -18,8 +18,7 @@ def test_the_gap_adds_up_over_every_split_and_may_be_negative(with_surface):
     quiet = replace(g.rows, residual=_quiet(g))
     where = infer_causes(quiet, g.background, g.survey, signs, np.random.default_rng(1), 20).where
     assert where.before < 0
-    assert "differ by no more than chance makes them" in where.headline
-    assert "-" not in where.headline.split("(")[0]
+    assert where.before <= where.null_band[1]
     for split in where.splits:
         assert split.share.sum() == pytest.approx(1.0)
         total = np.sum(split.count * np.sign(split.before) * split.before**2) / split.count.sum()
@@ -39,7 +38,6 @@ def test_a_bump_is_shown_when_it_is_not_when_it_surprises(with_surface, middle):
     assert extent.high == pytest.approx(middle + 9.4, abs=3.0)
     assert extent.share > 0.8
     assert extent.rows < 0.3
-    assert "of what the cause moves lies at a time of" in where.headline
 
 
 @pytest.mark.long

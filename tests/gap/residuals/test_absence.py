@@ -10,10 +10,14 @@ from mlscorr.gap.evidence._verdict import with_absence
 from mlscorr.gap.residuals import Absence, find_absence
 from mlscorr.gap.residuals.absence import AbsentRun
 from mlscorr.matching import Matches, Refusal
-from mlscorr.survey import ControlPoints, Survey, TargetObservations, Trajectory
+from mlscorr.survey import ControlPoints, Statement, Survey, TargetObservations, Trajectory
 
 TIME = np.arange(0.0, 100.0, 0.1)  # s
 CLEAN = {"none": 0.95, "time_offset": 0.03, "unknown": 0.02}
+
+
+def reason(why):
+    return Statement("not matched", values={"why": why})
 
 
 def survey_of(names):
@@ -62,7 +66,7 @@ def test_a_lone_missing_target_is_no_run():
 def test_none_is_not_said_over_a_run_of_missing_targets():
     "Two neighbours that are missing, one of them refused: unknown leads, by names and times"
     survey = survey_of(NAMES)
-    refusal = Refusal("T05", 1, "T05 isn't surely its target.", 30.2)
+    refusal = Refusal("T05", 1, reason("T05 isn't surely its target."), 30.2)
     (run,) = find_absence(survey, matches_of(survey, ("T04", "T05"), [refusal])).runs
     assert run.name == ("T04", "T05")
     assert run.gps_time == pytest.approx((25.0, 30.2), abs=0.1)

@@ -130,7 +130,7 @@ def test_times_of_another_day_are_refused_with_both_spans():
 
 def test_utc_is_not_taken_for_gps_time():
     "18 leap seconds are no system of their own: a short trajectory tells, a long one can't"
-    with pytest.raises(ValueError, match="Only 42% of"):
+    with pytest.raises(ValueError, match="Only 42 % of"):
         match_times("a.laz", OF_WEEK[:26] - 18.0, False, trajectory(OF_WEEK[0], OF_WEEK[25]))
 
 
@@ -163,7 +163,7 @@ def test_a_trajectory_in_utc_that_starts_before_the_cloud_is_named():
     for early in (18.0, -18.0):
         covering = trajectory(OF_WEEK[0] - early - 0.5, OF_WEEK[25] - early + 0.5)
         sentence = (
-            rf"Only 42% of.*with \{-early:+.0f} s: one of both may be in UTC, or the trajectory "
+            rf"Only 42 % of.*with \{-early:+.0f} s: one of both may be in UTC, or the trajectory "
             rf"covers a part.*add {early:.0f} to trajectory.time_constant"
         )
         with pytest.raises(ValueError, match=sentence):

@@ -7,9 +7,9 @@ from html.parser import HTMLParser
 
 import pytest
 
-from mlscorr.report.gap import diagnosis_page, plan_page, signed
+from mlscorr.report.gap import diagnosis_page, plan_page
 from mlscorr.report.gap._verdict import advice, facts, smallest, verdict
-from mlscorr.report.tables import number
+from mlscorr.wording import number, signed
 from tests.beds.browser import browse, need_browser
 from tests.beds.gap_documents import KINDS, gap_document, plan_document
 

@@ -2,7 +2,8 @@
 
 import pytest
 
-from mlscorr.effects import EFFECTS, SizeEstimate, effect_class, size
+from mlscorr.effects import EFFECTS, SizeEstimate, effect_class
+from mlscorr.wording import size
 
 
 @pytest.mark.parametrize("kind", EFFECTS, ids=lambda kind: kind.name)

@@ -1,0 +1,73 @@
+"""The sentences that a run of a project says on its way, on the terminal and in its log."""
+
+from mlscorr.survey import Statement, Wording
+from mlscorr.wording import counted, percent
+
+TITLES = {
+    "tiles": "Reading headers",
+    "findings": "Reading the clouds",
+    "areas": "Estimating areas",
+    "clouds": "Writing the clouds",
+    "reports": "Reporting",
+}
+
+
+def duration(seconds: float) -> str:
+    """A time in words.
+
+    >>> duration(59.6), duration(3725)
+    ('1 min', '1 h 2 min')
+    """
+    if seconds < 59.5:
+        return f"{seconds:.0f} s"
+    minutes = round(seconds / 60)
+    if minutes >= 60:
+        return f"{minutes // 60} h {minutes % 60} min"
+    return f"{minutes} min"
+
+
+def _stage_progress(
+    stage: str,
+    done: int,
+    tasks: int,
+    drives: int,
+    share: float,
+    rate: float,
+    left: float | None,
+    failures: int,
+) -> str:
+    whole = str(tasks)
+    if drives:
+        whole = f"{counted(tasks, 'file')} of {counted(drives, 'drive')}"
+    time = ""
+    if left is not None:
+        time = f"{duration(left)} left of this stage, "
+    return (
+        f"{TITLES[stage]}: {done} of {whole}, {percent(share)}, {rate / 1e6:.3g} M points/s, {time}"
+        f"{counted(failures, 'failure')} so far"
+    )
+
+
+PROGRESS: dict[str, Wording] = {
+    "task warning": "Warning: {task}: {text}",
+    "task failed": "Failed: {task}: {text}",
+    "task lost with scheduler": "{task} was lost with the scheduler, and is done again.",
+    "task lost with worker": "{task} lost its worker, and is done again.",
+    "no worker yet": "The cluster has no worker yet: waiting at {scheduler}, {patience} at most.",
+    "scheduler lost": "The scheduler is lost, and may start again: waiting at {scheduler}, "
+    "{patience} at most.",
+    "scheduler back": "A scheduler answers again, and is given what the lost one was given.",
+    "drives estimated": "Estimating {drives} drives together.",
+    "stage progress": _stage_progress,
+}
+
+
+def progress_sentence(statement: Statement) -> str:
+    """The sentence of what a run says on its way.
+
+    Parameters
+    ----------
+    statement : Statement
+        Of a key of PROGRESS.
+    """
+    return statement.sentence(PROGRESS)
