@@ -29,7 +29,6 @@ SEEDS = (1,)
 SHOWN = 3  # figures of a number, those that move most
 ROOMS = {  # name: module of the settings, function of seeds that returns a dict of figures
     "baselines": ("baselines._settings", room_figures.baselines),
-    "blind": ("blind._settings", room_figures.blind),
     "effects": ("effects._settings", room_figures.effects),
     "estimate": ("estimate.settings", room_figures.estimate),
     "evaluate": ("evaluate._settings", room_figures.evaluate),

@@ -19,7 +19,6 @@ from feature_surveys import feature_survey, scenarios
 from ties_study import feature_ties
 
 import mlscorr
-from mlscorr.blind import mix
 from mlscorr.estimate import estimate_correction, with_ties
 from mlscorr.evaluate import datum_differences
 from mlscorr.pipeline.project import correct_project
@@ -337,16 +336,4 @@ def plan(seeds):
     for seed in seeds:
         document = mlscorr.plan(mlscorr.read_survey(written(LONG, seed))).document
         figures |= summary(document, f"{seed} ")
-    return figures
-
-
-def blind(seeds):
-    """Kinds and sizes of the cases of a blind check."""
-    figures = {}
-    for seed in seeds:
-        cases = mix(200, np.random.default_rng(seed))
-        kinds = [case.kind for case in cases]
-        figures |= {f"{seed} {kind}": float(kinds.count(kind)) for kind in sorted(set(kinds))}
-        for kind in sorted(set(kinds)):
-            figures[f"{seed} {kind} MDB"] = rms([case.mdb for case in cases if case.kind == kind])
     return figures

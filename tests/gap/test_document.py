@@ -13,7 +13,6 @@ from mlscorr.gap.advice import distinct_parameters
 from mlscorr.gap.evidence import Cause, CauseParameter, Separability
 from mlscorr.gap.evidence._error_models import STATED
 from mlscorr.gap.signatures import signatures
-from mlscorr.report.gap._labels import parameters_of
 
 
 def test_separability_is_told_in_plain_numbers():
@@ -84,6 +83,3 @@ def test_times_of_two_events_have_names_of_their_own():
     cause = Cause("position_step+position_bump", 0.9, moment, parts, np.zeros(len(g.rows)))
     told = [vars(parameter) for parameter in distinct_parameters(cause)]
     assert [row["name"] for row in told] == ["position_step time", "position_bump time", "width"]
-    owned = parameters_of(cause.effect, told)
-    assert owned["position_step"]["time"].estimate == 3.0
-    assert owned["position_bump"]["time"].estimate == 5.0

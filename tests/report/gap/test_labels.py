@@ -18,6 +18,13 @@ def test_parameters_of_pairs_go_to_their_effects():
     plain = [parameter("magnitude", "s", 1e-3, 1e-4), parameter("magnitude", "m", 5e-3, 1e-4)]
     found = parameters_of("time_offset+range_noise", plain)
     assert [found[name]["magnitude"].unit for name in found] == ["s", "m"]
+    events = [
+        parameter("position_step time", "s", 3.0, None),
+        parameter("position_bump time", "s", 5.0, None),
+    ]
+    found = parameters_of("position_step+position_bump", events)
+    assert found["position_step"]["time"].estimate == 3.0
+    assert found["position_bump"]["time"].estimate == 5.0
 
 
 def test_windows_of_a_worse_pos_are_told_with_their_times():
