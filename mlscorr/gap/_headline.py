@@ -1,4 +1,4 @@
-"""How large the gap is and where most of it lies, in a sentence.
+"""Sentence on the size of the gap and on where most of it lies.
 
 A cause moves some residuals more than others, and so by chance also those of some range or
 brightness that it has nothing to do with. So a cause is located by the covariates on which it acts
@@ -68,7 +68,7 @@ class GapPlace(NamedTuple):
 
 
 def headline(where: Where, label: str, lead: str, start: float) -> str:
-    """How large the gap is, and where most of it lies.
+    """Return the sentence on the size of the gap and on where most of it lies.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def headline(where: Where, label: str, lead: str, start: float) -> str:
 
 
 def _acts_on(label: str, lead: str) -> Callable[[str], bool] | None:
-    """Whether a cause acts on a covariate; None where nobody knows."""
+    """Return True if a cause acts on a covariate; None if that is not known."""
     if label == "unknown" and lead:
         return lambda by: NAMES.get(by, (by,))[0] in lead
     effects = label.split("+")

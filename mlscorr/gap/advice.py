@@ -119,7 +119,7 @@ def advice_of(
     is_stated: bool = True,
     left_out: Mapping[str, str] = MappingProxyType({}),
 ) -> list[Statement]:
-    """What to do about a verdict.
+    """Return the advice on a verdict.
 
     Parameters
     ----------
@@ -137,8 +137,10 @@ def advice_of(
     verdict = inference.verdict
     advice = []
     if verdict.label == "none":
-        is_default = not is_stated and not excess
-        advice.append(Statement("drift of a default" if is_default else OF_EXCESS[excess]))
+        if not is_stated and not excess:
+            advice.append(Statement("drift of a default"))
+        else:
+            advice.append(Statement(OF_EXCESS[excess]))
     elif verdict.is_hidden:
         advice.append(Statement("unmatched targets"))
     elif verdict.label == "unknown":

@@ -1,4 +1,4 @@
-"""How far a POS errs whose sigma nobody stated: a scale on the default, by the survey itself.
+"""Scale of the default sigma of a POS whose sigma nobody stated, estimated from the survey.
 
 The inference averages over scales about a stated sigma, within a prior that a default does not
 deserve: a POS of another grade would look like noise, or like something unknown. So where a
@@ -25,7 +25,7 @@ LEAST_GAIN = 1.0
 
 
 def open_sigmas(survey: Survey) -> tuple[str, ...]:
-    """Those of SIGMAS that nobody stated.
+    """Names of the SIGMAS that nobody stated.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How the beams of a line scanner turn, and where they come from, by its cloud alone.
+"""Turning rate and origin of the beams of a line scanner, by its cloud alone.
 
 The points of a line scanner lie in one plane of the vehicle, and seen from the scanner their angle
 in it grows evenly with time. From anywhere else it does not.

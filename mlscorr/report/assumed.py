@@ -1,4 +1,4 @@
-"""What nobody stated: the defaults that stand in for it, on the first screen."""
+"""Defaults that stand in for accuracies that nobody stated, on the first screen."""
 
 from collections.abc import Iterable, Iterator, Mapping
 
@@ -16,7 +16,7 @@ SIGMAS = ("pos.position_sigma", "pos.attitude_sigma")
 
 
 def has_assumed_sigma(rows: Iterable[dict]) -> bool:
-    """Whether a sigma of the POS is a default.
+    """Return True if a sigma of the POS is a default.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def assumed_statement(
 
 
 def _item(row, uses):
-    """What is assumed, and how large this survey makes it."""
+    """Sentence on an assumed sigma, with its size by this survey."""
     text = f"{_size(row['value'], row['unit'])} assumed"
     if row.get("estimate") is not None:
         text += f"; about {_size(row['estimate'], row['unit'])} by this survey"

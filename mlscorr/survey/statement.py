@@ -1,4 +1,4 @@
-"""What is said of a survey, as a value: code compares its key, and readers get its sentence."""
+"""Statement on a survey as a value: code compares its key, and readers get its sentence."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

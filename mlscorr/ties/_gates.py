@@ -1,4 +1,4 @@
-"""How far apart two views of one thing may lie: by stated sigmas at first, then by what is left."""
+"""Gates of ties: the distance of two views of one thing, by stated sigmas, then by residuals."""
 
 import numpy as np
 
@@ -26,7 +26,7 @@ def placed_sigma(correction: Correction, survey: Survey, features: TieFeatures) 
 
 
 def widest_gate(sigma: np.ndarray) -> float:
-    """How far two features may be apart whose places have sigmas (n,). Units: m.
+    """Largest distance of two features whose places have sigmas (n,). Units: m.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def widest_gate(sigma: np.ndarray) -> float:
 
 
 def narrowest_gate(ties: Ties, moved: np.ndarray) -> float:
-    """How far features may be apart by the scatter of what a correction leaves of ties. Units: m.
+    """Largest distance of two features by the scatter of residuals of ties. Units: m.
 
     Parameters
     ----------

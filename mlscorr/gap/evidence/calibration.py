@@ -1,4 +1,4 @@
-"""How far stated probabilities are from how often they are right."""
+"""Difference between stated probabilities and how often they are right."""
 
 from __future__ import annotations
 

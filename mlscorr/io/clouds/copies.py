@@ -106,7 +106,7 @@ class _Points:
     _moments: np.ndarray | None = None
 
     def are_those_of(self, other: "_Points") -> bool:
-        """Whether both clouds hold the same times, in one order or another; not if undecodable."""
+        """Return True if both clouds hold the same times in any order; False if undecodable."""
         if self.layout.points != other.layout.points:  # some of an E57 are invalid
             return False
         with suppress(OSError, ValueError):
@@ -158,7 +158,7 @@ def _time_moments(layout: LasLayout) -> np.ndarray:
 
 
 def _differ_by_system(difference: np.ndarray) -> bool:
-    """Whether times differ by nothing, or all by what two time systems differ by. Units: s."""
+    """Return True if times are equal, or all differ as two time systems do. Units: s."""
     limit = SETTINGS.single_time_step
     if not np.isfinite(difference).all() or np.ptp(difference) > limit:
         return False

@@ -1,4 +1,4 @@
-"""How many points are flagged as noise, counted while clouds are read for a measurement."""
+"""Number of points flagged as noise, counted while clouds are read for a measurement."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -47,7 +47,7 @@ class NoiseCount:
 
     @property
     def sentence(self) -> str:
-        """What a user should know of them; empty where there are none."""
+        """Sentence on them; empty where there are none."""
         flagged, read = self.totals
         if not flagged:
             return ""
@@ -56,7 +56,7 @@ class NoiseCount:
 
 
 def noise_sentence(flagged: int, points: int, classes: list[int]) -> str:
-    """What a user should know of points that are flagged as noise.
+    """Sentence on points that are flagged as noise.
 
     Parameters
     ----------

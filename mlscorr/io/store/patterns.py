@@ -88,5 +88,5 @@ def _folders_in(folder):
 
 
 def _holds(folder, inner):
-    """Whether a real path is that of a folder, or lies below it."""
+    """Return True if a real path is that of a folder, or lies below it."""
     return inner == folder or inner.startswith(os.path.join(folder, ""))

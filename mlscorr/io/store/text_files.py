@@ -57,7 +57,7 @@ def _letters_beyond_ascii(path, encoding):
 
 
 def _are_chinese(letters):
-    """Whether most of some letters, given by their numbers, are common ones in Chinese."""
+    """Return True if most of some letters, given by their numbers, are common in Chinese."""
     coded = {letter: letter.encode("gb2312", errors="ignore") for letter in letters}
     common = sum(letters[letter] for letter in letters if b"" < coded[letter] < RARE_LETTERS)
     return 2 * common > letters.total()

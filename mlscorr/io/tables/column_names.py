@@ -171,7 +171,7 @@ def unit_of(name: str) -> str | None:
 
 
 def is_foreign(unit: str) -> bool:
-    """Whether a unit is one that is not read.
+    """Return True if a unit is one that is not read.
 
     Parameters
     ----------

@@ -100,7 +100,7 @@ def check_projected(path: Path, table: dict[str, np.ndarray]) -> None:
 
 
 def _is_geocentric_table(path, known):
-    """Whether X, Y and Z of a table are geocentric by their size."""
+    """Return True if X, Y and Z of a table are geocentric by their size."""
     columns = ("x", "y", "height")
     if not set(columns) <= set(known):
         return False
@@ -115,7 +115,7 @@ def _is_geocentric_table(path, known):
 
 
 def _is_geocentric(places):
-    """Whether places (x, y, z; m) lie about the Earth's surface, seen from its center."""
+    """Return True if geocentric places (x, y, z; m) lie near the Earth's surface."""
     is_far = np.abs(np.median(places[2])) > LARGEST_HEIGHT
     return bool(is_far and RADII[0] < _radius(places) < RADII[1])
 

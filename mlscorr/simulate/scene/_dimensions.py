@@ -208,7 +208,7 @@ class Furniture:
 
 @dataclass(frozen=True)
 class TargetHeight:
-    """How high targets hang on a support.
+    """Heights of targets on a support.
 
     Parameters
     ----------
