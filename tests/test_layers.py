@@ -58,7 +58,7 @@ MODULES = sorted(
 PROJECT_FLOORS = (  # of the modules within pipeline/project, which stands on top of one survey
     ("settings", "engine", "tasks", "wording"),
     ("joint", "file_tasks", "running", "progress"),
-    ("areas", "drive_estimate", "joint_estimate"),
+    ("areas", "drive_estimate"),
     ("corrected",),
     ("merged",),
     ("city",),

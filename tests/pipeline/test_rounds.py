@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from mlscorr.cli import app
 from mlscorr.io.surveys import read_survey
 from mlscorr.pipeline import diagnose
-from mlscorr.pipeline.rounds import DiagnosedRounds
+from mlscorr.pipeline.diagnosis import DiagnosedRounds
 from mlscorr.simulate import read_simulator
 from tests.beds import diagnosed_street
 from tests.beds.documents import undocumented

@@ -11,8 +11,7 @@ from mlscorr.pipeline.corrected_survey import CorrectedSurvey
 from mlscorr.pipeline.project.areas import Area, Piece, drive_areas, pieces_of
 from mlscorr.pipeline.project.corrected import DriveState, corrected_drives
 from mlscorr.pipeline.project.drive_estimate import CorrectedDrive
-from mlscorr.pipeline.project.joint import FoundDrive
-from mlscorr.pipeline.project.joint_estimate import estimate_group, near_drives
+from mlscorr.pipeline.project.joint import FoundDrive, estimate_group, near_drives
 from mlscorr.pipeline.project.merged import AreaResult, merged_drive
 from mlscorr.pipeline.project.settings import SETTINGS
 

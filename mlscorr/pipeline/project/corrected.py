@@ -15,8 +15,7 @@ from mlscorr.pipeline.correction import corrected_fields
 from mlscorr.pipeline.file_finding import FileFinding, join_findings
 from mlscorr.pipeline.project.areas import Area
 from mlscorr.pipeline.project.drive_estimate import CorrectedDrive, drive_estimate
-from mlscorr.pipeline.project.joint import FoundDrive
-from mlscorr.pipeline.project.joint_estimate import JointEstimate
+from mlscorr.pipeline.project.joint import FoundDrive, JointEstimate
 from mlscorr.survey import Survey
 
 STATES = {
