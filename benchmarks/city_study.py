@@ -31,7 +31,7 @@ from mlscorr.frames import attitude_from_angles
 from mlscorr.io.store import TaskStore
 from mlscorr.io.tables.control import NO_POINTS
 from mlscorr.matching import Matches
-from mlscorr.pipeline.finding import Finding
+from mlscorr.pipeline.finding import MatchedTargets
 from mlscorr.pipeline.project.city import in_turn, project_drives
 from mlscorr.pipeline.project.corrected import motion_of
 from mlscorr.pipeline.project.engine import engine
@@ -151,7 +151,8 @@ class City:
         candidates = Candidates(NO_CLOUD, np.empty(0, int), NO_CLOUD, passes, {})
         control = self.control(way, passed, error, number)
         nothing = TargetObservations.concatenate([control.observations])[[]]
-        finding = Finding(Matches(nothing, nothing, (), np.empty(0), ()), candidates, {})
+        matches = Matches(nothing, nothing, (), np.empty(0), ())
+        finding = MatchedTargets(survey, matches, candidates, {})
         return FoundDrive(survey, finding, features, control, control[[]])
 
     def left(self, name, correction):

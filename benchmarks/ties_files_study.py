@@ -99,7 +99,7 @@ def read(survey):
             collector.add(file, chunk)
             yield chunk
 
-    control, _ = find_control(survey, None, None, chunks).matches.by_role(survey)
+    control = find_control(survey, None, None, chunks).control
     return control, collector.features()
 
 

@@ -39,7 +39,7 @@ ROOMS_OF = {
     "laspy": {"io"},
     "openpyxl": {"io"},
     "pye57": {"io"},
-    "open3d": {"baselines", "simulate", "report"},
+    "open3d": {"baselines", "simulate", "report", "survey"},
     "sklearn": {"baselines", "gap"},
 }
 SIMULATOR = (  # floors inside simulate; its rooms on one floor do not know each other

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mlscorr.correction._kernel import fill_increments, move_integers, require_times
-from mlscorr.frames import angle_sigma
+from mlscorr.frames import angle_sigma, angles_from_attitude
 from mlscorr.survey import Mounting, PointCloud, Summary, Trajectory
 from mlscorr.wording import counted
 
@@ -105,6 +105,13 @@ class Correction(Summary):
             shift += new.attitude.apply(after.lever_arm - change.apply(before.lever_arm))
         turn = (turned * old.attitude.inv()).as_matrix() - np.eye(3)
         return np.hstack([old.position - self.origin, shift, turn.reshape(-1, 9)])
+
+    @property
+    def attitude_change(self) -> np.ndarray:
+        """Corrected - recorded roll, pitch and heading (n, 3). Units: rad."""
+        recorded = np.column_stack(angles_from_attitude(self.recorded.attitude))
+        corrected = np.column_stack(angles_from_attitude(self.corrected.attitude))
+        return (corrected - recorded + np.pi) % (2 * np.pi) - np.pi
 
     @property
     def origin(self) -> np.ndarray:

@@ -21,7 +21,7 @@ from mlscorr.blind import make_case, mix, outside_mechanisms, score
 from mlscorr.effects import EFFECTS, known_effects, register_file
 from mlscorr.io.store import document, output_file, write_json
 from mlscorr.io.surveys import read_survey
-from mlscorr.pipeline.finding import find_targets, silent
+from mlscorr.pipeline.finding import find_targets, match_targets, silent
 
 SECRET = ("truth*", "key*")  # names of files that no diagnosis may see
 
@@ -229,12 +229,17 @@ def _begin(effects):
         register_file(effects)
 
 
+def _matched(survey):
+    """Targets of a survey with their names."""
+    return match_targets(find_targets(survey), survey)
+
+
 def _make(folder, case, entropy, mechanisms):
     """Make a case in a process of its own, whole or not at all; its label."""
     warnings.simplefilter("ignore")
     with tempfile.TemporaryDirectory(prefix=".", dir=folder.parent) as place:
         made = Path(place) / folder.name
-        label = make_case(made, case, entropy, find_targets, mechanisms)
+        label = make_case(made, case, entropy, _matched, mechanisms)
         if folder.exists():  # of a run that was interrupted before it had the label
             shutil.rmtree(folder)
         os.replace(made, folder)

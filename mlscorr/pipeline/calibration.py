@@ -21,7 +21,12 @@ from mlscorr.io.clouds import sample_gps_times
 from mlscorr.matching import Refusal
 from mlscorr.pipeline.calibrated_survey import CalibratedSurvey, CalibrationResult, estimate_section
 from mlscorr.pipeline.control_checks import remounting_fault, reuse_warnings
-from mlscorr.pipeline.finding import Finding, find_control, find_or_compare_surfaces, read_into
+from mlscorr.pipeline.finding import (
+    MatchedTargets,
+    find_control,
+    find_or_compare_surfaces,
+    read_into,
+)
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.survey import Matched, Statement, Survey, SurveyFileError, TieFeatures, check_survey
 from mlscorr.ties import TieCollector, tie_mounting
@@ -125,9 +130,9 @@ def _title(name):
     return ""
 
 
-def _numbered(survey: Survey, finding: Finding) -> Iterator[Matched]:
+def _numbered(survey: Survey, finding: MatchedTargets) -> Iterator[Matched]:
     """The matched control points, then the check points, with the numbers of their scanners."""
-    of_pass = finding.scanners(survey)
+    of_pass = finding.scanners
     for matched in finding.matches.by_role(survey):
         scanner = [of_pass[number] for number in matched.observations.pass_number]
         yield replace(matched, scanner=np.array(scanner, int))
@@ -180,7 +185,7 @@ def calibrate_together(
 def _parts(survey, control, check, finding, calibration):
     """CalibratedSurvey of each scanner by its name, with the sentences on it alone."""
     parts = {}
-    of_pass = finding.scanners(survey)
+    of_pass = finding.scanners
     for number, (name, part) in enumerate(survey.by_scanner.items()):
         matched = [points[points.scanner == number] for points in (control, check)]
         refusals = [

@@ -14,7 +14,7 @@ from mlscorr.gap import contrast, residuals
 from mlscorr.gap.closure import Beams, BeamSimulator, Surroundings, collect_beams
 from mlscorr.gap.signatures import expected, without_effects
 from mlscorr.io.surveys import simulated_survey
-from mlscorr.pipeline.finding import Finding, find_or_compare_surfaces, read_into
+from mlscorr.pipeline.finding import MatchedTargets, find_or_compare_surfaces, read_into
 from mlscorr.pipeline.planning import check_enough
 from mlscorr.survey import Matched, Statement, Survey, TargetObservations
 
@@ -207,8 +207,8 @@ def _chunks_alone(collector):
     return lambda _, chunk: collector.add(chunk)
 
 
-def _with_moved(finding: Finding, survey: Survey) -> Finding:
-    """The Finding with observations of control points that stand elsewhere than was surveyed.
+def _with_moved(finding: MatchedTargets, survey: Survey) -> MatchedTargets:
+    """The targets with observations of control points that stand elsewhere than was surveyed.
 
     Their misclosures are what target_outlier is known by. Check points stay as they were matched.
     """
@@ -222,8 +222,8 @@ def _with_moved(finding: Finding, survey: Survey) -> Finding:
 
 def _read(
     believed, progress, sampler=None
-) -> tuple[Finding, residuals.Patches | None, Surroundings, tuple[str, ...]]:
-    """The Finding, Patches, Surroundings and notes.
+) -> tuple[MatchedTargets, residuals.Patches | None, Surroundings, tuple[str, ...]]:
+    """The MatchedTargets, Patches, Surroundings and notes.
 
     The clouds are read once: targets, patches, what lies about targets and, where there is a
     SampleCollector, its sample are taken from each chunk as it comes.

@@ -214,11 +214,13 @@ def compare(
     True
     """
     check_survey(survey)
-    survey, finding, features = observe_survey(survey, tie_use(survey, None), rng, progress)
-    control, check = finding.matches.by_role(survey)
+    matches, features = observe_survey(survey, tie_use(survey, None), rng, progress)
+    survey = matches.scanned_survey
+    control = matches.control
+    check = matches.check
     for sentence in reuse_warnings(survey):
         warnings.warn(sentence, stacklevel=2)
-    observed = Observed(survey, finding.candidates, features)
+    observed = Observed(survey, matches.candidates, features)
     load_open3d()  # takes seconds, which are not the method's
     is_few = len(set(check.name)) < SETTINGS.sufficient_check_points
     groups = _groups(control) if is_few else []
@@ -245,7 +247,7 @@ def compare(
         rows=tuple(rows),
         corrections=corrections,
         groups=len(groups),
-        missing=unseen_rows(survey, finding.matches.refusals, finding.candidates, finding.scanned),
+        missing=unseen_rows(survey, matches.matches.refusals, matches.candidates, matches.scanned),
     )
 
 

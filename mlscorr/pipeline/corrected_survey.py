@@ -20,7 +20,6 @@ from mlscorr.evaluate import (
     accuracy,
     largest_sigma,
     model_section,
-    score,
     surveyed_rows,
     tie_section,
 )
@@ -34,6 +33,7 @@ from mlscorr.io.trajectories import (
 )
 from mlscorr.pipeline._result import Reported, ResultFiles
 from mlscorr.pipeline.clouds import MovedClouds, WrittenClouds, write_counted
+from mlscorr.pipeline.estimation import check_score, control_score
 from mlscorr.pipeline.finding import silent
 from mlscorr.survey import Matched, Summary, Survey, Trajectory, rows_frame
 from mlscorr.targets import FittedTarget
@@ -90,19 +90,11 @@ class CorrectedSurvey(Summary):
 
     @property
     def _control(self) -> Score:
-        # a refused point scores nowhere
-        estimate = self.estimate
-        used = self.estimate.used
-        sigma = np.vstack([np.empty((0, 3)), *(test.sigma for test in estimate.tests)])
-        control = self.matched_control[used]
-        left_out = estimate.left_out[used]
-        return score(control, estimate.correction, left_out, sigma)
+        return control_score(self.estimate, self.matched_control)
 
     @property
     def _check(self) -> Score:
-        there = self.trajectory.at(self.matched_check.gps_time).position_sigma
-        sigma = np.sqrt(self.matched_check.variance + there**2)
-        return score(self.matched_check, self.estimate.correction, sigma=sigma)
+        return check_score(self.estimate, self.matched_check)
 
     @property
     def targets(self) -> list[TargetRow]:

@@ -1,4 +1,9 @@
-"""``correct``: from a survey to corrected clouds, trajectory and report."""
+"""``correct``: from a survey to corrected clouds, trajectory and report.
+
+It is its stages and nothing else: find targets, match them, estimate the POS error.
+"""
+
+from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
@@ -6,34 +11,30 @@ from dataclasses import replace
 from typing import Any, Literal, get_args
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from mlscorr.estimate import (
     SETTINGS,
     Estimate,
-    believed_correction,
     check_order,
-    estimate_correction,
-    find_mounting_error,
-    mounting_warnings,
-    scanner_warnings,
 )
 from mlscorr.evaluate import datum_differences, unseen_rows
-from mlscorr.pipeline.control_checks import reuse_warnings
+from mlscorr.pipeline.control_checks import check_control, reuse_warnings
 from mlscorr.pipeline.corrected_survey import CorrectedSurvey
-from mlscorr.pipeline.finding import Finding, find_control, find_or_compare_surfaces, read_into
+from mlscorr.pipeline.estimation import estimate_pos_error
+from mlscorr.pipeline.finding import (
+    MatchedTargets,
+    check_found_control,
+    find_targets,
+    match_if_any,
+    match_targets,
+)
 from mlscorr.survey import Matched, Survey, TieFeatures, check_survey
-from mlscorr.ties import TieCollector, tie_passes
 
 TieUse = Literal["auto", "off", "only"]
 
 NOTHING_TIED = (
     "No two passes of {} saw the same thing, so ties alone correct nothing. Drive the street "
     "twice, or survey control points."
-)
-LEFT_OUT = (
-    'What two passes both saw was left out, as asked: --no-ties, or use = "off" of [ties] in '
-    "survey.toml."
 )
 
 
@@ -92,16 +93,19 @@ def correct(
     if ties == "only":
         survey = without_control(survey)
 
-    survey, finding, features = observe_survey(survey, ties, rng, progress)
-    control, check = finding.matches.by_role(survey)
-    estimate = estimate_together(survey, control, features, order)
+    matches, features = observe_survey(survey, ties, rng, progress)
+    estimate = estimate_pos_error(survey, matches, features, order)
     if ties == "only" and estimate.ties is None:
         raise ValueError(f"{NOTHING_TIED.format(survey.path)} {estimate.untied}")
 
-    result = CorrectedSurvey(**corrected_fields(survey, control, check, finding, estimate))
+    result = CorrectedSurvey(
+        **corrected_fields(
+            matches.scanned_survey, matches.control, matches.check, matches, estimate
+        )
+    )
     datum = (difference.sentence for difference in result.datum)
-    # those of the finding were given when it was made
-    for sentence in (*control_warnings(survey, finding), *datum, *estimate.warnings):
+    # those of the targets were given when they were matched
+    for sentence in (*control_warnings(survey, matches), *datum, *estimate.warnings):
         warnings.warn(sentence, stacklevel=2)
     return result
 
@@ -145,7 +149,7 @@ def observe_survey(
     ties: TieUse,
     rng: np.random.Generator | None = None,
     progress: Callable | None = None,
-) -> tuple[Survey, Finding, TieFeatures | None]:
+) -> tuple[MatchedTargets, TieFeatures | None]:
     """Read a survey's clouds once, for its targets and for the features that may tie its passes.
 
     Parameters
@@ -158,9 +162,7 @@ def observe_survey(
 
     Returns
     -------
-    survey : Survey
-        Its trajectory knows the seconds in which points lie.
-    finding : Finding
+    matches : MatchedTargets
         With a control point at least, but where ties alone are asked for.
     features : TieFeatures or None
         None where ties are off.
@@ -168,57 +170,21 @@ def observe_survey(
     Raises
     ------
     ValueError
-        As ``find_control``.
+        When no target is found or matched, or no control point among them.
     """
-    collector = TieCollector(survey)
-    if ties == "off":
-        finding = find_control(survey, rng, progress)
-        features = None
-    elif ties == "auto":
-        finding = find_control(survey, rng, progress, read_into(collector.add))
-        features = collector.features()
+    if ties != "only":
+        check_control(survey)
+    targets = find_targets(survey, rng, progress, with_ties=ties != "off")
+    if ties == "only":
+        matches, _ = match_if_any(targets, survey)
     else:
-        read = read_into(collector.add)
-        finding, _ = find_or_compare_surfaces(survey, read, None, progress)
-        features = collector.features()
-    trajectory = survey.trajectory.scanned_at(finding.candidates.seconds)
-    return replace(survey, trajectory=trajectory), finding, features
-
-
-@threadpool_limits.wrap(limits=1, user_api="blas")  # more threads, other last digits
-def estimate_together(
-    survey: Survey, control: Matched, features: TieFeatures | None, order: int
-) -> Estimate:
-    """The POS error by matched control points, and by what two passes both saw.
-
-    Parameters
-    ----------
-    survey : Survey
-    control : Matched
-        Without any, ties alone bring passes together where the POS says that they are.
-    features : TieFeatures or None
-        None where ties are left out.
-    order : int
-        Of the trend.
-    """
-    if len(control):
-        estimate = estimate_correction(survey.trajectory, control, survey.pos, order)
-    else:
-        estimate = believed_correction(survey.trajectory, survey.pos)
-    if features is None:
-        return replace(estimate, untied=LEFT_OUT)
-    estimate = tie_passes(survey, estimate, features)
-    sentences = ()  # on mountings, where the ties tell of wrong ones
-    if estimate.equations.mounting is not None:
-        sentences = tuple(scanner_warnings(estimate, list(survey.by_scanner)))
-    if not sentences and None not in survey.mountings:  # all of them may be wrong alike
-        error = find_mounting_error(estimate, control, survey.mountings)
-        sentences = mounting_warnings(error, len(survey.mountings))
-    return replace(estimate, notes=(*estimate.notes, *sentences))
+        matches = match_targets(targets, survey)
+        check_found_control(matches)
+    return matches, targets.features
 
 
 def corrected_fields(
-    survey: Survey, control: Matched, check: Matched, finding: Finding, estimate: Estimate
+    survey: Survey, control: Matched, check: Matched, matches: MatchedTargets, estimate: Estimate
 ) -> dict[str, Any]:
     """Fields of a CorrectedSurvey.
 
@@ -226,7 +192,7 @@ def corrected_fields(
     ----------
     survey : Survey
     control, check : Matched
-    finding : Finding
+    matches : MatchedTargets
         Of which these are.
     estimate : Estimate
         By the control points.
@@ -238,20 +204,20 @@ def corrected_fields(
         "matched_control": control,
         "matched_check": check,
         "missing": unseen_rows(
-            survey, finding.matches.refusals, finding.candidates, finding.scanned
+            survey, matches.matches.refusals, matches.candidates, matches.scanned
         ),
-        "fitted": finding.fitted,
-        "warnings": (*finding.warnings, *control_warnings(survey, finding)),
+        "fitted": matches.fitted,
+        "warnings": (*matches.warnings, *control_warnings(survey, matches)),
         "datum": datum_differences(used, survey.trajectory, survey.pos, survey.crs),
     }
 
 
-def control_warnings(survey: Survey, finding: Finding) -> tuple[str, ...]:
+def control_warnings(survey: Survey, matches: MatchedTargets) -> tuple[str, ...]:
     """Warnings on control points that no cloud covers, or that corrected the survey before.
 
     Parameters
     ----------
     survey : Survey
-    finding : Finding
+    matches : MatchedTargets
     """
-    return (*finding.uncovered, *reuse_warnings(survey))
+    return (*matches.uncovered, *reuse_warnings(survey))

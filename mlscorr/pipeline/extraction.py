@@ -14,7 +14,13 @@ from mlscorr.io.clouds import read_chunks
 from mlscorr.io.tables import write_extracted_csv
 from mlscorr.pipeline._result import KnownResult, ResultFiles
 from mlscorr.pipeline.beams import with_beam_origin
-from mlscorr.pipeline.finding import Finding, fit_while_reading, match_targets, silent, unmatched
+from mlscorr.pipeline.finding import (
+    MatchedTargets,
+    fit_while_reading,
+    match_fitted,
+    silent,
+    unmatched,
+)
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.survey import Survey, TargetObservations, check_rng, check_survey, rows_frame
 from mlscorr.targets import BY_EDGES, distinct, search_targets, why_useless
@@ -84,20 +90,20 @@ def extract(
             of_file += targets
             yield chunk
 
-    near, candidates, _ = fit_while_reading(survey, searched, rng, done)
+    found = fit_while_reading(survey, searched, rng, done)
     everywhere = [
-        (candidates.passes[file, int(survey.trajectory.segment(target.gps_time))], target)
+        (found.candidates.passes[file, int(survey.trajectory.segment(target.gps_time))], target)
         for file, targets in objects.items()
         for target in distinct(targets)
     ]
-    result = _without_doubles(near, everywhere)
+    result = _without_doubles(list(found.targets), everywhere)
     sentences = _sentences(survey, np.flatnonzero(present), result)
     for sentence in sentences:
         warnings.warn(sentence, stacklevel=2)
     if result and len(surveyed):
-        finding = match_targets(result, candidates, survey)
+        finding = match_fitted(survey, result, found.candidates)
     else:
-        finding = unmatched(result, candidates, NO_CONTROL)
+        finding = unmatched(survey, result, found.candidates, NO_CONTROL)
     return ExtractedSurvey(survey, finding, sentences)
 
 
@@ -137,13 +143,13 @@ class ExtractedSurvey(KnownResult):
     Parameters
     ----------
     survey : Survey
-    finding : Finding
+    finding : MatchedTargets
     warnings : tuple of str
     """
 
     _name = "targets"
     survey: Survey
-    finding: Finding
+    finding: MatchedTargets
     warnings: tuple[str, ...]
 
     @property

@@ -6,7 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mlscorr.io.clouds import read_chunks
-from mlscorr.pipeline.finding import Finding, fit_while_reading, match_targets, read_into, unmatched
+from mlscorr.pipeline.finding import (
+    MatchedTargets,
+    fit_while_reading,
+    match_fitted,
+    read_into,
+    unmatched,
+)
 from mlscorr.survey import PointCloud, Survey, TieFeatures
 from mlscorr.targets import NO_POINTS, Candidates, PassTarget, number_passes
 from mlscorr.ties import TieCollector
@@ -60,13 +66,15 @@ def find_in_file(survey: Survey, origin: np.ndarray, with_ties: bool = True) -> 
         read = read_into(collector.add)
     else:
         read = read_chunks
-    fitted, candidates, near = fit_while_reading(survey, read)
+    found = fit_while_reading(survey, read)
+    candidates = found.candidates
+    near = found.near
     segments = {number: segment for (_, segment), number in candidates.passes.items()}
     features = collector.features()
     numbers = [segments[number] for number in features.pass_number.tolist()]
     return FileFinding(
         starts={segment: start for (_, segment), start in candidates.starts.items()},
-        targets=[(segments[number], target) for number, target in fitted],
+        targets=[(segments[number], target) for number, target in found.targets],
         unplaced=candidates.unplaced,
         scanned=near.scanned,
         warnings=tuple(near.warnings()),
@@ -76,7 +84,9 @@ def find_in_file(survey: Survey, origin: np.ndarray, with_ties: bool = True) -> 
     )
 
 
-def join_findings(survey: Survey, files: Sequence[FileFinding]) -> tuple[Finding, TieFeatures]:
+def join_findings(
+    survey: Survey, files: Sequence[FileFinding]
+) -> tuple[MatchedTargets, TieFeatures]:
     """The finding of a survey by those of its files, and all planes and poles with its passes.
 
     Parameters
@@ -101,9 +111,9 @@ def join_findings(survey: Survey, files: Sequence[FileFinding]) -> tuple[Finding
     seconds = np.concatenate([file.seconds for file in files])
     candidates = Candidates(unplaced=unplaced, passes=passes, starts=starts, seconds=seconds)
     if len(survey.surveyed):
-        finding = match_targets(targets, candidates, survey)
+        finding = match_fitted(survey, targets, candidates)
     else:
-        finding = unmatched(targets, candidates)
+        finding = unmatched(survey, targets, candidates)
     parts = []
     for number, file in enumerate(files):
         own = [passes[number, segment] for segment in file.features.pass_number.tolist()]

@@ -1,9 +1,17 @@
-"""From cloud files to matched targets: read, fit, match."""
+"""From cloud files to matched targets: read, fit, match.
+
+``find_targets`` and ``match_targets`` are stages of ``correct`` that a script may call by itself.
+"""
+
+from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from operator import itemgetter
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -14,7 +22,19 @@ from mlscorr.matching import Matches, match
 from mlscorr.pipeline.beams import with_beam_origin
 from mlscorr.pipeline.control_checks import check_control
 from mlscorr.pipeline.settings import SETTINGS
-from mlscorr.survey import CloudFile, PointCloud, Statement, Survey, check_rng
+from mlscorr.survey import (
+    CloudFile,
+    Matched,
+    PointCloud,
+    Statement,
+    Summary,
+    Survey,
+    TargetObservations,
+    TieFeatures,
+    check_rng,
+    check_survey,
+    columns_frame,
+)
 from mlscorr.targets import (
     BY_EDGES,
     NO_POINTS,
@@ -28,15 +48,38 @@ from mlscorr.targets import (
     search_radius,
     why_useless,
 )
+from mlscorr.ties import TieCollector
 from mlscorr.wording import counted
 
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.figure import Figure
 
-@dataclass(frozen=True)
-class Finding:
-    """Targets of a survey.
+SHOWN = 5  # refusals that an overview names: it fits a screen
+
+
+class RefusedTarget(NamedTuple):
+    """A surveyed point without an observation.
+
+    Attributes
+    ----------
+    name : str
+        Of the surveyed point.
+    reason : str
+        Why no target in the cloud has its name, in a sentence.
+    """
+
+    name: str
+    reason: str
+
+
+@dataclass(frozen=True, repr=False)
+class MatchedTargets(Summary):
+    """Targets of a survey with the names of the surveyed points that they are.
 
     Parameters
     ----------
+    survey : Survey
     matches : Matches
     candidates : Candidates
         The points on all targets, with their passes, and those without a pose.
@@ -50,6 +93,7 @@ class Finding:
         On cloud files with points outside the trajectory.
     """
 
+    survey: Survey
     matches: Matches
     candidates: Candidates
     fitted: dict[tuple[int, float], FittedTarget]
@@ -57,15 +101,191 @@ class Finding:
     warnings: tuple[str, ...] = ()
     uncovered: tuple[str, ...] = ()
 
-    def scanners(self, survey: Survey) -> dict[int, int]:
-        """Number of the scanner of each pass.
+    def __len__(self) -> int:
+        return len(self.matches.matched)
+
+    @property
+    def matched(self) -> Matched:
+        """Observations with the surveyed points that they are, control and check points."""
+        return Matched.by_name(self.matches.matched, self.survey.surveyed)
+
+    @property
+    def control(self) -> Matched:
+        """Observed control points."""
+        return self.matches.by_role(self.survey)[0]
+
+    @property
+    def check(self) -> Matched:
+        """Observed check points, which take part in no estimate."""
+        return self.matches.by_role(self.survey)[1]
+
+    @property
+    def refused(self) -> tuple[RefusedTarget, ...]:
+        """Surveyed points without an observation, with the reason."""
+        return tuple(RefusedTarget(row.name, row.reason) for row in self.matches.refusals)
+
+    @property
+    def scanners(self) -> dict[int, int]:
+        """Number of the scanner of each pass."""
+        numbers = self.survey.scanner_numbers
+        return {number: int(numbers[key[0]]) for key, number in self.candidates.passes.items()}
+
+    @property
+    def scanned_survey(self) -> Survey:
+        """The survey, with a trajectory that knows the seconds in which points lie."""
+        trajectory = self.survey.trajectory.scanned_at(self.candidates.seconds)
+        return replace(self.survey, trajectory=trajectory)
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A row for each matched observation, misclosures in m; pandas is needed for it."""
+        matched = self.matched
+        observed = matched.observations
+        is_check = np.isin(matched.name, self.survey.check.name)
+        return columns_frame(
+            {
+                "name": matched.name,
+                "role": np.where(is_check, "check", "control"),
+                "pass": observed.pass_number,
+                "gps_time": observed.gps_time,
+                "kind": observed.kind,
+                "surveyed": matched.surveyed.position,
+                "observed": observed.position,
+                "misclosure": matched.misclosure,
+                "sigma": np.sqrt(matched.variance),
+                "probability": self.matches.probability,
+            }
+        )
+
+    def plot(self) -> Figure:
+        """Misclosures (surveyed - observed) over time, with one sigma."""
+        from mlscorr.report import misclosure_figure
+
+        return misclosure_figure(self.control, self.check, self.survey.trajectory)
+
+    def to_open3d(self, origin: np.ndarray | None = None) -> Any:
+        """Lines from each observed centre to its surveyed place.
 
         Parameters
         ----------
-        survey : Survey
+        origin : (3,) array, optional
+            As of ``PointCloud.to_open3d``.
+
+        Returns
+        -------
+        open3d.t.geometry.LineSet
+            Control points black, check points red.
         """
-        numbers = survey.scanner_numbers
-        return {number: int(numbers[key[0]]) for key, number in self.candidates.passes.items()}
+        from mlscorr.report import misclosure_lines
+
+        return misclosure_lines(self.control, self.check, origin)
+
+    def _overview(self):
+        """Counts, the median misclosure, and the first refusals."""
+        rows = [
+            ("control points", f"{len(set(self.control.name))} of {len(self.survey.control)}"),
+            ("check points", f"{len(set(self.check.name))} of {len(self.survey.check)}"),
+            ("observations", len(self)),
+        ]
+        if len(self):
+            median = np.median(self.matched.misclosure, axis=0)
+            words = ", ".join(f"{axis} {v:+.3f}" for axis, v in zip("ENH", median, strict=True))
+            rows.append(("median misclosure (m)", words))
+        rows += [(f"no observation of {name}", why) for name, why in self.refused[:SHOWN]]
+        if len(self.refused) > SHOWN:
+            rows.append((f"and {len(self.refused) - SHOWN} more without an observation",))
+        return [(self.survey.name,), *rows]
+
+
+@dataclass(frozen=True, repr=False)
+class FoundTargets(Summary):
+    """Targets found in the clouds of a survey, near its surveyed points, without names.
+
+    ``targets[rows]`` are some of them, as a data frame's or an array's condition chooses.
+
+    Parameters
+    ----------
+    survey : Survey
+    targets : tuple of (pass number, FittedTarget)
+        In order of pass and time.
+    candidates : Candidates
+        The passes of the clouds, and points without a pose.
+    near : NearPoints
+    features : TieFeatures, optional
+        Planes, poles and paint that may tie passes, where these were collected.
+    """
+
+    survey: Survey
+    targets: tuple[PassTarget, ...]
+    candidates: Candidates
+    near: NearPoints
+    features: TieFeatures | None = None
+
+    def __len__(self) -> int:
+        return len(self.targets)
+
+    def __getitem__(self, rows: Any) -> FoundTargets:
+        numbers = np.atleast_1d(np.arange(len(self))[np.asarray(rows)])
+        return replace(self, targets=tuple(self.targets[number] for number in numbers))
+
+    @cached_property
+    def observations(self) -> TargetObservations:
+        """Centres with covariances, kinds and sizes, a row for each target and pass."""
+        return as_observations(list(self.targets))
+
+    @property
+    def cloud(self) -> PointCloud:
+        """Points on all targets."""
+        return PointCloud.concatenate([NO_POINTS, *(target.cloud for _, target in self.targets)])
+
+    @property
+    def score(self) -> np.ndarray:
+        """How target-like each is (n,), 0 to 1."""
+        return np.array([target.score for _, target in self.targets])
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A row for each target and pass; pandas is needed for it."""
+        return self.observations.to_frame().drop(columns="name").assign(score=self.score)
+
+    def plot(self) -> Figure:
+        """The targets one by one, each with the points on it and the outline that was fitted."""
+        from mlscorr.report import targets_figure
+
+        return targets_figure(self.targets)
+
+    def to_open3d(self, origin: np.ndarray | None = None, enlarged: float = 100.0) -> Any:
+        """Outlines of the targets, and about each centre the ellipsoid of one sigma.
+
+        Parameters
+        ----------
+        origin : (3,) array, optional
+            As of ``PointCloud.to_open3d``.
+        enlarged : float
+            Factor by which ellipsoids are drawn larger than they are.
+
+        Returns
+        -------
+        open3d.t.geometry.LineSet
+        """
+        from mlscorr.report import target_lines
+
+        return target_lines(self.observations, origin, enlarged)
+
+    def _overview(self):
+        """Counts by kind and pass."""
+        observed = self.observations
+        kinds = ", ".join(f"{kind} {count}" for kind, count in Counter(observed.kind).items())
+        rows = [
+            ("targets", len(self)),
+            ("kinds", kinds or "none"),
+            ("passes", len(set(observed.pass_number.tolist()))),
+            ("points on them", int(observed.points.sum())),
+        ]
+        if len(self):
+            sigma = np.sqrt(np.einsum("nii->n", observed.covariance))
+            rows.append(("median 3D sigma (m)", f"{np.median(sigma):.4f}"))
+        if self.features is not None:
+            rows.append(("tie features", len(self.features)))
+        return [(self.survey.name,), *rows]
 
 
 class NearPoints:
@@ -165,43 +385,44 @@ def find_control(
     rng: np.random.Generator | None = None,
     progress: Callable | None = None,
     read: Callable = read_chunks,
-) -> Finding:
+) -> MatchedTargets:
     """Find the targets of a survey that has control points, and some of these among them.
 
     Parameters
     ----------
     survey, rng, progress, read
-        As of ``find_targets``.
+        As of ``fit_while_reading``, progress without a title.
 
     Raises
     ------
     ValueError
-        As find_targets does, and when no control point was surveyed or found.
+        As match_targets does, and when no control point was surveyed or found.
     """
     check_control(survey)
-    finding = find_targets(survey, rng, progress, read)
-    check_found_control(survey, finding)
-    return finding
+    reading = (progress or silent)("Reading the cloud", survey.points)
+    matches = match_targets(fit_while_reading(survey, read, rng, reading), survey)
+    check_found_control(matches)
+    return matches
 
 
-def check_found_control(survey: Survey, finding: Finding) -> None:
-    """Refuse a finding without a control point, by which nothing is corrected.
+def check_found_control(matches: MatchedTargets) -> None:
+    """Refuse matches without a control point, by which nothing is corrected.
 
     Parameters
     ----------
-    survey : Survey
-    finding : Finding
+    matches : MatchedTargets
 
     Raises
     ------
     ValueError
         Where check points alone are matched.
     """
-    control, check = finding.matches.by_role(survey)
-    if len(control) == 0:
+    survey = matches.survey
+    if len(matches.control) == 0:
         raise ValueError(
             f"None of the {counted(len(survey.control), 'control point')} was found in the cloud, "
-            f"only {counted(len(check), 'check point')}, which must not take part in the estimate."
+            f"only {counted(len(matches.check), 'check point')}, which must not take part in the "
+            "estimate."
         )
 
 
@@ -209,9 +430,11 @@ def find_targets(
     survey: Survey,
     rng: np.random.Generator | None = None,
     progress: Callable | None = None,
-    read: Callable = read_chunks,
-) -> Finding:
-    """Find the surveyed targets in the cloud and match them.
+    with_ties: bool = False,
+) -> FoundTargets:
+    """Find targets in the clouds of a survey, near its surveyed points.
+
+    The clouds are read once, in chunks, whatever their size.
 
     Parameters
     ----------
@@ -220,17 +443,40 @@ def find_targets(
         For the random samples of flat patches; the same seed each time by default.
     progress : function, optional
         ``progress(title, total)`` returns a function of the number of points just done.
-    read : function of a CloudFile
-        Gives an iterator of PointCloud.
+    with_ties : bool
+        Whether the features that may tie passes are collected in the same reading; ``find_ties``
+        and ``estimate_pos_error`` take them from the result.
+
+    Returns
+    -------
+    FoundTargets
+        None where no target is there; ``match_targets`` says why.
 
     Raises
     ------
-    ValueError
-        When no target is found, or none of those found matches.
+    OSError
+        When reading fails.
+
+    >>> import mlscorr, numpy as np, tempfile
+    >>> from mlscorr.simulate import Scenario, simulate
+    >>> folder = tempfile.mkdtemp()
+    >>> short = Scenario(
+    ...     drive={"duration": 8.0},
+    ...     targets={"control": 4, "check": 1},
+    ...     scanner=[{"lines_per_second": 75, "points_per_line": 400}],
+    ... )
+    >>> simulate(short, np.random.default_rng(1)).write(folder)
+    >>> targets = mlscorr.find_targets(mlscorr.read_survey(folder))
+    >>> len(targets)
+    5
     """
+    check_survey(survey)
     reading = (progress or silent)("Reading the cloud", survey.points)
-    targets, candidates, near = fit_while_reading(survey, read, rng, reading)
-    return _checked(survey, targets, candidates, near)
+    if not with_ties:
+        return fit_while_reading(survey, read_chunks, rng, reading)
+    collector = TieCollector(survey)
+    targets = fit_while_reading(survey, read_into(collector.add), rng, reading)
+    return replace(targets, features=collector.features())
 
 
 def find_or_compare_surfaces(
@@ -239,7 +485,7 @@ def find_or_compare_surfaces(
     settle: Callable | None = None,
     progress: Callable | None = None,
     rng: np.random.Generator | None = None,
-) -> tuple[Finding, tuple[str, ...]]:
+) -> tuple[MatchedTargets, tuple[str, ...]]:
     """Find the targets where there are any: a diagnosis can do without.
 
     Parameters
@@ -251,20 +497,35 @@ def find_or_compare_surfaces(
 
     Returns
     -------
-    finding : Finding
+    matches : MatchedTargets
         Empty where nothing was surveyed or found.
     notes : tuple of str
         The sentence that says so.
     """
     reading = (progress or silent)("Reading the cloud", survey.points)
-    targets, candidates, near = fit_while_reading(survey, read, rng, reading, settle)
+    return match_if_any(fit_while_reading(survey, read, rng, reading, settle), survey)
+
+
+def match_if_any(targets: FoundTargets, survey: Survey) -> tuple[MatchedTargets, tuple[str, ...]]:
+    """Match targets where there are any.
+
+    Parameters
+    ----------
+    targets : FoundTargets
+    survey : Survey
+
+    Returns
+    -------
+    matches, notes
+        As of find_or_compare_surfaces.
+    """
     note = "No target was surveyed: only surfaces are compared."
     if len(survey.surveyed):
         try:
-            return _checked(survey, targets, candidates, near), ()
+            return match_targets(targets, survey), ()
         except ValueError as error:
             note = f"{error} Only surfaces are compared."
-    return unmatched([], Candidates()), (note,)
+    return unmatched(survey, [], Candidates()), (note,)
 
 
 def fit_while_reading(
@@ -273,8 +534,10 @@ def fit_while_reading(
     rng: np.random.Generator | None = None,
     progress: Callable | None = None,
     settle: Callable | None = None,
-) -> tuple[list[PassTarget], Candidates, NearPoints]:
+) -> FoundTargets:
     """Fit targets near surveyed points while the clouds are read.
+
+    Of fits that overlap the best is kept: the order of the surveyed points decides nothing.
 
     Parameters
     ----------
@@ -286,15 +549,6 @@ def fit_while_reading(
     settle : function, optional
         ``settle(fitted, since)`` is given the FittedTargets since its last call, and the time (s)
         before which none to come will have points.
-
-    Returns
-    -------
-    targets : list of (pass number, FittedTarget)
-        In order of pass and time. Of fits that overlap, the best: the order of the surveyed points
-        decides nothing.
-    candidates : Candidates
-        None, with the passes and the points without a pose.
-    near : NearPoints
 
     Warns where the intensity tells nothing.
     """
@@ -324,44 +578,70 @@ def fit_while_reading(
     of_pass = {number: [] for number in sorted(candidates.passes.values())}
     for _, key, target in sorted(fits, key=itemgetter(0)):  # not in the order of their points
         of_pass[candidates.passes[key]].append(target)
-    targets = [(number, t) for number, some in of_pass.items() for t in distinct(some)]
-    return targets, candidates, near
+    targets = tuple((number, t) for number, some in of_pass.items() for t in distinct(some))
+    return FoundTargets(survey, targets, candidates, near)
 
 
-def _checked(
-    survey: Survey, targets: list[PassTarget], candidates: Candidates, near: NearPoints
-) -> Finding:
-    """The Finding of what fit_while_reading gives; raises as find_targets does."""
-    uncovered = tuple(near.beams.outside())
-    sentences = tuple(near.warnings())
-    for sentence in sentences:
-        warnings.warn(sentence, stacklevel=4)
-    finding = matched_finding(survey, targets, candidates, near)
-    return replace(finding, scanned=near.scanned, warnings=sentences, uncovered=uncovered)
+def match_targets(targets: FoundTargets, survey: Survey) -> MatchedTargets:
+    """Give targets the names of the surveyed points that they are.
 
-
-def matched_finding(
-    survey: Survey, targets: list[PassTarget], candidates: Candidates, near: NearPoints
-) -> Finding:
-    """Match what fit_while_reading gives; this decides for ``check`` and ``correct`` alike.
+    All matches are decided together: misclosures change smoothly along the drive, and a target
+    that fits no point, or several, gets no name.
 
     Parameters
     ----------
+    targets : FoundTargets
     survey : Survey
         With all of its surveyed points, also where only some were looked at.
-    targets, candidates, near
-        As fit_while_reading gives them.
+
+    Returns
+    -------
+    MatchedTargets
 
     Raises
     ------
     ValueError
         When no target is found, or none of those found matches.
+
+    >>> import mlscorr, numpy as np, tempfile
+    >>> from mlscorr.simulate import Scenario, simulate
+    >>> folder = tempfile.mkdtemp()
+    >>> short = Scenario(
+    ...     drive={"duration": 8.0},
+    ...     targets={"control": 4, "check": 1},
+    ...     scanner=[{"lines_per_second": 75, "points_per_line": 400}],
+    ... )
+    >>> simulate(short, np.random.default_rng(1)).write(folder)
+    >>> survey = mlscorr.read_survey(folder)
+    >>> matches = mlscorr.match_targets(mlscorr.find_targets(survey), survey)
+    >>> len(matches.control), len(matches.check), matches.refused
+    (4, 1, ())
     """
+    near = targets.near
+    for sentence in near.warnings():
+        warnings.warn(sentence, stacklevel=2)
+    return match_silently(targets, survey)
+
+
+def match_silently(targets: FoundTargets, survey: Survey) -> MatchedTargets:
+    """Match targets; this decides for ``check`` and ``correct`` alike.
+
+    Parameters
+    ----------
+    targets, survey
+        As of match_targets.
+
+    Raises
+    ------
+    ValueError
+        As match_targets.
+    """
+    near = targets.near
     if len(targets) == 0:
-        raise ValueError(nothing_found(survey, candidates, near))
-    finding = match_targets(targets, candidates, survey)
-    if len(finding.matches.matched) == 0:
-        reasons = " ".join(refusal.reason for refusal in finding.matches.refusals[:3])
+        raise ValueError(nothing_found(survey, targets.candidates, near))
+    found = match_fitted(survey, targets.targets, targets.candidates)
+    if len(found) == 0:
+        reasons = " ".join(refusal.reason for refusal in found.matches.refusals[:3])
         places = len(np.unique(survey.surveyed.position, axis=0))
         is_twice = 2 * places <= len(survey.surveyed)  # and then the CRS isn't what is wrong
         questions = "Are control and cloud in the same CRS?", "Is each point named twice?"
@@ -369,7 +649,12 @@ def matched_finding(
             f"None of the {len(survey.surveyed)} surveyed targets is among the {len(targets)} that "
             f"were found ({near.intensity_range} there). {reasons} {questions[is_twice]}"
         )
-    return finding
+    return replace(
+        found,
+        scanned=near.scanned,
+        warnings=tuple(near.warnings()),
+        uncovered=tuple(near.beams.outside()),
+    )
 
 
 def nothing_found(survey: Survey, candidates: Candidates, near: NearPoints) -> str:
@@ -417,32 +702,40 @@ def _other_heights(survey, radius):
     )
 
 
-def match_targets(targets: list[PassTarget], candidates: Candidates, survey: Survey) -> Finding:
+def match_fitted(
+    survey: Survey, targets: Sequence[PassTarget], candidates: Candidates
+) -> MatchedTargets:
     """Match fitted targets with the surveyed points.
 
     Parameters
     ----------
-    targets : list of (pass number, FittedTarget)
+    survey : Survey
+    targets : sequence of (pass number, FittedTarget)
     candidates : Candidates
         Their passes and the points without a pose are kept.
-    survey : Survey
     """
-    observations = as_observations(targets)
     matches = match(
-        observations, survey.surveyed, survey.trajectory, survey.pos, survey.search_radius
+        as_observations(targets),
+        survey.surveyed,
+        survey.trajectory,
+        survey.pos,
+        survey.search_radius,
     )
     numbers = np.repeat([n for n, _ in targets], [len(t.cloud) for _, t in targets]).astype(int)
     cloud = PointCloud.concatenate([NO_POINTS, *(t.cloud for _, t in targets)])
     on_targets = replace(candidates, cloud=cloud, pass_number=numbers)
-    return Finding(matches, on_targets, _by_pass_and_time(targets))
+    return MatchedTargets(survey, matches, on_targets, _by_pass_and_time(targets))
 
 
-def unmatched(targets: list[PassTarget], candidates: Candidates, reason: str = "") -> Finding:
-    """The Finding of targets where there is nothing to match.
+def unmatched(
+    survey: Survey, targets: Sequence[PassTarget], candidates: Candidates, reason: str = ""
+) -> MatchedTargets:
+    """Targets where there is nothing to match.
 
     Parameters
     ----------
-    targets : list of (pass number, FittedTarget)
+    survey : Survey
+    targets : sequence of (pass number, FittedTarget)
     candidates : Candidates
     reason : str
         Why none has a name.
@@ -451,7 +744,7 @@ def unmatched(targets: list[PassTarget], candidates: Candidates, reason: str = "
     nothing = observations[np.zeros(len(targets), bool)]
     why = (Statement("not matched", values={"why": reason}),) * len(targets)
     matches = Matches(nothing, observations, (), np.empty(0), why)
-    return Finding(matches, candidates, _by_pass_and_time(targets))
+    return MatchedTargets(survey, matches, candidates, _by_pass_and_time(targets))
 
 
 def _by_pass_and_time(targets):

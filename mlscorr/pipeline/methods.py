@@ -9,7 +9,7 @@ from functools import partial
 from mlscorr import baselines
 from mlscorr.estimate import SETTINGS as ESTIMATE
 from mlscorr.estimate import estimate_correction
-from mlscorr.pipeline.correction import estimate_together
+from mlscorr.pipeline.estimation import estimate_together
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.survey import Survey, TieFeatures
 from mlscorr.targets import Candidates

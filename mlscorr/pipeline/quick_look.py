@@ -9,16 +9,16 @@ import numpy as np
 from mlscorr.io.clouds import read_windows
 from mlscorr.io.tables import nearest_epochs
 from mlscorr.pipeline.finding import (
-    NearPoints,
+    FoundTargets,
     check_found_control,
     fit_while_reading,
-    match_targets,
-    matched_finding,
+    match_fitted,
+    match_silently,
     nothing_found,
 )
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.survey import ControlPoints, Matched, PointCloud, Survey
-from mlscorr.targets import Candidates, PassTarget, search_radius
+from mlscorr.targets import search_radius
 
 
 @dataclass(frozen=True)
@@ -71,31 +71,30 @@ def look_near_control(survey: Survey) -> QuickLook:
     windows = {file: list(_near(survey, file)) for file in survey.clouds}
     survey = replace(survey, control=_affordable(survey, windows))
     start = perf_counter()
-    fitted = _fit(survey, windows)
+    found = _fit(survey, windows)
     seconds = (perf_counter() - start) / len(survey.control)
-    matched, refusal = _decided(whole, fitted)
+    matched, refusal = _decided(whole, found)
     matched = matched[np.isin(matched.name, survey.control.name)]
     fault = doubt = ""
     if 2 * len(set(matched.name)) < len(survey.control):
         fault = _with_sizes_doubled(survey, windows, matched) or _with_other_heights(
             survey, windows, matched
         )
-        doubt = "" if fault else _doubt(survey, matched, *fitted[1:])
+        doubt = "" if fault else _doubt(survey, matched, found)
     return QuickLook(survey.control, matched, fault, refusal, doubt, seconds)
 
 
-def _decided(survey, fitted):
+def _decided(survey, found):
     """What of all surveyed points is matched, and the sentence where a correction refuses that."""
     try:
-        finding = matched_finding(survey, *fitted)
+        matches = match_silently(found, survey)
     except ValueError as error:
         return Matched.none(), str(error)
-    matched = Matched.by_name(finding.matches.matched, survey.surveyed)
     try:
-        check_found_control(survey, finding)
+        check_found_control(matches)
     except ValueError as error:
-        return matched, str(error)
-    return matched, ""
+        return matches.matched, str(error)
+    return matches.matched, ""
 
 
 def spread_points(survey: Survey) -> ControlPoints:
@@ -154,16 +153,15 @@ def _spans(survey):
     return np.column_stack([trajectory.gps_time[starts], trajectory.gps_time[ends]])
 
 
-def _fit(survey, windows) -> tuple[list[PassTarget], Candidates, NearPoints]:
+def _fit(survey, windows) -> FoundTargets:
     """Targets near surveyed points, fitted in what was read."""
     return fit_while_reading(survey, lambda file: iter(windows[file]))
 
 
 def _find(survey, windows) -> Matched:
     """Surveyed targets that are found in what was read."""
-    targets, candidates, _ = _fit(survey, windows)
-    matches = match_targets(targets, candidates, survey).matches
-    return Matched.by_name(matches.matched, survey.control)
+    found = _fit(survey, windows)
+    return match_fitted(survey, found.targets, found.candidates).control
 
 
 def _with_sizes_doubled(survey, windows, matched):
@@ -226,10 +224,11 @@ def _count(matched):
     return len(set(matched.name))
 
 
-def _doubt(survey, matched, candidates, near):
+def _doubt(survey, matched, found):
     """A sentence on what a quick look does not find."""
+    near = found.near
     if not len(matched):
-        return nothing_found(survey, candidates, near)
+        return nothing_found(survey, found.candidates, near)
     return (
         f"A quick look finds {_count(matched)} of the {len(survey.control)} surveyed points that "
         f"it looks at, among {near.points} points ({near.intensity_range}) near them: check kind, "

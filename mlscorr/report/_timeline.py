@@ -6,7 +6,6 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from mlscorr.correction import Correction
-from mlscorr.frames import angles_from_attitude
 from mlscorr.report import style
 from mlscorr.report.correction_report import CorrectionReport, array, ordered
 from mlscorr.report.settings import SETTINGS
@@ -16,13 +15,6 @@ WORDS = {
     "check": "Check point: misclosure before, 1 sigma",
     "unused": "Not used (triangle: beyond the axis)",
 }
-
-
-def attitude_change(correction: Correction) -> np.ndarray:
-    """Corrected - recorded roll, pitch and heading (n, 3). Units: deg."""
-    recorded = np.column_stack(angles_from_attitude(correction.recorded.attitude))
-    corrected = np.column_stack(angles_from_attitude(correction.corrected.attitude))
-    return np.degrees((corrected - recorded + np.pi) % (2 * np.pi) - np.pi)
 
 
 @style.styled
@@ -52,7 +44,9 @@ def attitude_figure(correction: Correction, report: CorrectionReport) -> Figure:
     """
     sigma = np.degrees(correction.corrected.attitude_sigma)
     words = "roll, pitch and heading", ("Roll (deg)", "Pitch (deg)", "Heading (deg)")
-    return _figure(4.4, correction, report, attitude_change(correction), sigma, [], words)
+    return _figure(
+        4.4, correction, report, np.degrees(correction.attitude_change), sigma, [], words
+    )
 
 
 def _figure(height, correction, report, change, sigma, rows, words):

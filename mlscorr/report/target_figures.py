@@ -4,6 +4,7 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Ellipse, Patch, Polygon
@@ -59,6 +60,23 @@ def target_drawings(
     return drawings
 
 
+def draw_target(
+    axes: Axes, target: FittedTarget, name: str | None, pass_number: int, note: str
+) -> None:
+    """Draw a target into axes of a larger figure; a low score is red.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    target : FittedTarget
+    name : str or None
+    pass_number : int
+    note : str
+    """
+    _draw(axes, target)
+    _title(axes, target, name, pass_number, note, target.score < SETTINGS.low_score)
+
+
 def _doubt(row, target):
     """Words where a target was not used, or is hardly like one."""
     if row.role == "check":
@@ -103,9 +121,7 @@ def write_contact_sheet(
             axes = figure.add_subplot(lines, columns, i + 1)
             target = fitted[row["pass"], row["gps_time"]]
             name = row["name"] or f"row {rows.index(row) + 1}"
-            _draw(axes, target)
-            red = target.score < SETTINGS.low_score
-            _title(axes, target, name, row["pass"], f"score {target.score:.2f}", red)
+            draw_target(axes, target, name, row["pass"], f"score {target.score:.2f}")
     Path(path).write_bytes(png(figure))
 
 

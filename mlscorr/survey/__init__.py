@@ -3,6 +3,7 @@
 float64, SI units, radians inside; map axes E, N, H; body axes X right, Y forward, Z up.
 """
 
+from mlscorr.survey._open3d import line_geometry
 from mlscorr.survey.beliefs import SEARCH_RADIUS, Assumption, Pos, Scanner
 from mlscorr.survey.clouds import (
     COORDINATE_ROUNDING,
@@ -14,7 +15,7 @@ from mlscorr.survey.clouds import (
     counted_on,
 )
 from mlscorr.survey.columns import Columns
-from mlscorr.survey.data_frame import AXES, rows_frame
+from mlscorr.survey.data_frame import AXES, columns_frame, rows_frame
 from mlscorr.survey.recording import (
     InputFile,
     MountedScanner,

@@ -25,15 +25,24 @@ position_sigma=None, attitude_sigma=None, session=None, scanned=None, weeks=None
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
 
     def __repr__(self) -> str:
+        rows = self._overview()
+        if rows is not None:
+            return text_table(type(self).__name__, rows)
         parts = (f"{field.name}={_short(getattr(self, field.name))}" for field in fields(self))
         return f"{type(self).__name__}({', '.join(parts)})"
 
     def _repr_html_(self) -> str:
-        return html_table(type(self).__name__, self._overview())
+        rows = self._overview()
+        if rows is None:
+            rows = [(field.name, _short(getattr(self, field.name))) for field in fields(self)]
+        return html_table(type(self).__name__, rows)
 
-    def _overview(self) -> Iterable[Sequence[object]]:
-        """Rows of what a notebook shows; those of one cell are sentences."""
-        return [(field.name, _short(getattr(self, field.name))) for field in fields(self)]
+    def _overview(self) -> Iterable[Sequence[object]] | None:
+        """Rows of a table for terminal and notebook; those of one cell are sentences.
+
+        None where the fields say it.
+        """
+        return None
 
 
 def _short(value):
@@ -50,6 +59,37 @@ def _short(value):
     if len(text) <= LONGEST:
         return text
     return type(value).__name__
+
+
+def text_table(caption: str, rows: Iterable[Sequence[object]]) -> str:
+    """A table in plain text, below its caption.
+
+    Parameters
+    ----------
+    caption : str
+    rows : iterable of sequences
+        One cell alone is a sentence, and takes no part in the widths of columns.
+
+    >>> print(text_table("Survey", [("street",), ("points", 12), ("crs", "EPSG:32650")]))
+    Survey
+      street
+      points  12
+      crs     EPSG:32650
+    """
+    cells = [[str(cell) for cell in row] for row in rows]
+    columns = max(map(len, cells), default=0)
+    widths = [
+        max((len(line[i]) for line in cells if 1 < len(line) > i), default=0)
+        for i in range(columns)
+    ]
+    lines = [caption]
+    for line in cells:
+        if len(line) == 1:
+            lines.append(line[0])
+        else:
+            padded = (cell.ljust(width) for cell, width in zip(line, widths, strict=False))
+            lines.append("  ".join(padded).rstrip())
+    return "\n  ".join(lines)
 
 
 def html_table(caption: str, rows: Iterable[Sequence[object]]) -> str:

@@ -1,5 +1,6 @@
 """Points near a control point -> pieces of cloud by pass and visit -> targets as fitted."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -88,12 +89,12 @@ def _with_motion(targets, survey):
     ]
 
 
-def as_observations(targets: list[PassTarget]) -> TargetObservations:
+def as_observations(targets: Sequence[PassTarget]) -> TargetObservations:
     """Targets as observations without names, in their order.
 
     Parameters
     ----------
-    targets : list of (pass number, FittedTarget)
+    targets : sequence of (pass number, FittedTarget)
     """
     n = len(targets)
     fitted = [target for _, target in targets]

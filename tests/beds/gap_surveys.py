@@ -7,14 +7,14 @@ import numpy as np
 from mlscorr.gap.closure import Surroundings, collect_beams
 from mlscorr.gap.residuals import PatchCollector, Patches, build_rows
 from mlscorr.io.clouds import read_chunks
-from mlscorr.pipeline.finding import Finding, find_or_compare_surfaces
+from mlscorr.pipeline.finding import MatchedTargets, find_or_compare_surfaces
 
 
 @dataclass(frozen=True)
 class Read:
     "What one reading of a survey's clouds gives"
 
-    finding: Finding
+    finding: MatchedTargets
     patches: Patches
     surroundings: Surroundings
 

@@ -8,7 +8,7 @@ import pytest
 from mlscorr.correction import Correction
 from mlscorr.estimate import Support
 from mlscorr.frames import attitude_from_angles
-from mlscorr.report._timeline import attitude_change, correction_figure
+from mlscorr.report._timeline import correction_figure
 from tests.beds.reports import START, drive, fabricate, page, words
 
 
@@ -52,7 +52,7 @@ def test_the_attitude_panel_shows_the_smaller_turn_through_north():
         for a in (359.999, 0.001)
     )
     np.testing.assert_allclose(
-        attitude_change(Correction(old, new)), [[0, 0, 0.002]] * 50, atol=1e-9
+        np.degrees(Correction(old, new).attitude_change), [[0, 0, 0.002]] * 50, atol=1e-9
     )
 
 

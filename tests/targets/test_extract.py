@@ -8,7 +8,6 @@ from scipy.spatial.transform import Rotation
 from mlscorr.frames import attitude_from_angles
 from mlscorr.pipeline.finding import fit_while_reading
 from mlscorr.survey import ControlPoints, Mounting, PointCloud, Scanner, Survey, Trajectory
-from mlscorr.targets import as_observations
 
 ORIGIN = np.array([532_000.0, 3_374_000.0, 42.0])  # m, UTM
 START = 357_700.0  # s of the GPS week
@@ -177,7 +176,7 @@ def survey_of(trajectory, control, clouds=(None,)):
 def find(view, search_radius=10.0):
     survey = survey_of(view.trajectory, view.control)
     survey = replace(survey, search_radius=search_radius)
-    return as_observations(fit_while_reading(survey, lambda _: [view.cloud])[0])
+    return fit_while_reading(survey, lambda _: [view.cloud]).observations
 
 
 @dataclass(frozen=True)

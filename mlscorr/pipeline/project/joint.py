@@ -13,8 +13,8 @@ from scipy.sparse.csgraph import connected_components
 from mlscorr.estimate import Estimate
 from mlscorr.io.store import digest
 from mlscorr.io.trajectories import join_sessions, with_sigmas
-from mlscorr.pipeline.correction import estimate_together
-from mlscorr.pipeline.finding import Finding
+from mlscorr.pipeline.estimation import estimate_together
+from mlscorr.pipeline.finding import MatchedTargets
 from mlscorr.survey import (
     WEEK,
     ControlPoints,
@@ -37,14 +37,14 @@ class FoundDrive:
     ----------
     survey : Survey
         With the surveyed points near its clouds.
-    finding : Finding
+    finding : MatchedTargets
     features : TieFeatures
         With the numbers of its passes.
     control, check : Matched
     """
 
     survey: Survey
-    finding: Finding
+    finding: MatchedTargets
     features: TieFeatures
     control: Matched
     check: Matched

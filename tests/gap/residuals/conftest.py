@@ -5,7 +5,7 @@ import pytest
 
 from mlscorr.gap.residuals import build_rows, find_patches
 from mlscorr.io.surveys import read_survey
-from mlscorr.pipeline.finding import find_targets
+from mlscorr.pipeline.finding import find_targets, match_targets
 from mlscorr.simulate import Scenario, simulate
 from tests.beds.gap_surveys import write_reference
 
@@ -38,7 +38,7 @@ def survey(simulated, tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def targets(survey):
-    found = find_targets(survey)
+    found = match_targets(find_targets(survey), survey)
     matches = found.matches
     candidates = found.candidates
     return matches.matched, candidates

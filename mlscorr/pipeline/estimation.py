@@ -1,0 +1,345 @@
+"""From matched targets to the POS error, and what remains at them: stages of ``correct``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from mlscorr.estimate import (
+    SETTINGS,
+    Estimate,
+    believed_correction,
+    check_order,
+    estimate_correction,
+    find_mounting_error,
+    mounting_warnings,
+    scanner_warnings,
+)
+from mlscorr.evaluate import Score
+from mlscorr.evaluate import score as score_matched
+from mlscorr.pipeline.finding import MatchedTargets
+from mlscorr.pipeline.ties import TiedSurvey
+from mlscorr.survey import (
+    Matched,
+    Summary,
+    Survey,
+    TieFeatures,
+    check_survey,
+    columns_frame,
+    rows_frame,
+)
+from mlscorr.ties import tie_passes
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.figure import Figure
+
+LEFT_OUT = (
+    'What two passes both saw was left out, as asked: --no-ties, or use = "off" of [ties] in '
+    "survey.toml."
+)
+
+
+class PosErrorEstimate(Estimate):
+    """The POS error over time, as control points and ties tell it.
+
+    ``correction`` moves points, ``left_out`` is what remains at each control observation once its
+    target takes no part, ``tests`` and ``outliers`` say which targets the others contradict,
+    ``parameters`` are those of the most probable covariance function, ``warnings`` what to mind.
+    """
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A row for each epoch: what is added to the pose, with sigmas; pandas is needed for it.
+
+        Positions in m, angles in degrees.
+        """
+        correction = self.correction
+        corrected = correction.corrected
+        change = np.degrees(correction.attitude_change)
+        return columns_frame(
+            {
+                "gps_time": corrected.gps_time,
+                "shift": corrected.position - correction.recorded.position,
+                "shift_sigma": corrected.position_sigma,
+                **dict(zip(("roll", "pitch", "heading"), change.T, strict=True)),
+                "angle_sigma": np.degrees(corrected.attitude_sigma),
+            }
+        )
+
+    def plot(self) -> Figure:
+        """The correction of the position over time, with its sigma."""
+        from mlscorr.report import pos_error_figure
+
+        return pos_error_figure(self)
+
+    def to_open3d(self, origin: np.ndarray | None = None, color: str = "correction") -> Any:
+        """The corrected trajectory as lines, broken at its gaps.
+
+        Parameters
+        ----------
+        origin : (3,) array, optional
+            As of ``PointCloud.to_open3d``.
+        color : str
+            ``correction`` by its 3D length, or ``sigma`` by the 3D sigma after the estimate. The
+            values are the attribute of that name of the lines, in m.
+
+        Returns
+        -------
+        open3d.t.geometry.LineSet
+
+        Raises
+        ------
+        ValueError
+            For another colour.
+        """
+        from mlscorr.report import correction_lines
+
+        return correction_lines(self.correction, origin, color)
+
+    def _overview(self):
+        """The size of the correction, its sigma, what it rests on."""
+        corrected = self.correction.corrected
+        length = np.linalg.norm(corrected.position - self.correction.recorded.position, axis=1)
+        sigma = np.linalg.norm(corrected.position_sigma, axis=1)
+        rows = [
+            ("control observations", f"{int(self.used.sum())} of {len(self.used)} used"),
+            ("correction, 3D (m)", f"median {np.median(length):.3f}, largest {length.max():.3f}"),
+            ("its sigma, 3D (m)", f"median {np.median(sigma):.3f}, largest {sigma.max():.3f}"),
+            ("order of the trend", self.order),
+            ("sigma0", f"{self.sigma0:.2f}"),
+        ]
+        if self.ties is not None:
+            rows.append(("ties", f"{int(self.ties.used.sum())} of {len(self.ties.used)} used"))
+        rows += [("contradicted by the others", test.name) for test in self.outliers]
+        return [*rows, *((sentence,) for sentence in self.warnings)]
+
+
+def estimate_pos_error(
+    survey: Survey,
+    matches: MatchedTargets,
+    ties: TiedSurvey | TieFeatures | None = None,
+    order: int = SETTINGS.order,
+) -> PosErrorEstimate:
+    """Estimate the POS error over time from matched control points, and from ties of passes.
+
+    Least squares collocation: l = A x + B s + n, with a polynomial trend x and a signal s that is
+    correlated over time  (Mao et al. 2015, Eq. 13-15).
+
+    Parameters
+    ----------
+    survey : Survey
+    matches : MatchedTargets
+        Check points among them take no part.
+    ties : TiedSurvey or TieFeatures, optional
+        What ``find_ties`` gives, or the ``features`` of ``find_targets(..., with_ties=True)``.
+    order : int
+        Of the polynomial trend of the position error.
+
+    Returns
+    -------
+    PosErrorEstimate
+
+    Raises
+    ------
+    ValueError
+        Without a control point and without ties, and for an order that is none.
+
+    >>> import mlscorr, numpy as np, tempfile
+    >>> from mlscorr.simulate import Scenario, simulate
+    >>> folder = tempfile.mkdtemp()
+    >>> short = Scenario(
+    ...     drive={"duration": 8.0},
+    ...     targets={"control": 4, "check": 1},
+    ...     scanner=[{"lines_per_second": 75, "points_per_line": 400}],
+    ... )
+    >>> simulate(short, np.random.default_rng(1)).write(folder)
+    >>> survey = mlscorr.read_survey(folder)
+    >>> matches = mlscorr.match_targets(mlscorr.find_targets(survey), survey)
+    >>> estimate = mlscorr.estimate_pos_error(survey, matches)
+    >>> float(np.abs(estimate.left_out).max()) < 0.1
+    True
+    """
+    check_survey(survey)
+    check_order(order)
+    control = matches.control
+    if len(control) == 0 and ties is None:
+        raise ValueError(
+            "No control point is among the matched targets, and no ties are given: nothing tells "
+            "the POS error. Match some control points, or give what mlscorr.find_ties returns."
+        )
+    features = ties.features if isinstance(ties, TiedSurvey) else ties
+    trajectory = survey.trajectory.scanned_at(matches.candidates.seconds)
+    scanned = replace(survey, trajectory=trajectory)
+    return PosErrorEstimate(**vars(estimate_together(scanned, control, features, order)))
+
+
+@threadpool_limits.wrap(limits=1, user_api="blas")  # more threads, other last digits
+def estimate_together(
+    survey: Survey, control: Matched, features: TieFeatures | None, order: int
+) -> Estimate:
+    """The POS error by matched control points, and by what two passes both saw.
+
+    Parameters
+    ----------
+    survey : Survey
+    control : Matched
+        Without any, ties alone bring passes together where the POS says that they are.
+    features : TieFeatures or None
+        None where ties are left out.
+    order : int
+        Of the trend.
+    """
+    if len(control):
+        estimate = estimate_correction(survey.trajectory, control, survey.pos, order)
+    else:
+        estimate = believed_correction(survey.trajectory, survey.pos)
+    if features is None:
+        return replace(estimate, untied=LEFT_OUT)
+    estimate = tie_passes(survey, estimate, features)
+    sentences = ()  # on mountings, where the ties tell of wrong ones
+    if estimate.equations.mounting is not None:
+        sentences = tuple(scanner_warnings(estimate, list(survey.by_scanner)))
+    if not sentences and None not in survey.mountings:  # all of them may be wrong alike
+        error = find_mounting_error(estimate, control, survey.mountings)
+        sentences = mounting_warnings(error, len(survey.mountings))
+    return replace(estimate, notes=(*estimate.notes, *sentences))
+
+
+def control_score(estimate: Estimate, control: Matched) -> Score:
+    """What remains at the control points; one that the others contradict scores nowhere.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        By these.
+    control : Matched
+    """
+    used = estimate.used
+    sigma = np.vstack([np.empty((0, 3)), *(test.sigma for test in estimate.tests)])
+    return score_matched(control[used], estimate.correction, estimate.left_out[used], sigma)
+
+
+def check_score(estimate: Estimate, check: Matched) -> Score:
+    """What remains at the check points, with the sigma to be expected.
+
+    Parameters
+    ----------
+    estimate : Estimate
+    check : Matched
+    """
+    corrected = estimate.correction.corrected
+    there = corrected.at(check.gps_time).position_sigma
+    sigma = np.sqrt(check.variance + there**2)
+    return score_matched(check, estimate.correction, sigma=sigma)
+
+
+@dataclass(frozen=True, repr=False)
+class Scores(Summary):
+    """What remains at surveyed points: RMSE of misclosures before and after the correction.
+
+    ``scores.check.after.rmse`` are the five numbers E, N, H, horizontal and 3D, in m.
+
+    Parameters
+    ----------
+    control, check : Score
+        ``before``, ``after``, and of control points ``left_out`` (leave-one-out).
+    by_kind : mapping
+        Score by (role, kind of target).
+    """
+
+    control: Score
+    check: Score
+    by_kind: Mapping[tuple[str, str], Score]
+
+    def _rows(self):
+        """Role, kind, state and Statistics of all that is known."""
+        scores = {("control", "all"): self.control, ("check", "all"): self.check, **self.by_kind}
+        for (role, kind), score_of in scores.items():
+            states = {
+                "before": score_of.before,
+                "after": score_of.after,
+                "leave-one-out": score_of.left_out,
+            }
+            for state, statistics in states.items():
+                if statistics is not None and statistics.n:
+                    yield role, kind, state, statistics
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A row for each role, kind of target and state; pandas is needed for it. Units: m."""
+        return rows_frame(
+            {"role": role, "kind": kind, "state": state, "n": statistics.n, **statistics.document()}
+            for role, kind, state, statistics in self._rows()
+        )
+
+    def plot(self) -> Figure:
+        """RMSE before, after and leave-one-out, axis by axis."""
+        from mlscorr.report import score_figure
+
+        return score_figure({"Control points": self.control, "Check points": self.check})
+
+    def _overview(self):
+        """RMSE of each role; kinds where there are several."""
+        several = len({kind for _, kind in self.by_kind}) > 1
+        rows = [("RMSE (m)", "kind", "state", "n", "east", "north", "height", "3D")]
+        for role, kind, state, statistics in self._rows():
+            if kind == "all" or several:
+                rmse = (f"{value:.4f}" for value in statistics.rmse[[0, 1, 2, 4]])
+                rows.append((role, kind, state, statistics.n, *rmse))
+        return rows
+
+
+def score(estimate: Estimate, matches: MatchedTargets) -> Scores:
+    """Compare observed targets with their surveyed places, before and after a correction.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        As ``estimate_pos_error`` gives it for these matches.
+    matches : MatchedTargets
+
+    Returns
+    -------
+    Scores
+        By role, kind of target and component.
+
+    Raises
+    ------
+    ValueError
+        When the estimate is of other control observations.
+
+    >>> import mlscorr, numpy as np, tempfile
+    >>> from mlscorr.simulate import Scenario, simulate
+    >>> folder = tempfile.mkdtemp()
+    >>> short = Scenario(
+    ...     drive={"duration": 8.0},
+    ...     targets={"control": 4, "check": 1},
+    ...     scanner=[{"lines_per_second": 75, "points_per_line": 400}],
+    ... )
+    >>> simulate(short, np.random.default_rng(1)).write(folder)
+    >>> survey = mlscorr.read_survey(folder)
+    >>> matches = mlscorr.match_targets(mlscorr.find_targets(survey), survey)
+    >>> scores = mlscorr.score(mlscorr.estimate_pos_error(survey, matches), matches)
+    >>> bool((scores.check.after.rmse < scores.check.before.rmse).all())
+    True
+    """
+    control = matches.control
+    check = matches.check
+    if len(control) != len(estimate.used):
+        raise ValueError(
+            f"The estimate rests on {len(estimate.used)} control observations, and the matches "
+            f"hold {len(control)}: give those by which mlscorr.estimate_pos_error made it."
+        )
+    by_kind = {}
+    for kind in dict.fromkeys(control.surveyed.kind):
+        rows = np.array(control.surveyed.kind) == kind
+        of_kind = rows & estimate.used
+        left_out = estimate.left_out[of_kind]
+        by_kind["control", kind] = score_matched(control[of_kind], estimate.correction, left_out)
+    for kind in dict.fromkeys(check.surveyed.kind):
+        rows = np.array(check.surveyed.kind) == kind
+        by_kind["check", kind] = check_score(estimate, check[rows])
+    return Scores(control_score(estimate, control), check_score(estimate, check), by_kind)

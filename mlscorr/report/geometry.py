@@ -1,0 +1,157 @@
+"""Targets, trajectories and misclosures as lines of Open3D, in the colours of the report."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.colors import to_rgb
+
+from mlscorr.correction import Correction
+from mlscorr.report.render import colour_table, percentiles
+from mlscorr.report.style import BLUE, MARKS, VERMILLION
+from mlscorr.survey import Matched, TargetObservations, Trajectory, line_geometry
+
+CORNERS = 48  # of a circle as a polygon: no corner is seen
+ROUND = ("circle", "hole")  # kinds with a circular outline
+
+
+def target_lines(
+    observations: TargetObservations, origin: np.ndarray | None, enlarged: float
+) -> Any:
+    """Outlines of targets, and about each centre the ellipsoid of one sigma.
+
+    Parameters
+    ----------
+    observations : TargetObservations
+    origin : (3,) array or None
+        As of ``PointCloud.to_open3d``.
+    enlarged : float
+        Factor by which ellipsoids are drawn larger than they are.
+
+    Returns
+    -------
+    open3d.t.geometry.LineSet
+        Outlines blue, ellipsoids red.
+    """
+    loops = []
+    colors = []
+    for row in range(len(observations)):
+        centre = observations.position[row]
+        loops.append(centre + _outline(observations, row))
+        colors.append(BLUE)
+        values, axes = np.linalg.eigh(observations.covariance[row])
+        half = enlarged * np.sqrt(np.maximum(values, 0.0)) * axes
+        for one, other in ((0, 1), (1, 2), (2, 0)):
+            loops.append(centre + _circle() @ np.stack([half[:, one], half[:, other]]))
+            colors.append(VERMILLION)
+    return _loops(loops, colors, origin)
+
+
+def misclosure_lines(control: Matched, check: Matched, origin: np.ndarray | None) -> Any:
+    """Lines from observed centres to surveyed places, control black and check points red.
+
+    Parameters
+    ----------
+    control, check : Matched
+    origin : (3,) array or None
+        As of ``PointCloud.to_open3d``.
+    """
+    roles = control, check
+    observed = [matched.observations.position for matched in roles]
+    surveyed = [matched.surveyed.position for matched in roles]
+    places = np.vstack([*observed, *surveyed])
+    pairs = np.arange(len(places)).reshape(2, -1).T
+    colors = np.array(
+        [to_rgb(MARKS["control"]["color"])] * len(control)
+        + [to_rgb(MARKS["check"]["color"])] * len(check)
+    ).reshape(-1, 3)
+    return line_geometry(places, pairs, origin, {"colors": colors})
+
+
+def correction_lines(correction: Correction, origin: np.ndarray | None, color: str) -> Any:
+    """The corrected trajectory, coloured by how far it was moved or by its sigma.
+
+    Parameters
+    ----------
+    correction : Correction
+    origin : (3,) array or None
+        As of ``PointCloud.to_open3d``.
+    color : str
+        ``correction`` or ``sigma``.
+
+    Raises
+    ------
+    ValueError
+        For another colour, and for the sigma of a correction that has none.
+    """
+    corrected = correction.corrected
+    if color == "correction":
+        values = np.linalg.norm(corrected.position - correction.recorded.position, axis=1)
+    elif color == "sigma":
+        if corrected.position_sigma is None:
+            raise ValueError("The corrected trajectory has no sigma: take color='correction'.")
+        values = np.linalg.norm(corrected.position_sigma, axis=1)
+    else:
+        raise ValueError(f"color = {color!r} is none of 'correction', 'sigma'.")
+    return path_lines(corrected, origin, {color: values})
+
+
+def path_lines(
+    trajectory: Trajectory, origin: np.ndarray | None, values: dict[str, np.ndarray]
+) -> Any:
+    """A trajectory as lines between epochs, broken at its gaps.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    origin : (3,) array or None
+        As of ``PointCloud.to_open3d``.
+    values : dict
+        One array (n,) of the epochs by its name, which colours the lines and is their attribute.
+    """
+    first = np.arange(len(trajectory) - 1)
+    first = first[~np.isin(trajectory.gps_time[:-1], trajectory.gaps[:, 0])]
+    attributes = {}
+    for name, of_epoch in values.items():
+        of_line = (of_epoch[first] + of_epoch[first + 1]) / 2
+        low, high = percentiles(of_line)
+        share = np.clip((of_line - low) / max(high - low, np.finfo(float).tiny), 0, 1)
+        attributes["colors"] = colour_table("sigma")[np.rint(255 * share).astype(int)] / 255
+        attributes[name] = of_line
+    pairs = np.column_stack([first, first + 1])
+    return line_geometry(trajectory.position, pairs, origin, attributes)
+
+
+def _outline(observations, row):
+    """Corners (k, 3) of a target's outline, from its centre. Units: m."""
+    normal = observations.normal[row]
+    up = np.array([0.0, 0.0, 1.0])
+    if abs(normal @ up) > np.sqrt(0.5):
+        up = np.array([0.0, 1.0, 0.0])
+    across = np.cross(up, normal)
+    across /= np.linalg.norm(across)
+    axes = observations.size[row] / 2 * np.stack([across, np.cross(normal, across)])
+    if observations.kind[row] in ROUND:
+        return _circle() @ axes
+    return np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) @ axes
+
+
+def _circle():
+    """Points (k, 2) of the unit circle."""
+    angle = np.linspace(0, 2 * np.pi, CORNERS, endpoint=False)
+    return np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def _loops(loops, colors, origin):
+    """Closed polygons as a line set."""
+    pairs = [np.empty((0, 2), int)]
+    start = 0
+    for loop in loops:
+        number = start + np.arange(len(loop))
+        pairs.append(np.column_stack([number, np.roll(number, -1)]))
+        start += len(loop)
+    shades = [np.tile(to_rgb(c), (len(loop), 1)) for c, loop in zip(colors, loops, strict=True)]
+    points = np.concatenate([np.empty((0, 3)), *loops])
+    shade = np.concatenate([np.empty((0, 3)), *shades])
+    return line_geometry(points, np.concatenate(pairs), origin, {"colors": shade})

@@ -1,0 +1,177 @@
+"""Points and lines as Open3D's tensor geometries, about an origin that travels with them.
+
+Open3D draws in float32, which at map coordinates holds half a metre: positions are therefore about
+an origin near them, in float64, and each point has it as its attribute ``origin``. That attribute
+takes no memory of its own until Open3D makes a new geometry, and survives what Open3D does with
+points: selecting, cropping, appending.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+OWN = ("positions", "gps_time", "intensity", "origin")  # what a PointCloud has a place for
+
+
+def is_geometry(value: object) -> bool:
+    """Whether a value is a geometry of Open3D, which is not loaded for it."""
+    return type(value).__module__.startswith("open3d") or any(
+        kind.__module__.startswith("open3d") for kind in type(value).__mro__
+    )
+
+
+def cloud_geometry(
+    xyz: np.ndarray, attributes: Mapping[str, np.ndarray], origin: np.ndarray | None
+) -> Any:
+    """A tensor point cloud that shares the memory of its attributes.
+
+    Parameters
+    ----------
+    xyz : (n, 3) array
+        Units: m.
+    attributes : mapping
+        Arrays (n,) or (n, k).
+    origin : (3,) array or None
+        The whole metre below the middle of the points without one. Units: m.
+    """
+    geometry = _open3d().t.geometry.PointCloud()
+    origin = chosen_origin(xyz, origin)
+    geometry.point["positions"] = _tensor(xyz - origin)
+    for name, values in attributes.items():
+        geometry.point[name] = _tensor(_columns(values))
+    geometry.point["origin"] = _repeated(origin, len(xyz))
+    return geometry
+
+
+def line_geometry(
+    points: np.ndarray,
+    pairs: np.ndarray,
+    origin: np.ndarray | None,
+    attributes: Mapping[str, np.ndarray],
+) -> Any:
+    """A tensor line set.
+
+    Parameters
+    ----------
+    points : (n, 3) array
+        Units: m.
+    pairs : (k, 2) int array
+        Numbers of the points that a line joins.
+    origin : (3,) array or None
+        As of cloud_geometry.
+    attributes : mapping
+        Arrays (k, ...) of the lines; ``colors`` (k, 3) from 0 to 1.
+    """
+    geometry = _open3d().t.geometry.LineSet()
+    origin = chosen_origin(points, origin)
+    geometry.point["positions"] = _tensor(points - origin)
+    geometry.point["origin"] = _repeated(origin, len(points))
+    geometry.line["indices"] = _tensor(np.asarray(pairs, np.int32).reshape(-1, 2))
+    for name, values in attributes.items():
+        geometry.line[name] = _tensor(_columns(values))
+    return geometry
+
+
+def chosen_origin(xyz: np.ndarray, origin: np.ndarray | None) -> np.ndarray:
+    """The origin (3,) that is asked for, or a whole metre near the middle of points. Units: m.
+
+    Raises
+    ------
+    ValueError
+        For an origin that is no place.
+    """
+    if origin is None:
+        if len(xyz) == 0:
+            return np.zeros(3)
+        return np.floor((np.min(xyz, axis=0) + np.max(xyz, axis=0)) / 2)
+    place = np.asarray(origin, float)
+    if place.shape != (3,) or not np.isfinite(place).all():
+        raise ValueError(
+            f"origin = {origin!r} is no place: give three finite numbers, E, N, H in m."
+        )
+    return place
+
+
+def geometry_columns(geometry: Any, origin: np.ndarray | None) -> tuple[np.ndarray, dict]:
+    """Positions (n, 3) in the map, and the attributes of a tensor or legacy point cloud.
+
+    Parameters
+    ----------
+    geometry : open3d.t.geometry.PointCloud
+    origin : (3,) array or None
+        Of its positions, where the geometry has none. Units: m.
+
+    Returns
+    -------
+    xyz : (n, 3) array
+        Units: m.
+    attributes : dict
+        Arrays (n,) or (n, k), which share the geometry's memory.
+
+    Raises
+    ------
+    ValueError
+        For another geometry, or one without points.
+    """
+    point = getattr(geometry, "point", None)
+    if point is None or not hasattr(geometry, "voxel_down_sample"):
+        raise ValueError(
+            f"An open3d.t.geometry.PointCloud belongs where {type(geometry).__name__} was given: a "
+            "legacy cloud has no gps_time. Give a tensor cloud with the point attribute gps_time."
+        )
+    attributes = {name: _array(point[name]) for name in point}
+    if "positions" not in attributes:
+        raise ValueError("The Open3D cloud has no positions: an empty cloud can't be corrected.")
+    positions = attributes.pop("positions")
+    places = attributes.pop("origin", None)
+    if origin is not None:
+        place = chosen_origin(positions, origin)
+    elif places is not None and len(places):
+        if np.ptp(places, axis=0).any():
+            place = places.astype(float)
+        else:
+            place = places[0]
+    else:
+        place = np.zeros(3)
+    return positions + place, attributes
+
+
+def has_origin(geometry: Any) -> bool:
+    """Whether an Open3D geometry says where its origin lies."""
+    return "origin" in getattr(geometry, "point", ())
+
+
+def _open3d():
+    import open3d
+
+    return open3d
+
+
+def _tensor(values):
+    """A tensor on top of an array's memory."""
+    return _open3d().core.Tensor.from_numpy(np.ascontiguousarray(values))
+
+
+def _repeated(origin, n):
+    """The origin as (n, 3) rows that are all the same memory."""
+    rows = np.lib.stride_tricks.as_strided(np.array(origin, float), (n, 3), (0, 8))
+    return _open3d().core.Tensor.from_numpy(rows)
+
+
+def _columns(values):
+    """Values (n,) as a column, which Open3D asks for."""
+    values = np.asarray(values)
+    if values.ndim == 1:
+        return values[:, None]
+    return values
+
+
+def _array(tensor):
+    """A tensor's memory as an array, (n,) of one column."""
+    values = tensor.cpu().numpy()
+    if values.ndim == 2 and values.shape[1] == 1:
+        return values[:, 0]
+    return values
