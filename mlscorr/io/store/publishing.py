@@ -13,8 +13,7 @@ from time import monotonic, sleep
 from typing import Any, TextIO, cast
 
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.store.opening import read_bytes
-from mlscorr.io.store.storage import WEB, asking, check_bucket, is_remote, is_there
+from mlscorr.io.store.storage import WEB, asking, check_bucket, is_remote, is_there, read_bytes
 from mlscorr.wording import counted
 
 S3 = ("s3", "s3a")  # schemes of stores that take a file in parts, side by side

@@ -1,16 +1,30 @@
-"""Surveyed targets from control.csv, and from lists as others write them."""
+"""Surveyed targets from control.csv, and from lists as others write them.
+
+Of a list, all faults in its rows are told at once, and what is doubtful warns.
+"""
 
 import re
 import warnings
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-from mlscorr.io.store import ENCODING, as_path, open_file, shown, warn_of_cut
-from mlscorr.io.tables._sheets import SUFFIX
-from mlscorr.io.tables.column_names import CONTROL_NAMES, WORDS, meant, same_word
-from mlscorr.io.tables.control_faults import doubled_names, refuse, row_doubts, row_faults
+from mlscorr.io.settings import SETTINGS
+from mlscorr.io.store import (
+    ENCODING,
+    OpenPlace,
+    OpenQuestion,
+    as_path,
+    nearest,
+    open_file,
+    shown,
+    warn_of_cut,
+)
+from mlscorr.io.tables.column_names import CONTROL_NAMES, WORDS, ControlSection, meant, same_word
 from mlscorr.io.tables.control_lists import (
     HINTS,
     NORMAL,
@@ -27,14 +41,15 @@ from mlscorr.io.tables.control_lists import (
     word_places,
 )
 from mlscorr.io.tables.layout_search import read_layout
-from mlscorr.io.tables.table_rows import read_rows
-from mlscorr.io.tables.table_sections import ControlSection
+from mlscorr.io.tables.table_rows import SUFFIX, read_rows
 from mlscorr.survey import AXES, ControlPoints, Trajectory
 
-COLUMNS = ("name", *AXES, *SIGMAS, "kind", "size", "role")
-ROLES = tuple(WORDS["role"])
-SEXAGESIMAL = re.compile(r"-?\d{1,3}[°: ]\s*\d{1,2}['′: ]")  # degrees and minutes
-NOTHING_GIVEN = ControlSection(file="")
+_OWN_WORDS = "Say under [control] words in survey.toml what an office's own words mean."
+_AMBIGUOUS = {"cp": " It is short for control point and for check point alike: write gcp or check."}
+_COLUMNS = ("name", *AXES, *SIGMAS, "kind", "size", "role")
+_ROLES = tuple(WORDS["role"])
+_SEXAGESIMAL = re.compile(r"-?\d{1,3}[°: ]\s*\d{1,2}['′: ]")  # degrees and minutes
+_NOTHING_GIVEN = ControlSection(file="")
 
 
 class ControlList(NamedTuple):
@@ -54,7 +69,7 @@ class ControlList(NamedTuple):
 
 
 def read_control(
-    path: str | Path, section: ControlSection = NOTHING_GIVEN, trajectory: Trajectory | None = None
+    path: str | Path, section: ControlSection = _NOTHING_GIVEN, trajectory: Trajectory | None = None
 ) -> ControlList:
     """Points of control.csv, or of a list as total stations and offices write it.
 
@@ -85,7 +100,7 @@ def read_control(
         used and may be that of the roles.
     """
     rules = CONTROL_NAMES, lacking, section.columns.chosen, unnamed_columns, HINTS
-    layout = read_layout(path, COLUMNS, (NORMAL,), *rules)
+    layout = read_layout(path, _COLUMNS, (NORMAL,), *rules)
     layout, given = (layout, {}) if layout.is_own else complete(layout, section, NORMAL)
     lines = list(read_rows(layout, exact=True))
     if not lines:
@@ -93,7 +108,7 @@ def read_control(
     meanings = section.meanings
     rows, faults = _values(layout, lines, meanings)
     rows = [given | row for row in rows]  # of a word's own size before that of all points
-    refuse(path, [*faults, *doubled_names(path, rows)])
+    _refuse(path, [*faults, *_doubled_names(path, rows)])
     if not layout.is_own:
         check_unused(layout, [cells for _, cells in lines], given, meanings)
         for doubt in () if section.check else role_doubts(layout, [cells for _, cells in lines]):
@@ -101,14 +116,14 @@ def read_control(
     has_axes = "x" in layout.columns
     layout, rows = placed(layout, with_check_points(path, rows, section.check), trajectory)
     points = [(f"{shown(row['name'])} of {path}", row) for row in rows]
-    faults = [(who, fault) for who, row in points for fault in row_faults(row)]
+    faults = [(who, fault) for who, row in points for fault in _row_faults(row)]
     unknown = unknown_words(layout, [cells for _, cells in lines], meanings)
-    others = [row | {"kind": next(iter(WORDS["kind"])), "role": ROLES[0]} for row in rows]
-    is_mended = not any(fault for row in others for fault in row_faults(row))
-    refuse(path, faults, word_places(unknown) if is_mended else ())
-    for doubt in row_doubts(path, rows):
+    others = [row | {"kind": next(iter(WORDS["kind"])), "role": _ROLES[0]} for row in rows]
+    is_mended = not any(fault for row in others for fault in _row_faults(row))
+    _refuse(path, faults, word_places(unknown) if is_mended else ())
+    for doubt in _row_doubts(path, rows):
         warnings.warn(doubt, stacklevel=2)
-    control, check = (_points([row for row in rows if row["role"] == role]) for role in ROLES)
+    control, check = (_points([row for row in rows if row["role"] == role]) for role in _ROLES)
     if layout.sheet is None and layout.encoding != "utf-16":
         warn_of_cut(path)
     is_plain = layout.is_own and not layout.unused
@@ -177,7 +192,7 @@ def _value(layout, name, cell, meanings):
         number = layout.number(cell) * layout.factors.get(name, 1.0)
     except ValueError:
         angle = " It looks like an angle: project it to m, in the crs of survey.toml."
-        way_out = angle * bool(SEXAGESIMAL.match(cell))
+        way_out = angle * bool(_SEXAGESIMAL.match(cell))
         raise ValueError(
             f"has the {name} '{shown(cell)}', which is not a number.{way_out}"
         ) from None
@@ -204,5 +219,156 @@ def _points(rows):
     )
 
 
-NO_POINTS = _points([])
-NOTHING_SURVEYED = ControlList(NO_POINTS, NO_POINTS)
+_NO_POINTS = _points([])
+NOTHING_SURVEYED = ControlList(_NO_POINTS, _NO_POINTS)
+
+
+class ListError(OpenQuestion):
+    """Faults in the rows of a file, and their number.
+
+    Parameters
+    ----------
+    sentence : str
+    number : int
+    places : sequence of OpenPlace
+        What survey.toml must say, where that mends all of them.
+    """
+
+    def __init__(self, sentence: str, number: int, places: Sequence[OpenPlace] = ()):
+        super().__init__(sentence, places)
+        self.number = number
+
+
+def _refuse(
+    path: str | Path, faults: Iterable[tuple[object, str]], places: Sequence[OpenPlace] = ()
+) -> None:
+    """Raise all that is wrong with the rows of a file at once, what is wrong alike as one.
+
+    Parameters
+    ----------
+    path : path
+    faults : iterable of (str, str)
+        Who has it, and what is wrong: words that begin with has.
+    places : sequence of OpenPlace
+        As of ListError.
+
+    Raises
+    ------
+    ListError
+        Where anything is.
+    """
+    groups: dict[str, list[object]] = {}
+    for who, what in faults:
+        groups.setdefault(what, []).append(who)
+    sentences = [
+        f"{who} {what}" if not more else f"{who} and {len(more)} more have{what[len('has') :]}"
+        for what, (who, *more) in groups.items()
+    ]
+    number = len(sentences)
+    limit = SETTINGS.named_faults
+    if number > 1:
+        if number > limit:
+            more = [f"And {number - limit} more like these."]
+        else:
+            more = []
+        sentences = [f"{path} has {number} faults.", *sentences[:limit], *more]
+    if places:
+        sentences.append(_OWN_WORDS)
+    if sentences:
+        raise ListError(" ".join(sentences), number, places)
+
+
+def _doubled_names(
+    path: str | Path, rows: Sequence[dict[str, Any]]
+) -> Iterator[tuple[object, str]]:
+    """The pair (file, what is wrong) of names that stand more than once.
+
+    Parameters
+    ----------
+    path : path
+    rows : sequence of dict
+    """
+    count = Counter(row.get("name", "") for row in rows)
+    doubled = [name for name, number in count.items() if number > 1 and name]
+    if doubled:
+        names = shown(", ".join(doubled))
+        yield path, f"names {names} more than once; every point needs a name of its own."
+
+
+def _row_faults(row: dict[str, Any]) -> Iterator[str]:
+    """What is wrong with each value of a point's row that can't be meant.
+
+    Parameters
+    ----------
+    row : dict
+    """
+    smallest, largest = SETTINGS.target_size
+    for key, words in WORDS.items():
+        if row[key] not in words:
+            near = nearest(row[key], words) if key == "kind" else None  # words of roles are alike
+            yield (
+                f"has the unknown {key} '{shown(row[key])}'; known are {_known(words)}."
+                f"{f' Is {near} meant?' if near else ''}{_AMBIGUOUS.get(row[key], '')}"
+            )
+    if not smallest <= row["size"] <= largest:
+        yield (
+            f"has the size {row['size']:g} m, outside [{smallest:g}, {largest:g}] m: "
+            f"{_likely_unit(row['size'])}"
+        )
+    for key in AXES:
+        if abs(row[key]) > SETTINGS.largest_coordinate:
+            yield (
+                f"has the {key} {row[key]:g} m, beyond {SETTINGS.largest_coordinate:g} m: "
+                "no map reaches that far (millimetres?)."
+            )
+    for key in SIGMAS:
+        if row[key] <= 0:
+            yield f"has the {key} {row[key]:g} m; it must be greater than zero."
+    normal = [row.get(name, np.nan) for name in NORMAL]
+    if np.isfinite(normal).any() and not (np.isfinite(normal).all() and np.any(normal)):
+        yield f"has the normal {normal}; give three numbers, not all zero, or none."
+
+
+def _known(words):
+    """Our words, each with those of others."""
+    translated = [f"{our} ({', '.join(others)})" for our, others in words.items() if others]
+    untranslated = [our for our, others in words.items() if not others]
+    return ", ".join([*translated, *untranslated])
+
+
+def _likely_unit(size):
+    """What may be meant by a size that can't be metres."""
+    if size <= 0:
+        return "a diameter or edge is positive."
+    smallest, largest = SETTINGS.target_size
+    sizes = {"centimetres": size / 100, "millimetres": size / 1000}
+    usual = np.sqrt(smallest * largest)
+    unit = min(sizes, key=lambda unit: abs(np.log(sizes[unit] / usual)))
+    if smallest <= sizes[unit] <= largest:
+        return f"{unit}? Then give {sizes[unit]:g}."
+    return "sizes are in metres; is the decimal point misplaced, or another unit meant?"
+
+
+def _row_doubts(path: str | Path, rows: Sequence[dict[str, Any]]) -> Iterator[str]:
+    """A sentence on sigmas with which points hardly count, and one on points at one place.
+
+    Parameters
+    ----------
+    path : path
+    rows : sequence of dict
+    """
+    coarse = [(row, key) for row in rows for key in SIGMAS if row[key] > SETTINGS.coarse_sigma]
+    for row, key in coarse[:1]:
+        yield (
+            f"{shown(row['name'])} of {path} has the {key} {row[key]:g} m and will hardly count "
+            f"(millimetres?){f', nor will {len(coarse) - 1} more sigmas' * (len(coarse) > 1)}."
+        )
+    smallest = SETTINGS.target_size[0]  # m: nearer to one another two targets can't be
+    near = cKDTree([[row[axis] for axis in AXES] for row in rows]).query_pairs(smallest)
+    pairs = [[rows[i] for i in pair] for pair in sorted(near)]
+    twice = [f"{a['name']} and {b['name']}" for a, b in pairs if a["kind"] == b["kind"]]
+    if twice:
+        yield (
+            f"{path} gives one place two names: {shown(', '.join(twice))}. No observation tells "
+            "them apart, so neither counts: leave one of the two out."
+        )

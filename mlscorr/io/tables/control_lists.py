@@ -11,22 +11,27 @@ import numpy as np
 
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.store import OpenPlace, OpenQuestion, listed, shown
-from mlscorr.io.tables.column_names import CONTROL_NAMES, WORDS, OfficeWord, meant, same_word
-from mlscorr.io.tables.layouts import NUMBER, TableLayout
-from mlscorr.io.tables.missing_columns import missing_sentence
+from mlscorr.io.tables.column_names import (
+    CONTROL_NAMES,
+    WORDS,
+    ControlSection,
+    OfficeWord,
+    meant,
+    same_word,
+)
+from mlscorr.io.tables.layout_search import missing_sentence
 from mlscorr.io.tables.nearness import distance_of
-from mlscorr.io.tables.table_rows import read_rows
-from mlscorr.io.tables.table_sections import ControlSection
+from mlscorr.io.tables.table_rows import NUMBER, TableLayout, read_rows
 from mlscorr.survey import AXES, SurveyFileError, Trajectory
 
 SIGMAS = ("sigma_horizontal", "sigma_vertical")
 NORMAL = ("normal_e", "normal_n", "normal_h")
 HINTS = {("easting", "latitude"): (" Latitude and longitude must be projected first.", ())}
-EXAMPLES = {
+_EXAMPLES = {
     **dict.fromkeys(SIGMAS, "sigma = [0.003, 0.004] (horizontal, vertical)"),
     **{"kind": 'kind = "circle"', "size": "size = 0.6"},
 }
-PLACES = {
+_PLACES = {
     **dict.fromkeys(
         SIGMAS,
         OpenPlace(("control", "sigma"), ([0.003, 0.004],), "m, one sigma: E and N each, height"),
@@ -34,7 +39,7 @@ PLACES = {
     "kind": OpenPlace(("control", "kind"), tuple(WORDS["kind"]), "shape of all targets"),
     "size": OpenPlace(("control", "size"), (0.6,), "m, diameter or edge of all targets"),
 }
-UNNAMED_AXES = ("x", "y")  # either may point east
+_UNNAMED_AXES = ("x", "y")  # either may point east
 
 
 class AxesError(OpenQuestion):
@@ -48,7 +53,7 @@ def lacking(names: Collection[str]) -> list[str]:
     ----------
     names : collection of str
     """
-    place = AXES[2:] if set(UNNAMED_AXES) <= set(names) else AXES
+    place = AXES[2:] if set(_UNNAMED_AXES) <= set(names) else AXES
     return [name for name in ("name", *place) if name not in names]
 
 
@@ -67,7 +72,7 @@ def unnamed_columns(cells: Sequence[str]) -> dict[str, int]:
     """
     if len(cells) < 4 or not cells[0] or not all(map(NUMBER.fullmatch, cells[1:4])):
         return {}
-    return dict(zip(("name", *UNNAMED_AXES, "height"), range(4), strict=True))
+    return dict(zip(("name", *_UNNAMED_AXES, "height"), range(4), strict=True))
 
 
 def complete(
@@ -98,7 +103,7 @@ def complete(
     columns = layout.columns
     needless = set() if set(group) <= set(columns) else set(group)
     if {"easting", "northing"} <= set(columns):
-        needless.update(UNNAMED_AXES)
+        needless.update(_UNNAMED_AXES)
     columns = {name: i for name, i in columns.items() if name not in needless}
     horizontal, vertical = section.sigma or (None, None)
     kind = section.kind and meant("kind", section.kind)
@@ -137,7 +142,7 @@ def _unstated(layout, rows, missing, meanings):
         name: header[i] for name, i in _columns_of_words(layout, rows, meanings) if name in missing
     }
     sentence = missing_sentence(layout.path, header, missing, used, CONTROL_NAMES, seeming)
-    values = ", ".join(dict.fromkeys(EXAMPLES[name] for name in missing))
+    values = ", ".join(dict.fromkeys(_EXAMPLES[name] for name in missing))
     sentence += (
         f" A value for all points may stand under [control] in survey.toml, lengths in m: {values}."
     )
@@ -160,8 +165,8 @@ def _unstated(layout, rows, missing, meanings):
         if name in seeming:
             key = ("control", "columns", name)
             places.insert(0, OpenPlace(key, (seeming[name],), f"column of the {name}"))
-        elif not (name == "size" and are_sized) and PLACES[name] not in places:
-            places.append(PLACES[name])
+        elif not (name == "size" and are_sized) and _PLACES[name] not in places:
+            places.append(_PLACES[name])
     return OpenQuestion(sentence, places)
 
 
@@ -362,16 +367,16 @@ def placed(
 
 def _axes_east_and_north(layout, rows, trajectory):
     """X and Y in the order in which they are easting and northing."""
-    position = np.array([[row[axis] for axis in UNNAMED_AXES] for row in rows])
+    position = np.array([[row[axis] for axis in _UNNAMED_AXES] for row in rows])
     near = [
         trajectory is not None and distance_of(places, trajectory) < SETTINGS.near
         for places in (position, position[:, ::-1])
     ]
     if near[0] != near[1]:
         if near[0]:
-            return UNNAMED_AXES
-        return UNNAMED_AXES[::-1]
-    x, y = (layout.name_of(axis) for axis in UNNAMED_AXES)
+            return _UNNAMED_AXES
+        return _UNNAMED_AXES[::-1]
+    x, y = (layout.name_of(axis) for axis in _UNNAMED_AXES)
     named = [
         OpenPlace(("control", "columns", our), (x, y), f"column of the {our}") for our in AXES[:2]
     ]
