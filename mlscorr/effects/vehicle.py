@@ -6,8 +6,7 @@ from typing import ClassVar
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mlscorr.effects._quantity import quantity
-from mlscorr.effects._size_estimate import SizeEstimate
+from mlscorr.effects._quantity import SizeEstimate, quantity
 from mlscorr.effects.effect import Effect
 from mlscorr.effects.stages import EAST_NORTH_UP, MAP
 from mlscorr.wording import DASH, joined, known, size

@@ -199,11 +199,10 @@ def test_what_glitters_everywhere_is_bounded():
 
 
 @pytest.mark.long
-def test_targets_near_control_do_not_depend_on_how_many_points_are_held(street, monkeypatch):
-    "Handed on a thousand points at a time, the street's targets are the same to the last digit"
+def test_targets_near_control_do_not_depend_on_how_many_points_are_read(street):
+    "Read twenty thousand points at a time, the street's targets are the same to the last digit"
     survey = mlscorr.read_survey(street)
     whole, _, near = fit_while_reading(survey, read_chunks)
-    monkeypatch.setitem(SETTINGS.__dict__, "held_points", 1000)
     parts, _, near_parts = fit_while_reading(survey, lambda file: read_chunks(file, 20_000))
     assert near.points == near_parts.points > 1000
     assert [number for number, _ in whole] == [number for number, _ in parts]

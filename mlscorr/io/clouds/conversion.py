@@ -18,8 +18,8 @@ from pyproj.exceptions import CRSError
 
 from mlscorr.io.clouds._cloud_sources import CloudSource
 from mlscorr.io.clouds._e57 import open_e57
-from mlscorr.io.clouds._ply_clouds import open_ply
 from mlscorr.io.clouds.las_writer import INTEGER_LIMIT, cloud_writer
+from mlscorr.io.clouds.ply import open_ply
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.store import (
     file_state,

@@ -6,9 +6,9 @@ Of a list, all faults in its rows are told at once, and what is doubtful warns.
 import re
 import warnings
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -278,16 +278,8 @@ def _refuse(
         raise ListError(" ".join(sentences), number, places)
 
 
-def _doubled_names(
-    path: str | Path, rows: Sequence[dict[str, Any]]
-) -> Iterator[tuple[object, str]]:
-    """The pair (file, what is wrong) of names that stand more than once.
-
-    Parameters
-    ----------
-    path : path
-    rows : sequence of dict
-    """
+def _doubled_names(path, rows):
+    """The pair (file, what is wrong) of names that stand more than once."""
     count = Counter(row.get("name", "") for row in rows)
     doubled = [name for name, number in count.items() if number > 1 and name]
     if doubled:
@@ -295,13 +287,8 @@ def _doubled_names(
         yield path, f"names {names} more than once; every point needs a name of its own."
 
 
-def _row_faults(row: dict[str, Any]) -> Iterator[str]:
-    """What is wrong with each value of a point's row that can't be meant.
-
-    Parameters
-    ----------
-    row : dict
-    """
+def _row_faults(row):
+    """What is wrong with each value of a point's row that can't be meant."""
     smallest, largest = SETTINGS.target_size
     for key, words in WORDS.items():
         if row[key] not in words:
@@ -349,14 +336,8 @@ def _likely_unit(size):
     return "sizes are in metres; is the decimal point misplaced, or another unit meant?"
 
 
-def _row_doubts(path: str | Path, rows: Sequence[dict[str, Any]]) -> Iterator[str]:
-    """A sentence on sigmas with which points hardly count, and one on points at one place.
-
-    Parameters
-    ----------
-    path : path
-    rows : sequence of dict
-    """
+def _row_doubts(path, rows):
+    """A sentence on sigmas with which points hardly count, and one on points at one place."""
     coarse = [(row, key) for row in rows for key in SIGMAS if row[key] > SETTINGS.coarse_sigma]
     for row, key in coarse[:1]:
         yield (

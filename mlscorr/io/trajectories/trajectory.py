@@ -10,9 +10,9 @@ from mlscorr.io.settings import SETTINGS
 from mlscorr.io.store import as_path, open_file, output_file, warn_of_cut
 from mlscorr.io.trajectories._course import check_units, checked_motion
 from mlscorr.io.trajectories._trj import MARK
+from mlscorr.io.trajectories.conventions import TrajectorySection
 from mlscorr.io.trajectories.pof import POF_SUFFIX
 from mlscorr.io.trajectories.sbet import is_sbet, read_riegl, read_sbet
-from mlscorr.io.trajectories.trajectory_sections import TrajectorySection
 from mlscorr.io.trajectories.trajectory_tables import (
     ATTITUDE_SIGMAS,
     COLUMNS,

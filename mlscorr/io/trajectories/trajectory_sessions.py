@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.io.settings import SETTINGS
+from mlscorr.io.trajectories.conventions import TrajectorySection
 from mlscorr.io.trajectories.time_systems import NAMES, usual_systems
 from mlscorr.io.trajectories.trajectory import read_trajectory_file
-from mlscorr.io.trajectories.trajectory_sections import TrajectorySection
 from mlscorr.survey import WEEK, Pos, Trajectory
 
 KINDS = ("position", "attitude")
