@@ -1,7 +1,7 @@
-"""A parameter of an effect: its unit, limits and usual size, and in words the size that was found."""
+"""A parameter of an effect: its unit, limits and usual size, and its size as found, in words."""
 
 from collections.abc import Iterable
-from dataclasses import MISSING, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -98,7 +98,9 @@ def quantity(unit: str, largest: float, why: str, default: float | None = None, 
     default : float, optional
     """
     metadata = {"quantity": Quantity(unit, largest, why, **more)}
-    return field(default=MISSING if default is None else default, metadata=metadata)
+    if default is None:
+        return field(metadata=metadata)
+    return field(default=default, metadata=metadata)
 
 
 class SizeEstimate(NamedTuple):
@@ -135,7 +137,8 @@ def vector(
         value, sigma, unit = parameters.get(name, (None, None, ""))
         if not known(value):
             continue
-        texts.append(f"{size(abs(value), sigma, unit)} {below if value < 0 else above}")
+        side = below if value < 0 else above
+        texts.append(f"{size(abs(value), sigma, unit)} {side}")
         if known(sigma) and abs(value) > SETTINGS.certain_sigmas * sigma:
             certain.append(texts[-1])
     return joined(certain or texts) or DASH

@@ -98,10 +98,7 @@ def make_effect(name: str, **parameters: Any) -> Effect:
     unknown = [key for key in parameters if key not in known]
     missing = [key for key, f in known.items() if f.default is MISSING and key not in parameters]
     if unknown or missing:
-        if unknown:
-            fault = f"has no parameter {unknown[0]!r}"
-        else:
-            fault = f"lacks {missing[0]}"
+        fault = f"has no parameter {unknown[0]!r}" if unknown else f"lacks {missing[0]}"
         raise ValueError(f"{name} {fault}; its parameters are {_describe(kind)}.")
     return kind(**parameters)
 
@@ -314,9 +311,8 @@ def run_file(path: Path) -> ModuleType:
     try:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:  # a user's code may raise anything
+        line = ""
         if isinstance(error, SyntaxError) and error.lineno:
             line = f" (line {error.lineno})"
-        else:
-            line = ""
         raise ValueError(f"{path} can't be run{line}: {type(error).__name__}: {error}") from error
     return module

@@ -217,35 +217,22 @@ class Effect:
 
 
 def _checked_change(effect: Any, change: Callable, value: Any, *given: Any) -> Any:
-    """What a user's effect makes of the value of its stage, whose columns it can't write into.
-
-    Parameters
-    ----------
-    effect : Effect
-    change : function
-        Of the effect: from a value and what else is given to the changed value.
-    value
-        Of its stage.
-    *given
-
-    Raises
-    ------
-    ValueError
-        Where it raises anything, or gives what can't take the place of the value: of another type,
-        shape or kind of numbers, or no numbers.
-    """
+    """What a user's effect makes of the value of its stage, whose columns it can't write into."""
+    columns = {}
     if is_dataclass(value):
         columns = {f.name: getattr(value, f.name) for f in fields(value)}
-    else:
-        columns = {}
     arrays = [name for name, column in columns.items() if isinstance(column, np.ndarray)]
     views = {name: np.broadcast_to(columns[name], columns[name].shape) for name in arrays}
     try:
-        changed = change(replace(value, **views) if views else value, *given)
+        guarded = value
+        if views:
+            guarded = replace(value, **views)
+        changed = change(guarded, *given)
         if not all(hasattr(changed, name) for name in columns):
             raise TypeError(f"it gives a {type(changed).__name__}")
         same = {name: columns[name] for name in arrays if getattr(changed, name) is views[name]}
-        changed = replace(changed, **same) if same else changed
+        if same:
+            changed = replace(changed, **same)
         for name, column in columns.items() or [("divergence", value)]:
             _check(name, column, getattr(changed, name, changed))
     except (Exception, SystemExit) as error:  # a user's code may raise anything
@@ -266,8 +253,15 @@ def _check(name, old, new):
     """Refuse a column that can't take the place of the old one."""
     if new is old:
         return
-    old, new = (np.asarray(c.as_quat() if isinstance(c, Rotation) else c) for c in (old, new))
+    old, new = map(_numbers, (old, new))
     if new.shape != old.shape or not np.can_cast(new.dtype, old.dtype, "same_kind"):
         raise ValueError(f"{name} is {new.dtype} {new.shape}, not {old.dtype} {old.shape}")
     if new.dtype.kind == "f" and (lost := np.isfinite(old) & ~np.isfinite(new)).any():
         raise ValueError(f"of {name} {lost.sum()} of {lost.size} numbers are not a number")
+
+
+def _numbers(column):
+    """A column as an array, attitudes as quaternions."""
+    if isinstance(column, Rotation):
+        return column.as_quat()
+    return np.asarray(column)

@@ -206,7 +206,9 @@ class PositionNoise(Effect):
             return {"size": f"{size(estimate, sigma, '')} times as large"}
         if "magnitude" in parameters:
             estimate, sigma, unit = parameters["magnitude"]
-            value = abs(estimate) if known(estimate) else None
+            value = None
+            if known(estimate):
+                value = abs(estimate)
             return {"size": f"{size(value, sigma, unit)} of scatter come on top"}
         return {"size": cls._windows_in_words(parameters)}
 
@@ -223,12 +225,13 @@ class PositionNoise(Effect):
             f"between gps_time {start:.0f} s and {start + length:.0f} s"
             for start, length in zip(starts, lengths, strict=True)
         ]
+        words = spans[:2]
         left = len(spans) - 2
         if left == 1:
-            more = ["once more"]
-        else:
-            more = [f"{left} times more"] if left > 1 else []
-        return f"up to {max(factors):.0f} times as large {joined([*spans[:2], *more])}"
+            words.append("once more")
+        elif left > 1:
+            words.append(f"{left} times more")
+        return f"up to {max(factors):.0f} times as large {joined(words)}"
 
     def _error(self, value, reference, rng):
         fixes = value.gps_time - value.gps_time[0]  # one a second

@@ -48,7 +48,7 @@ class Columns:
         """All rows of some records, in their order."""
         names = [field.name for field in fields(cls)]
         columns = zip(*([getattr(part, name) for name in names] for part in parts), strict=True)
-        return cls(*(sum(c, ()) if isinstance(c[0], tuple) else np.concatenate(c) for c in columns))
+        return cls(*map(_joined, columns))
 
 
 def check_lengths(record: Any) -> None:
@@ -75,6 +75,12 @@ def check_lengths(record: Any) -> None:
             f"The columns of {type(record).__name__} have unlike numbers of rows ({counts}): "
             "a row of each belongs to the same thing. Give all of them the same length."
         )
+
+
+def _joined(columns):
+    if isinstance(columns[0], tuple):
+        return sum(columns, ())
+    return np.concatenate(columns)
 
 
 def _selected(column, rows):
@@ -162,6 +168,8 @@ def _parts(name: str, column) -> Iterator[tuple[str, Any]]:
     if np.ndim(column) < 2:
         yield name, column
         return
-    count = np.shape(column)[1]
-    for i, end in enumerate(AXES if count == len(AXES) else range(1, count + 1)):
+    ends = range(1, np.shape(column)[1] + 1)
+    if len(ends) == len(AXES):
+        ends = AXES
+    for i, end in enumerate(ends):
         yield from _parts(f"{name}_{end}", column[:, i])

@@ -206,11 +206,12 @@ class Survey(Summary):
 
     def _overview(self):
         """What a notebook shows."""
-        (start, end), gaps = self.trajectory.gps_time[[0, -1]], len(self.trajectory.gaps)
+        start, end = self.trajectory.gps_time[[0, -1]]
+        gaps = len(self.trajectory.gaps)
         driven = f"{len(self.trajectory)} epochs, {start:.1f} to {end:.1f} s, gaps {gaps}"
-        mounted = ", ".join(scanner.name for scanner in self.scanners) or (
-            "not given" if self.mounting is None else "given"
-        )
+        mounted = "not given" if self.mounting is None else "given"
+        if self.scanners:
+            mounted = ", ".join(scanner.name for scanner in self.scanners)
         return [
             ("name", self.name),
             ("coordinates", self.crs or "not stated"),
@@ -325,7 +326,10 @@ class Survey(Summary):
         rows : (n,) bool array, or a slice of all
         """
         for number, part in enumerate(self.by_scanner.values()):
-            yield part, scanner == number if self.scanners else slice(None)
+            rows = slice(None)
+            if self.scanners:
+                rows = scanner == number
+            yield part, rows
 
     def check_one_scanner(self, verb: str) -> None:
         """Refuse several scanners, for what rests on one mounting.

@@ -326,7 +326,7 @@ class CopcWriter:
     output : binary file
         Open for writing, empty.
     folder : path
-        As of Octree.
+        As of _Octree.
     """
 
     def __init__(self, layout: LasLayout, output: BinaryIO, folder: Path):
@@ -351,7 +351,7 @@ class CopcWriter:
         Parameters
         ----------
         blocks : function
-            As of Octree.
+            As of _Octree.
         file : binary file
             That of the layout, open for reading.
         """

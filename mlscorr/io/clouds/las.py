@@ -72,9 +72,15 @@ def read_chunks(
         cloud = PointCloud(xyz, times, records["intensity"].copy())
         is_timed = np.isfinite(times)
         if is_timed.any():
-            yield cloud if is_timed.all() else cloud[is_timed]
-    is_whole = first == 0 and end in (None, layout.points)
-    _count_noise(cloud_file, None if is_whole else (first, end or layout.points), flagged, read)
+            if not is_timed.all():
+                cloud = cloud[is_timed]
+            yield cloud
+    count = _count.get()
+    if count is not None:
+        part = None
+        if first > 0 or end not in (None, layout.points):
+            part = (first, end or layout.points)
+        count.add(cloud_file, part, flagged, read)
 
 
 def read_windows(
@@ -219,10 +225,11 @@ def records_at(layout: LasLayout, places: ArrayLike) -> np.ndarray:
         decoder = layout.decoder(file, threads=False, is_brief=True)
         for k, place in enumerate(places.tolist()):
             is_ahead = place >= reached and place // size == reached // size
-            raw = bytearray((place - reached if is_ahead else 0) * length + length)
             with decoding_points(layout, place, place + 1):
                 if not is_ahead:
                     decoder.seek(place)  # decodes the chunk from its start
+                    reached = place
+                raw = bytearray((place - reached + 1) * length)
                 decoder.decompress_many(raw)
             records[k] = np.frombuffer(raw[-length:], layout.record)[0]
             reached = place + 1
@@ -311,19 +318,10 @@ _count: ContextVar[NoiseCount | None] = ContextVar("count", default=None)
 
 
 def _noise_sentence(flagged: int, points: int, classes: list[int]) -> str:
-    """Sentence on points that are flagged as noise.
-
-    Parameters
-    ----------
-    flagged, points : int
-        Number of points flagged, and of all.
-    classes : list of int
-        That count as noise.
-    """
+    """Sentence on points that are flagged as noise."""
+    kinds = "withheld"
     if classes:
-        kinds = f"withheld or of class {' or '.join(map(str, classes))}"
-    else:
-        kinds = "withheld"
+        kinds += f" or of class {' or '.join(map(str, classes))}"
     return (
         f"{flagged} of {points} points read are flagged as noise ({kinds}). They take no part in "
         "any measurement, and are corrected like all others; cloud.noise_classes in survey.toml "
@@ -345,17 +343,3 @@ def counted_noise() -> Iterator[NoiseCount]:
         yield count
     finally:
         _count.reset(token)
-
-
-def _count_noise(file: CloudFile, part: tuple[int, int] | None, flagged: int, read: int) -> None:
-    """Add to the count, where one is kept; as NoiseCount.add.
-
-    Parameters
-    ----------
-    file : CloudFile
-    part : (int, int) or None
-    flagged, read : int
-    """
-    count = _count.get()
-    if count is not None:
-        count.add(file, part, flagged, read)

@@ -43,8 +43,10 @@ def read_layout(path: str | Path) -> LasLayout:
     path = as_path(path)
     if not is_there(path):
         raise ValueError(f"There is no file {path}. Check cloud.files in survey.toml.")
-    source = path if is_foreign(path) else None
-    path = converted(path).path if source else path
+    source = None
+    if is_foreign(path):
+        source = path
+        path = converted(path).path
     size = file_state(path)[0]
     if not size:
         raise ValueError(f"{path} is empty (0 bytes): its copying was interrupted. Copy it anew.")
@@ -257,7 +259,9 @@ def evlrs(layout: LasLayout, file: BinaryIO) -> Iterator[tuple[int, int]]:
     layout : LasLayout
     file : binary file
     """
-    position, count = layout.field("QI", 235) if layout.version >= (1, 4) else (0, 0)
+    if layout.version < (1, 4):
+        return
+    position, count = layout.field("QI", 235)
     for _ in range(count):
         file.seek(min(position, layout.size))  # of a damaged file it may lie anywhere
         header = file.read(EVLR_HEADER.size)
@@ -286,20 +290,7 @@ def variable_records(layout: LasLayout, user: bytes, record: int) -> list[bytes]
 
 
 def _check_hierarchy(layout: LasLayout, file: BinaryIO, chunks: Sequence[tuple[int, int]]) -> None:
-    """That each LAZ chunk of a COPC file is a node of its hierarchy, and each node a chunk.
-
-    Parameters
-    ----------
-    layout : LasLayout
-    file : binary file
-        Open for reading.
-    chunks : sequence of (points, bytes)
-        As they follow each other.
-
-    Raises
-    ------
-    ValueError
-    """
+    """That each LAZ chunk of a COPC file is a node of its hierarchy, and each node a chunk."""
     info = b"".join(layout.vlr_data(*COPC))
     if len(info) != INFO.size:
         raise ValueError(

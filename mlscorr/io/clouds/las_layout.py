@@ -132,7 +132,9 @@ class LasLayout:
     @property
     def points(self) -> int:
         """Number of points."""
-        return self.field(*(("Q", 247) if self.version >= (1, 4) else ("I", 107)))[0]
+        if self.version >= (1, 4):
+            return self.field("Q", 247)[0]
+        return self.field("I", 107)[0]
 
     @property
     def scale(self) -> np.ndarray:
@@ -149,7 +151,10 @@ class LasLayout:
         """Type of a point record: the fields that are used here by name, the others by length."""
         fields = PointFormat(self.point_format).dtype().fields
         names = ["X", "Y", "Z", "intensity", "gps_time", "point_source_id"]
-        names += [NEW_FLAGS, NEW_CLASS] if self.point_format >= 6 else [OLD_CLASS]
+        if self.point_format >= 6:
+            names += [NEW_FLAGS, NEW_CLASS]
+        else:
+            names.append(OLD_CLASS)
         kinds, starts = zip(*(fields[name][:2] for name in names), strict=True)
         form: Any = {"names": names, "formats": kinds, "offsets": starts}
         return np.dtype(form | {"itemsize": self.record_length})
@@ -242,7 +247,10 @@ class LasLayout:
         kept = [self.head[a:b] for a, b in self.vlrs if self.owner(a) != (user, record)]
         if data is not None:
             kept.append(VLR_HEADER.pack(user, record, len(data), description) + data)
-        between = self.head[self.vlrs[-1][1] if self.vlrs else header_size :]
+        end = header_size
+        if self.vlrs:
+            end = self.vlrs[-1][1]
+        between = self.head[end:]
         head = bytearray(self.head[:header_size] + b"".join(kept) + between)
         struct.pack_into("<II", head, 96, len(head), len(kept))
         return bytes(head)
@@ -271,8 +279,10 @@ class LasLayout:
     @property
     def chunk_size(self) -> int:
         """Number of points that are decoded together; 1 where it is none or differs by chunk."""
-        vlr = lazrs.LazVlr(self.laszip) if self.is_compressed else None
-        if vlr is None or vlr.uses_variable_size_chunks():
+        if not self.is_compressed:
+            return 1
+        vlr = lazrs.LazVlr(self.laszip)
+        if vlr.uses_variable_size_chunks():
             return 1
         return vlr.chunk_size()
 
@@ -316,16 +326,16 @@ class LasLayout:
         file.seek(len(self.head))
         if not self.is_compressed:
             return _PlainPoints(file, len(self.head), self.record_length)
-        brief = lazrs.SELECTIVE_DECOMPRESS_GPS_TIME | lazrs.SELECTIVE_DECOMPRESS_POINT_SOURCE_ID
-        fields = brief if is_brief else lazrs.SELECTIVE_DECOMPRESS_ALL
+        fields = lazrs.SELECTIVE_DECOMPRESS_ALL
+        if is_brief:
+            fields = lazrs.SELECTIVE_DECOMPRESS_GPS_TIME
+            fields |= lazrs.SELECTIVE_DECOMPRESS_POINT_SOURCE_ID
         selection = lazrs.DecompressionSelection(fields)
         if lazrs.LazVlr(self.laszip).uses_variable_size_chunks():
             return _ChunkedPoints(file, self.laszip, selection)
         if threads:
-            kind = lazrs.ParLasZipDecompressor
-        else:
-            kind = lazrs.LasZipDecompressor
-        return kind(file, self.laszip, selection)
+            return lazrs.ParLasZipDecompressor(file, self.laszip, selection)
+        return lazrs.LasZipDecompressor(file, self.laszip, selection)
 
 
 def read_records(
@@ -471,7 +481,8 @@ class _ChunkedPoints:
         points, sizes = np.array(self._chunks, np.int64).T
         self._firsts = np.cumsum(points) - points  # numbers of the chunks' first points
         self._starts = file.tell() + np.cumsum(sizes) - sizes
-        self._next, self._held = 0, np.empty(0, np.uint8)
+        self._next = 0
+        self._held = np.empty(0, np.uint8)
 
     def seek(self, point: int) -> None:
         """Go on with a point.

@@ -57,16 +57,16 @@ def open_ply(path: Path) -> CloudSource:
     if time is None:
         raise lacking_time(path, names, "", "gps_time (double)")
     used = {*map(vertices.names.get, AXES), time, intensity, *vertices.colours}
+    limit = 255.0
     if vertices.colours:
         colour = vertices.kind[vertices.colours[0]]
-    else:
-        colour = np.dtype("u1")
+        limit = float(np.iinfo(colour).max) if colour.kind in "iu" else 1.0
     return CloudSource(
         path,
         vertices.points,
         f"with times by {shown(time)}",
         tuple(shown(name) for name in names if name not in used),
-        float(np.iinfo(colour).max) if colour.kind in "iu" else 1.0,
+        limit,
         None,
         partial(_intensities, vertices, intensity),
         partial(_blocks, vertices, time, intensity),
@@ -123,15 +123,15 @@ def _header(path) -> _Vertices:
         head = file.read(1 << 16).split(b"end_header", 1)
         if not head[0].startswith(b"ply") or len(head) < 2:
             raise ValueError(f"{path} is no PLY: it has no header from ply to end_header.")
-        start = len(head[0]) + len(b"end_header") + (2 if head[1].startswith(b"\r\n") else 1)
+        start = len(head[0]) + len(b"end_header\n")
+        if head[1].startswith(b"\r\n"):
+            start += 1
     lines = [line.split() for line in head[0].decode("latin-1").splitlines() if line.strip()]
     form = next((line[1] for line in lines if line[0] == "format" and len(line) > 1), "")
     elements = [line for line in lines if line[0] == "element"]
-    first = elements[0] if elements else []
-    if len(first) == 3 and first[1] == "vertex":
-        count = first[2]
-    else:
-        count = ""
+    count = ""
+    if elements and len(elements[0]) == 3 and elements[0][1] == "vertex":
+        count = elements[0][2]
     places = [place for place, line in enumerate(lines) if line[0] == "element"] + [len(lines)]
     rows = [line for line in lines[places[0] : places[1 % len(places)]] if line[0] == "property"]
     is_plain = all(len(line) == 3 and line[1] in KINDS for line in rows)
@@ -169,19 +169,19 @@ def _blocks(vertices, time, intensity, size) -> Iterator[SourceBlock]:
         for what, name in named.items()
         if vertices.kind[name].itemsize == 4 and vertices.kind[name].kind == "f"
     ]
-    for rows in vertices.read(size):
-        xyz = np.column_stack([rows[axis].astype(float) for axis in axes])
-        times = rows[time].astype(float)
+    for whole in vertices.read(size):
+        xyz = np.column_stack([whole[axis].astype(float) for axis in axes])
+        times = whole[time].astype(float)
         is_valid = np.isfinite(xyz).all(axis=1)
         check_precision(vertices.path, singles, xyz[is_valid], times[np.isfinite(times)])
-        colours = vertices.colours
-        yield SourceBlock(
-            xyz[is_valid],
-            times[is_valid],
-            None if intensity is None else rows[intensity].astype(float)[is_valid],
-            np.column_stack([rows[name][is_valid] for name in colours]) if colours else None,
-            int(np.count_nonzero(~is_valid)),
-        )
+        rows = whole[is_valid]
+        intensities = colours = None
+        if intensity is not None:
+            intensities = rows[intensity].astype(float)
+        if vertices.colours:
+            colours = np.column_stack([rows[name] for name in vertices.colours])
+        invalid = int(np.count_nonzero(~is_valid))
+        yield SourceBlock(xyz[is_valid], times[is_valid], intensities, colours, invalid)
 
 
 def write_ply(path: str | Path, triangles: np.ndarray) -> None:

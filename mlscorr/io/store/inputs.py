@@ -46,7 +46,8 @@ class FileIdentity:
         OSError
             Where it can't be read.
         """
-        (size, changed), hashed = file_state(path), hashlib.sha256()
+        size, changed = file_state(path)
+        hashed = hashlib.sha256()
         if not str(changed).startswith(ETAG):
             with open_file(path, is_scattered=True) as file:
                 hashed.update(file.read(SETTINGS.identified_bytes))
@@ -97,10 +98,9 @@ def check_unchanged(inputs: Sequence[InputFile]) -> None:
     if changed:
         file = changed[0]
         state = _state(changed[0].path)
+        size = "it is gone"
         if any(state):
             size = f"{state[0]} bytes now, {file.state[0]} then"
-        else:
-            size = "it is gone"
         raise OSError(
             f"{len(changed)} of {len(inputs)} input files were replaced or changed since they were "
             f"read (first: the {file.what} {file.path}, {size}): another program may still be "

@@ -73,16 +73,16 @@ def check_output(
     own = {(out / name).resolve(): Path(name) for name in (*folders, "")}
     pairs = zip(files, places, strict=True)
     held = [str(own[where] / path.name) for path, two in pairs for where in two if where in own]
-    check_contents(out, held, [] if overwrite else _entries(out))
+    present = [] if overwrite else _entries(out)
+    check_contents(out, held, present)
     _place(out)
 
 
 def _entries(out):
     """Names in a folder, but those of results that aren't whole yet."""
-    if out.is_dir():
-        names = sorted(path.name for path in out.iterdir())
-    else:
-        names = []
+    if not out.is_dir():
+        return []
+    names = sorted(path.name for path in out.iterdir())
     return [n for n in names if not (n.startswith(_prefix(out)) and n.endswith(PART))]
 
 
@@ -246,11 +246,9 @@ def _take_along(out: Path, part: Path) -> None:
 
 def _exchange(out: Path, part: Path) -> None:
     """Exchange two folders, at once where the system can."""
-    if os.name == "nt":
-        library = None
-    else:
-        library = ctypes.CDLL(None, use_errno=True)
-    rename = getattr(library, "renameat2", None)
+    rename = None
+    if os.name != "nt":
+        rename = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
     # AT_FDCWD and RENAME_EXCHANGE of linux/fs.h
     here = -100
     swap = 2

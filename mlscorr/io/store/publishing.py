@@ -91,9 +91,11 @@ def publish(source: Path, target: Any) -> None:
     if not is_remote(target):
         os.replace(source, target)
         return
-    parts = {"chunksize": SETTINGS.uploaded_bytes, "max_concurrency": 2}
+    parts = {}
+    if target.protocol in S3:
+        parts = {"chunksize": SETTINGS.uploaded_bytes, "max_concurrency": 2}
     with asking(target):
-        target.fs.put_file(str(source), target.path, **(parts if target.protocol in S3 else {}))
+        target.fs.put_file(str(source), target.path, **parts)
         target.fs.invalidate_cache()
 
 

@@ -69,9 +69,9 @@ def as_path(name: str | Path) -> Path:
     ImportError
         Where the package is missing that reads it.
     """
-    if is_remote(name) or not is_url(name):
-        if is_remote(name):
-            return cast(Path, name)
+    if is_remote(name):
+        return cast(Path, name)
+    if not is_url(name):
         return Path(name)
     scheme = str(name).partition("://")[0]
     try:
@@ -190,11 +190,9 @@ def file_state(path: str | Path) -> tuple[int, int | str]:
         return state.st_size, state.st_mtime_ns
     with asking(path):
         info = _info(path)
-    tag = info.get("ETag") or info.get("etag")
-    if tag:
+    changed = str(info.get("LastModified") or info.get("created"))
+    if tag := info.get("ETag") or info.get("etag"):
         changed = f"{ETAG} {tag}"
-    else:
-        changed = str(info.get("LastModified") or info.get("created"))
     return info.get("size") or 0, changed
 
 
@@ -283,12 +281,10 @@ def open_file(
         Where it can't be read; in a ``with`` also where a library hid that behind its own error.
     """
     if not is_remote(path):
-        how: dict[str, Any] = {"newline": newline, "errors": errors} if encoding else {}
-        return open(path, "r" if encoding else "rb", encoding=encoding, **how)
-    if is_scattered:
-        size = SETTINGS.identified_bytes
-    else:
-        size = SETTINGS.copied_bytes
+        if encoding is None:
+            return open(path, "rb")
+        return open(path, encoding=encoding, errors=errors, newline=newline)
+    size = SETTINGS.identified_bytes if is_scattered else SETTINGS.copied_bytes
     reader = _Reader(_Ranges(path, size))
     if encoding:
         return io.TextIOWrapper(reader, encoding, errors, newline)
@@ -369,9 +365,12 @@ def read_doubles(path: str | Path, start: int = 0, count: int = -1) -> np.ndarra
     count : int
         How many; all that are left if negative.
     """
+    size = -1
+    if count >= 0:
+        size = 8 * count
     with open_file(path) as file:
         file.seek(8 * start)
-        data = bytearray(file.read(8 * count if count >= 0 else -1))
+        data = bytearray(file.read(size))
     return np.frombuffer(data, "<f8", len(data) // 8)
 
 
@@ -411,15 +410,7 @@ def files_like(folder: Path, pattern: str) -> list[Path]:
 
 
 def _names_like(folder: Path, pattern: str) -> set[str]:
-    """Names of files and folders by a pattern, from a folder.
-
-    Parameters
-    ----------
-    folder : Path
-    pattern : str
-        As of Python's glob: ``**`` between slashes stands for any number of folders, hidden ones
-        left out.
-    """
+    """Names of files and folders by a pattern, from a folder."""
     # Python's own ** follows a link each time that it meets it: two folders that link to each
     # other are entered in every order, some 2^40 times before the system refuses
     parts = re.split(r"[\\/]" if os.sep == "\\" else "/", pattern)
@@ -429,7 +420,10 @@ def _names_like(folder: Path, pattern: str) -> set[str]:
     before = "/".join([*parts[:place], ""])
     behind = "/".join(parts[place + 1 :]) or "*"
     names = set()
-    for top in glob.glob(before, root_dir=folder) if before else [""]:
+    tops = [""]
+    if before:
+        tops = glob.glob(before, root_dir=folder)
+    for top in tops:
         for below in folders_below(folder / top):
             name = Path(top) / below.relative_to(folder / top)
             names |= {str(name / file) for file in _names_like(below, behind)}
@@ -469,7 +463,9 @@ def folders_below(
         if level and not is_wanted(here):
             continue
         yield here
-        for path in _folders_in(here) if level < depth else ():
+        if level >= depth:
+            continue
+        for path in _folders_in(here):
             if not path.is_symlink():
                 waiting.append((path, level + 1))
             elif not any(_holds(os.path.realpath(path), inner) for inner in (real, top)):

@@ -21,6 +21,7 @@ from pydantic import (
 from mlscorr.io.store.storage import as_path, is_folder, is_there, read_bytes
 from mlscorr.io.store.text_files import ENCODING, nearest, shown, warn_of_cut
 from mlscorr.survey import SurveyFileError
+from mlscorr.wording import counted
 
 MARK = "?"  # stands for a value that is still open; no key can have it
 Model = TypeVar("Model", bound=BaseModel)
@@ -212,10 +213,9 @@ class OpenPlace:
         >>> OpenPlace(("control", "size"), (0.6,)).option
         "--set 'control.size = 0.6'"
         """
+        value = "..."
         if self.examples:
             value = json.dumps(self.examples[0], ensure_ascii=False)
-        else:
-            value = "..."
         return f"--set '{self.key} = {value}'"
 
     def __str__(self) -> str:
@@ -264,25 +264,10 @@ def places_of(error: BaseException) -> tuple[OpenPlace, ...]:
 
 
 def _check_answered(path: Path, document: Mapping[str, Any]) -> None:
-    """Refuse a TOML document with open places.
-
-    Parameters
-    ----------
-    path : Path
-        For the message.
-    document : mapping
-
-    Raises
-    ------
-    SurveyFileError
-        Names all of them.
-    """
+    """Refuse a TOML document with open places."""
     keys = [OpenPlace(keys).key for keys in _open_keys(document, ())]
     if keys:
-        if len(keys) == 1:
-            number = "1 open place"
-        else:
-            number = f"{len(keys)} open places"
+        number = counted(len(keys), "open place")
         raise SurveyFileError(
             f'{path} has {number}: {", ".join(keys)}. Replace each "{MARK}" with the value; the '
             "comment behind it names what is possible."

@@ -253,10 +253,7 @@ def read_survey_file(path: str | Path, planned: bool = False) -> PlannedSurveyFi
         Names the line of bad TOML, or every key that is unknown (with the nearest known one),
         missing, or of the wrong type.
     """
-    if planned:
-        sections = PlannedSurveyFile
-    else:
-        sections = SurveyFile
+    sections = PlannedSurveyFile if planned else SurveyFile
     settings = read_toml(survey_toml(path), sections, "it")
     if settings.crs is not None:
         check_crs(settings.crs)
@@ -399,29 +396,15 @@ def read_surveyed(
     return points
 
 
-def _scaled(points: ControlList, section: ControlSection, crs: str | None) -> ControlList:
+def _scaled(points, section, crs):
     """Points whose eastings and northings are multiplied as [control] says, about its origin.
 
-    Parameters
-    ----------
-    points : ControlList
-    section : ControlSection
-        Without a scale_origin it is the middle of the control points (of all, where all are check
-        points), which then stays where it is.
-    crs : str or None
-        Of the survey.
-
-    Raises
-    ------
-    SurveyFileError
-        For ground distances without a CRS.
+    Without a scale_origin it is the middle of the control points (of all, where all are check
+    points), which then stays where it is.
     """
     if section.scale_factor is None:
         return points
-    if len(points.control):
-        about = points.control
-    else:
-        about = points.check
+    about = points.control if len(points.control) else points.check
     middle = about.position.mean(axis=0)
     origin = np.array([*(section.scale_origin or middle[:2]), 0.0])
     if section.scale_factor == "ground":
@@ -432,13 +415,13 @@ def _scaled(points: ControlList, section: ControlSection, crs: str | None) -> Co
             )
         ground = map_factors(crs, middle)
         factor = ground.combined
-        words = f", from ground distances to {crs}: {ground}"
+        source = f"scale_factor under [control], from ground distances to {crs}: {ground}"
     else:
         factor = float(section.scale_factor)
-        words = ""
+        source = "scale_factor under [control]"
     sentence = (
         f"Eastings and northings of the control were multiplied by {factor:.7f} about E "
-        f"{origin[0]:.3f}, N {origin[1]:.3f} m (scale_factor under [control]{words})."
+        f"{origin[0]:.3f}, N {origin[1]:.3f} m ({source})."
     )
     control, check = (
         replace(part, position=origin + (part.position - origin) * [factor, factor, 1.0])

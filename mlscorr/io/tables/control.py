@@ -46,7 +46,7 @@ from mlscorr.survey import AXES, ControlPoints, Trajectory
 
 _OWN_WORDS = "Say under [control] words in survey.toml what an office's own words mean."
 _AMBIGUOUS = {"cp": " It is short for control point and for check point alike: write gcp or check."}
-_COLUMNS = ("name", *AXES, *SIGMAS, "kind", "size", "role")
+COLUMNS = ("name", *AXES, *SIGMAS, "kind", "size", "role")
 _ROLES = tuple(WORDS["role"])
 _SEXAGESIMAL = re.compile(r"-?\d{1,3}[°: ]\s*\d{1,2}['′: ]")  # degrees and minutes
 _NOTHING_GIVEN = ControlSection(file="")
@@ -99,9 +99,13 @@ def read_control(
         Of sigmas with which points hardly count, of points at one place, and of a column that isn't
         used and may be that of the roles.
     """
-    rules = CONTROL_NAMES, lacking, section.columns.chosen, unnamed_columns, HINTS
-    layout = read_layout(path, _COLUMNS, (NORMAL,), *rules)
-    layout, given = (layout, {}) if layout.is_own else complete(layout, section, NORMAL)
+    chosen = section.columns.chosen
+    layout = read_layout(
+        path, COLUMNS, (NORMAL,), CONTROL_NAMES, lacking, chosen, unnamed_columns, HINTS
+    )
+    given = {}
+    if not layout.is_own:
+        layout, given = complete(layout, section, NORMAL)
     lines = list(read_rows(layout, exact=True))
     if not lines:
         raise ValueError(f"{path} has a header but no points.")
@@ -109,27 +113,29 @@ def read_control(
     rows, faults = _values(layout, lines, meanings)
     rows = [given | row for row in rows]  # of a word's own size before that of all points
     _refuse(path, [*faults, *_doubled_names(path, rows)])
+    all_cells = [cells for _, cells in lines]
     if not layout.is_own:
-        check_unused(layout, [cells for _, cells in lines], given, meanings)
-        for doubt in () if section.check else role_doubts(layout, [cells for _, cells in lines]):
-            warnings.warn(doubt, stacklevel=2)
+        check_unused(layout, all_cells, given, meanings)
+        if not section.check:
+            for doubt in role_doubts(layout, all_cells):
+                warnings.warn(doubt, stacklevel=2)
     has_axes = "x" in layout.columns
     layout, rows = placed(layout, with_check_points(path, rows, section.check), trajectory)
-    points = [(f"{shown(row['name'])} of {path}", row) for row in rows]
-    faults = [(who, fault) for who, row in points for fault in _row_faults(row)]
-    unknown = unknown_words(layout, [cells for _, cells in lines], meanings)
+    faults = [
+        (f"{shown(row['name'])} of {path}", fault) for row in rows for fault in _row_faults(row)
+    ]
     others = [row | {"kind": next(iter(WORDS["kind"])), "role": _ROLES[0]} for row in rows]
-    is_mended = not any(fault for row in others for fault in _row_faults(row))
-    _refuse(path, faults, word_places(unknown) if is_mended else ())
+    places = []
+    if not any(fault for row in others for fault in _row_faults(row)):  # words alone are wrong
+        places = word_places(unknown_words(layout, all_cells, meanings))
+    _refuse(path, faults, places)
     for doubt in _row_doubts(path, rows):
         warnings.warn(doubt, stacklevel=2)
     control, check = (_points([row for row in rows if row["role"] == role]) for role in _ROLES)
     if layout.sheet is None and layout.encoding != "utf-16":
         warn_of_cut(path)
-    is_plain = layout.is_own and not layout.unused
-    if is_plain:
-        sentence = None
-    else:
+    sentence = None
+    if not layout.is_own or layout.unused:
         sentence = sentence_on(layout, has_axes, given, section.check)
     return ControlList(control, check, sentence)
 
@@ -164,11 +170,9 @@ def _values(layout, lines, meanings):
                 row[name] = _value(layout, name, cells[i], meanings)
             except ValueError as fault:
                 faults.append((line, str(fault)))
-        kind = layout.columns.get("kind")
-        if kind is None:
-            word = None
-        else:
-            word = meanings.get(same_word(cells[kind]))
+        word = None
+        if "kind" in layout.columns:
+            word = meanings.get(same_word(cells[layout.columns["kind"]]))
         if word is not None and word.size is not None:
             size = row.setdefault("size", word.size)
             if size != word.size:
@@ -191,8 +195,9 @@ def _value(layout, name, cell, meanings):
     try:
         number = layout.number(cell) * layout.factors.get(name, 1.0)
     except ValueError:
-        angle = " It looks like an angle: project it to m, in the crs of survey.toml."
-        way_out = angle * bool(_SEXAGESIMAL.match(cell))
+        way_out = ""
+        if _SEXAGESIMAL.match(cell):
+            way_out = " It looks like an angle: project it to m, in the crs of survey.toml."
         raise ValueError(
             f"has the {name} '{shown(cell)}', which is not a number.{way_out}"
         ) from None
@@ -219,8 +224,8 @@ def _points(rows):
     )
 
 
-_NO_POINTS = _points([])
-NOTHING_SURVEYED = ControlList(_NO_POINTS, _NO_POINTS)
+NO_POINTS = _points([])
+NOTHING_SURVEYED = ControlList(NO_POINTS, NO_POINTS)
 
 
 class ListError(OpenQuestion):
@@ -242,36 +247,22 @@ class ListError(OpenQuestion):
 def _refuse(
     path: str | Path, faults: Iterable[tuple[object, str]], places: Sequence[OpenPlace] = ()
 ) -> None:
-    """Raise all that is wrong with the rows of a file at once, what is wrong alike as one.
-
-    Parameters
-    ----------
-    path : path
-    faults : iterable of (str, str)
-        Who has it, and what is wrong: words that begin with has.
-    places : sequence of OpenPlace
-        As of ListError.
-
-    Raises
-    ------
-    ListError
-        Where anything is.
-    """
+    """Raise all that is wrong with the rows of a file at once, what is wrong alike as one."""
     groups: dict[str, list[object]] = {}
     for who, what in faults:
         groups.setdefault(what, []).append(who)
-    sentences = [
-        f"{who} {what}" if not more else f"{who} and {len(more)} more have{what[len('has') :]}"
-        for what, (who, *more) in groups.items()
-    ]
+    sentences = []
+    for what, (who, *others) in groups.items():
+        if others:
+            sentences.append(f"{who} and {len(others)} more have{what.removeprefix('has')}")
+        else:
+            sentences.append(f"{who} {what}")
     number = len(sentences)
     limit = SETTINGS.named_faults
     if number > 1:
-        if number > limit:
-            more = [f"And {number - limit} more like these."]
-        else:
-            more = []
-        sentences = [f"{path} has {number} faults.", *sentences[:limit], *more]
+        sentences = [f"{path} has {number} faults.", *sentences[:limit]]
+    if number > limit:
+        sentences.append(f"And {number - limit} more like these.")
     if places:
         sentences.append(_OWN_WORDS)
     if sentences:
@@ -292,11 +283,10 @@ def _row_faults(row):
     smallest, largest = SETTINGS.target_size
     for key, words in WORDS.items():
         if row[key] not in words:
-            near = nearest(row[key], words) if key == "kind" else None  # words of roles are alike
-            yield (
-                f"has the unknown {key} '{shown(row[key])}'; known are {_known(words)}."
-                f"{f' Is {near} meant?' if near else ''}{_AMBIGUOUS.get(row[key], '')}"
-            )
+            hint = _AMBIGUOUS.get(row[key], "")
+            if key == "kind" and (near := nearest(row[key], words)):  # words of roles are alike
+                hint = f" Is {near} meant?{hint}"
+            yield f"has the unknown {key} '{shown(row[key])}'; known are {_known(words)}.{hint}"
     if not smallest <= row["size"] <= largest:
         yield (
             f"has the size {row['size']:g} m, outside [{smallest:g}, {largest:g}] m: "
@@ -339,10 +329,14 @@ def _likely_unit(size):
 def _row_doubts(path, rows):
     """A sentence on sigmas with which points hardly count, and one on points at one place."""
     coarse = [(row, key) for row in rows for key in SIGMAS if row[key] > SETTINGS.coarse_sigma]
-    for row, key in coarse[:1]:
+    if coarse:
+        row, key = coarse[0]
+        others = ""
+        if len(coarse) > 1:
+            others = f", nor will {len(coarse) - 1} more sigmas"
         yield (
             f"{shown(row['name'])} of {path} has the {key} {row[key]:g} m and will hardly count "
-            f"(millimetres?){f', nor will {len(coarse) - 1} more sigmas' * (len(coarse) > 1)}."
+            f"(millimetres?){others}."
         )
     smallest = SETTINGS.target_size[0]  # m: nearer to one another two targets can't be
     near = cKDTree([[row[axis] for axis in AXES] for row in rows]).query_pairs(smallest)

@@ -237,8 +237,12 @@ def _parted_tables(path) -> Iterator[tuple[TableLayout, list[tuple[int, list[str
             yield TableLayout(path, (), 0, {}, sheet=sheet), rows[: SETTINGS.sampled_lines]
         return
     encoding = encoding_of(path)
-    lines = _first_lines(path, encoding) if encoding else []
-    for separator in SEPARATORS if lines else ():
+    if encoding is None:
+        return
+    lines = _first_lines(path, encoding)
+    if not lines:
+        return
+    for separator in SEPARATORS:
         layout = TableLayout(path, (), 0, {}, separator, encoding=encoding)
         yield layout, [(number, split(line, separator)) for number, line in lines]
 
@@ -297,8 +301,9 @@ def _holds_units(cells, columns):
 
 def _parted(layout, rows):
     """The layout and its rows where these are parted otherwise than the names, as in POSPac's."""
-    is_whole = not rows or len(rows[0]) > 1
-    for separator in () if is_whole else SEPARATORS:
+    if not rows or len(rows[0]) > 1:
+        return layout, rows
+    for separator in SEPARATORS:
         parted = [split(row[0], separator) for row in rows]
         if len(parted[0]) == len(layout.header):
             return replace(layout, separator=separator), parted
@@ -330,11 +335,13 @@ def _check_doubled(layout, meanings, rows, section):
 def _unnamed_layout(start, rows, is_numbered, unnamed):
     """The layout of a table without a header: its first row, or the first with what was chosen."""
     rows = [row for row in rows if not (row[1] and row[1][0].startswith(COMMENT_MARKS))]
-    for place, (number, cells) in enumerate(rows if is_numbered else rows[:1]):
+    for place, (number, cells) in enumerate(rows):
         columns = unnamed(cells)
         if columns:
             layout = replace(start, lines=number - 1, columns=dict(columns))
             return _with_units_and_decimals(layout, [], [row for _, row in rows[place:]])
+        if not is_numbered:
+            return None
     return None
 
 
@@ -384,21 +391,7 @@ def likely_header(path: str | Path, names: Mapping[str, Collection[str]]) -> lis
 
 
 def _check_chosen(path: Path, missing: Collection[str], chosen: Mapping[str, str | int]) -> None:
-    """Refuse columns that survey.toml names and the table does not have.
-
-    Parameters
-    ----------
-    path : Path
-    missing : collection of str
-        Our names.
-    chosen : mapping
-        See find_layout.
-
-    Raises
-    ------
-    ValueError
-        Names the first.
-    """
+    """Refuse columns that survey.toml names and the table does not have."""
     for name in sorted(set(missing) & set(chosen)):
         raise SurveyFileError(
             f"{path} has no column '{chosen[name]}', which survey.toml names the {name}."
@@ -413,23 +406,7 @@ def _missing_columns(
     names: Mapping[str, Collection[str]],
     hints: Mapping[tuple[str, str], tuple[str, Sequence[OpenPlace]]] | None = None,
 ) -> OpenQuestion:
-    """The error on a table without columns that are needed.
-
-    Parameters
-    ----------
-    path : path
-    header : sequence of str
-        The likely one.
-    missing : sequence of str
-        Our names.
-    meanings : mapping
-        What the header has, as of find_meanings.
-    names : mapping
-        See find_meanings.
-    hints : mapping, optional
-        Name that is missing and one that is there to the sentence that says the way out, and to
-        the places of survey.toml that are the way out.
-    """
+    """The error on a table without columns that are needed."""
     used = {header[i] for positions in meanings.values() for i in positions}
     hinted = [
         hint

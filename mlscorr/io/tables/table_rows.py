@@ -59,24 +59,23 @@ class TableLayout:
 
     def __str__(self) -> str:
         """What was understood, without a full stop."""
-        places = sorted(self.columns.items(), key=lambda item: item[1])
-        names = {name: self.name_of(name) for name, _ in places}
-        parts = [
-            f"{name} = {other}" for name, other in names.items() if plain(other) != plain(name)
-        ]
-        identical = [name for name, other in names.items() if plain(other) == plain(name)]
-        parts += [f"{', '.join(identical)} by name"] * bool(identical)
+        parts = []
+        identical = []
+        for name in sorted(self.columns, key=self.columns.__getitem__):
+            if plain(self.name_of(name)) == plain(name):
+                identical.append(name)
+            else:
+                parts.append(f"{name} = {self.name_of(name)}")
+        if identical:
+            parts.append(f"{', '.join(identical)} by name")
         if self.sheet:
-            parted = f"sheet {shown(self.sheet)}"
+            form = [f"sheet {shown(self.sheet)}"]
         else:
-            parted = SEPARATORS[self.separator]
-        if self.encoding == ENCODING:
-            letters = ""
-        else:
-            letters = f", letters of {ENCODINGS[self.encoding]}"
-        sign = "comma" if self.decimal == "," else "point"
-        form = f"{parted}, decimal {sign}{letters}"
-        return f"{self.path.name} was read as {', '.join(parts)} ({form})"
+            form = [SEPARATORS[self.separator]]
+        form.append("decimal comma" if self.decimal == "," else "decimal point")
+        if self.encoding != ENCODING:
+            form.append(f"letters of {ENCODINGS[self.encoding]}")
+        return f"{self.path.name} was read as {', '.join(parts)} ({', '.join(form)})"
 
     @property
     def unused(self) -> list[int]:
@@ -117,7 +116,7 @@ class TableLayout:
         ValueError
             For anything else: points in numbers with decimal commas too, and 1_000.
         """
-        if any(mark in cell for mark in ("_" if self.decimal == "." else "_.")):
+        if "_" in cell or (self.decimal == "," and "." in cell):
             raise ValueError(cell)
         return float(cell.replace(self.decimal, "."))
 
@@ -240,6 +239,7 @@ def read_rows(layout: TableLayout, exact: bool = False) -> Iterator[tuple[str, l
         For a row that is too short or too long, and a file that is not text.
     """
     is_parted_by_blanks = layout.separator == " " and not layout.sheet
+    is_strict = exact or not layout.is_own
     if not layout.is_own:
         exact = is_parted_by_blanks
     width = len(layout.header)
@@ -256,7 +256,6 @@ def read_rows(layout: TableLayout, exact: bool = False) -> Iterator[tuple[str, l
             while width and len(cells) > width and not cells[-1]:
                 del cells[-1]
         line = f"Line {number} of {layout.path}"
-        is_strict = exact or not layout.is_own
         if is_strict and layout.separator != " " and 0 < width < len(cells):
             raise ValueError(_too_wide(line, len(cells), width))
         if len(cells) < least or (exact and len(cells) != width):
@@ -358,8 +357,7 @@ def _loaded(layout, converters, is_plain):
 def _plain_lines(layout):
     """Rows of numbers of any layout, parted by tabs and with decimal points."""
     for _, cells in read_rows(layout):
-        line = "\t".join(cells)
-        yield line.replace(",", ".") if layout.decimal == "," else line
+        yield "\t".join(cells).replace(layout.decimal, ".")
 
 
 def _check_width(path, lines, width):
@@ -387,9 +385,12 @@ def _first_bad(layout, converters):
             try:
                 converters.get(column, layout.number)(cell)
             except ValueError:
-                place = f"where a number belongs (column {column + 1})."
-                way_out = " It seems to be a date or a time of day: give seconds."
-                return f"{line} has '{shown(cell)}' {place}{way_out * bool(_DATE.match(cell))}"
+                sentence = (
+                    f"{line} has '{shown(cell)}' where a number belongs (column {column + 1})."
+                )
+                if _DATE.match(cell):
+                    sentence += " It seems to be a date or a time of day: give seconds."
+                return sentence
     return ""
 
 

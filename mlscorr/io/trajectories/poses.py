@@ -20,18 +20,7 @@ from mlscorr.io.trajectories.sbet import SBET_FIELDS
 from mlscorr.io.trajectories.time_systems import count_on
 from mlscorr.io.trajectories.trajectory import SBET_SUFFIXES, read_trajectory
 
-_SERIES_COLUMNS = (
-    "time",
-    "N",
-    "E",
-    "D",
-    "velocity N",
-    "velocity E",
-    "velocity D",
-    "roll",
-    "pitch",
-    "yaw",
-)
+_SERIES_COLUMNS = ("time", *"NED", *(f"velocity {axis}" for axis in "NED"), "roll", "pitch", "yaw")
 _POS_COLUMNS = ("time", "latitude", "longitude", "height")  # then sigmas, of a .pos
 _LAYOUTS = (  # time, east, north, up of CSV files with an attitude of unknown convention
     ("gpstime", "easting", "northing", "altitude"),  # pyboreas
@@ -95,7 +84,10 @@ def read_poses(path: str | Path) -> Poses:
             f"{path} has the unknown suffix '{path.suffix}'; a path is .csv, .pos or SBET "
             f"({', '.join(SBET_SUFFIXES)})."
         )
-    trajectory = read_trajectory(path, _sbet_zone(path) if suffix in SBET_SUFFIXES else None)
+    crs = None
+    if suffix in SBET_SUFFIXES:
+        crs = _sbet_zone(path)
+    trajectory = read_trajectory(path, crs)
     return Poses(trajectory.gps_time, trajectory.position, trajectory.attitude)
 
 
@@ -148,7 +140,9 @@ def utm_zone(latitude: float, longitude: float) -> str:
     ('EPSG:32650', 'EPSG:32756')
     """
     zone = int(np.floor((longitude + 180.0) / 6.0)) % 60 + 1
-    return f"EPSG:{(32600 if latitude >= 0 else 32700) + zone}"
+    if latitude >= 0:
+        return f"EPSG:326{zone:02d}"
+    return f"EPSG:327{zone:02d}"
 
 
 def _seconds(cell):

@@ -111,11 +111,12 @@ def read_table(
 
     def lacking(names: Collection[str]) -> list[str]:
         is_projected = "latitude" not in names or {"easting", "northing"} <= set(names)
-        if is_projected:
-            place = AXES
-        else:
+        place = AXES
+        if not is_projected:
             place = ("latitude", "longitude", "height")
-        angles = ("roll", "pitch", "yaw" if section.heading and "yaw" in names else "heading")
+        angles = ANGLES
+        if section.heading and "yaw" in names:
+            angles = ("roll", "pitch", "yaw")
         if _is_quaternion(names, chosen):
             angles = QUATERNION
             is_named = {"easting", "northing"} & set(names) or not is_projected
@@ -125,14 +126,7 @@ def read_table(
 
     try:
         layout = read_layout(
-            path,
-            COLUMNS,
-            groups,
-            TRAJECTORY_NAMES,
-            lacking,
-            chosen,
-            tum_columns,
-            HINTS,
+            path, COLUMNS, groups, TRAJECTORY_NAMES, lacking, chosen, tum_columns, HINTS
         )
     except ValueError as error:
         if isinstance(error, SurveyFileError) or not (other := position_file(path)):
@@ -157,17 +151,17 @@ def read_table(
     conventions = Conventions.of(section, _usual_heading(layout, section))
     given = section.model_fields_set & {"angles", "heading", "pitch", "roll"}
     if layout.is_own and not given:
-        return table, f"{layout}{unit}." if unit else None
+        if unit:
+            return table, f"{layout}{unit}."
+        return table, None
     table = in_our_conventions(path, table, conventions, crs)
-    if "roll" in layout.factors:
-        degrees = ""
-    else:
-        degrees = ", angles in degrees"
+    sentence = f"{layout}{unit}"
     if "latitude" in layout.columns:
-        where = f"; latitude and longitude in the datum of {crs}"
-    else:
-        where = ""
-    return table, f"{layout}{unit}{where}; {conventions}{degrees}{layout.not_used}."
+        sentence += f"; latitude and longitude in the datum of {crs}"
+    sentence += f"; {conventions}"
+    if "roll" not in layout.factors:
+        sentence += ", angles in degrees"
+    return table, f"{sentence}{layout.not_used}."
 
 
 def read_terrascan(
@@ -257,12 +251,18 @@ def _used(layout: TableLayout, is_quaternion: bool) -> TableLayout:
         columns = {horizontal.get(name, name): place for name, place in columns.items()}
         factors = {horizontal.get(name, name): factor for name, factor in layout.factors.items()}
         layout = replace(layout, factors=factors)
-    needless = {"x", "y", *(ANGLES if is_quaternion else QUATERNION)}
-    needless |= {"yaw"} if is_quaternion else set()
-    needless |= {"latitude", "longitude"} if "easting" in columns else set()
-    needless |= {"yaw"} if "heading" in columns else set()
+    needless = {"x", "y"}
+    if is_quaternion:
+        needless.update(ANGLES, ["yaw"])
+    else:
+        needless.update(QUATERNION)
+    if "easting" in columns:
+        needless.update(("latitude", "longitude"))
+    if "heading" in columns:
+        needless.add("yaw")
     for group in (POSITION_SIGMAS, ATTITUDE_SIGMAS):
-        needless |= set() if set(group) <= set(columns) else set(group)
+        if not set(group) <= set(columns):
+            needless.update(group)
     return replace(layout, columns={name: i for name, i in columns.items() if name not in needless})
 
 
@@ -325,37 +325,21 @@ def position_file(path: Path) -> str:
     is_whole = "gps_time" in known and used == set(range(len(header)))
     if is_oriented or not (is_rtklib or (is_placed and (is_whole or is_geocentric))):
         return ""
-    if is_rtklib:
-        kind = "an RTKLIB position file"
-    else:
-        kind = "a file of positions"
-    if is_geocentric:
-        frame = ", in geocentric coordinates X, Y, Z (ECEF)"
-    else:
-        frame = ""
+    kind = "an RTKLIB position file" if is_rtklib else "a file of positions"
+    frame = ", in geocentric coordinates X, Y, Z (ECEF)" if is_geocentric else ""
     return f"{path} is {kind} without attitude (roll, pitch, heading){frame}. {_EXPORTS}"
 
 
-def _check_projected(path: Path, table: dict[str, np.ndarray]) -> None:
-    """Refuse geocentric coordinates in columns of easting, northing and height.
-
-    Parameters
-    ----------
-    path : Path
-        For messages.
-    table : dict
-        Name of a column to an (n,) array. Units: m.
-
-    Raises
-    ------
-    ValueError
-        States the distance from the Earth's center.
-    """
-    if set(AXES) <= set(table) and _is_geocentric([table[name] for name in AXES]):
+def _check_projected(path, table):
+    """Refuse geocentric coordinates in columns of easting, northing and height."""
+    if not set(AXES) <= set(table):
+        return
+    places = [table[name] for name in AXES]
+    if _is_geocentric(places):
         raise ValueError(
             f"{path} has geocentric coordinates (ECEF): its epochs lie "
-            f"{_radius([table[name] for name in AXES]) / 1e3:.0f} km from the Earth's center, with "
-            f"heights of {np.median(table['height']) / 1e3:.0f} km. {_PROJECTED}"
+            f"{_radius(places) / 1e3:.0f} km from the Earth's center, with heights of "
+            f"{np.median(table['height']) / 1e3:.0f} km. {_PROJECTED}"
         )
 
 
