@@ -16,7 +16,7 @@ import mlscorr
 from mlscorr.cli import app
 from mlscorr.effects import catalogue, known_effects
 from mlscorr.io.surveys import SurveyFile
-from mlscorr.io.surveys.project_sections import ProjectFile
+from mlscorr.io.surveys.project_file import ProjectFile
 from mlscorr.simulate import Scenario
 from mlscorr.simulate.simulator_file import SimulatorFile
 from tests.beds.places import ROOT

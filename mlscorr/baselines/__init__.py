@@ -6,9 +6,14 @@ per axis, interpolation between control points, a Gaussian process, and the coll
 al. 2015 printed it.
 """
 
-from mlscorr.baselines.interpolation import fit_gaussian_process, fit_linear, fit_pchip
+from mlscorr.baselines.interpolation import (
+    fit_gaussian_process,
+    fit_linear,
+    fit_literal,
+    fit_pchip,
+    fit_polynomial,
+)
 from mlscorr.baselines.pairs import Undetermined
-from mlscorr.baselines.polynomial import fit_literal, fit_polynomial
 from mlscorr.baselines.registration import fit_icp
 from mlscorr.baselines.transformation import (
     RAW,

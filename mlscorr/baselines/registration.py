@@ -175,7 +175,10 @@ def _as_open3d(points, normals=None):
 
 def _axes(normal):
     """Two axes in a plane and its normal, as rows (3, 3); the first is level where it can be."""
-    level = np.cross([0.0, 0.0, 1.0] if abs(normal[2]) < 0.9 else [0.0, 1.0, 0.0], normal)
+    up = [0.0, 0.0, 1.0]
+    if abs(normal[2]) >= 0.9:
+        up = [0.0, 1.0, 0.0]
+    level = np.cross(up, normal)
     level /= np.linalg.norm(level)
     return np.array([level, np.cross(normal, level), normal])
 
@@ -183,9 +186,8 @@ def _axes(normal):
 def _points_on(observations, i, axes, tree, cloud, pass_number):
     """Bright points (n, 2) of one target in its plane, about its observed centre. Units: m."""
     size = observations.size[i]
-    if observations.kind[i] == "circle":
-        radius = size / 2
-    else:
+    radius = size / 2
+    if observations.kind[i] != "circle":
         radius = size / np.sqrt(2)
     rows = np.array(tree.query_ball_point(observations.position[i], radius), dtype=int)
     rows = np.sort(rows[pass_number[rows] == observations.pass_number[i]])

@@ -24,8 +24,7 @@ sources, how it enters an observation, and its words in a report. ``register`` m
 one's own known.
 """
 
-from mlscorr.effects._quantity import quantity
-from mlscorr.effects._size_estimate import SizeEstimate
+from mlscorr.effects._quantity import SizeEstimate, quantity
 from mlscorr.effects.catalogue import (
     EFFECTS,
     apply_effects,
@@ -36,11 +35,12 @@ from mlscorr.effects.catalogue import (
     known_effects,
     make_effect,
     register,
+    register_file,
+    run_file,
 )
 from mlscorr.effects.effect import Effect
 from mlscorr.effects.labels import OTHERS, family, lowered, meaning, parameter_title, title, titles
 from mlscorr.effects.mounting import Boresight, LeverArm
-from mlscorr.effects.own import register_file, run_file
 from mlscorr.effects.ranging import Dropout
 from mlscorr.effects.stages import STAGES, Reference, Returns
 from mlscorr.effects.vehicle import PositionNoise

@@ -5,9 +5,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from mlscorr.effects._pulses import noise_by_pulse
 from mlscorr.effects._quantity import quantity
 from mlscorr.effects.effect import Effect
+from mlscorr.effects.stages import noise_by_pulse
 
 
 @dataclass(frozen=True)

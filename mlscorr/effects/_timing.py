@@ -7,9 +7,9 @@ its derivation; nothing else backs it.
 from dataclasses import dataclass
 from typing import ClassVar
 
-from mlscorr.effects._pulses import noise_by_pulse
 from mlscorr.effects._quantity import quantity
 from mlscorr.effects.effect import Effect
+from mlscorr.effects.stages import noise_by_pulse
 
 
 @dataclass(frozen=True)

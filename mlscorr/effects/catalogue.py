@@ -1,9 +1,13 @@
-"""All known effects: making them by their names, and applying them in their order."""
+"""All known effects, one's own too: making them by name, and applying them in their order."""
 
+import sys
 from collections.abc import Iterable
 from dataclasses import MISSING, fields
 from difflib import get_close_matches
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
 from string import Formatter
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -30,6 +34,157 @@ EFFECTS = (  # a stage in a line or two, in the order in which they act
 SYSTEMATIC = tuple(kind.name for kind in EFFECTS if not kind.is_scatter())
 RANDOM = tuple(kind.name for kind in EFFECTS if kind.random)
 _registered: dict[str, type[Effect]] = {}  # a user's own, which act after these
+
+
+def known_effects() -> tuple[type[Effect], ...]:
+    """Classes of all effects: EFFECTS, and those that were registered, in their order."""
+    return (*EFFECTS, *_registered.values())
+
+
+def effects_by_name() -> dict[str, type[Effect]]:
+    """Classes of all effects by their names."""
+    return {kind.name: kind for kind in known_effects()}
+
+
+def effect_class(name: str) -> type[Effect]:
+    """The class of an effect by its name.
+
+    Parameters
+    ----------
+    name : str
+
+    Raises
+    ------
+    ValueError
+        For an unknown name, with the nearest known one.
+    """
+    by_name = effects_by_name()
+    if name not in by_name:
+        near = get_close_matches(str(name), by_name, n=1, cutoff=0.0)[0]
+        raise ValueError(
+            f"{name!r} is an unknown effect; the nearest known one is {near}. Is it your own? Then "
+            "give its file: --effects FILE."
+        )
+    return by_name[name]
+
+
+def make_effect(name: str, **parameters: Any) -> Effect:
+    """The effect of a name with its parameters, in the units that its class states.
+
+    Parameters
+    ----------
+    name : str
+    **parameters
+        As the class names them.
+
+    Raises
+    ------
+    ValueError
+        In one sentence for an unknown name (with the nearest known one), unknown or missing
+        parameters, and values beyond the largest credible one.
+
+    Examples
+    --------
+    >>> from mlscorr.effects import make_effect
+    >>> make_effect("time_offset", magnitude=0.002)
+    TimeOffset(magnitude=0.002)
+    >>> make_effect("boresight", magnitude=[200, 0, 0])
+    Traceback (most recent call last):
+    ValueError: boresight of 200 deg exceeds 10 deg; a mounting is known from its drawing to a
+    degree.
+    """
+    kind = effect_class(name)
+    known = {field.name: field for field in fields(kind)}
+    unknown = [key for key in parameters if key not in known]
+    missing = [key for key, f in known.items() if f.default is MISSING and key not in parameters]
+    if unknown or missing:
+        fault = f"has no parameter {unknown[0]!r}" if unknown else f"lacks {missing[0]}"
+        raise ValueError(f"{name} {fault}; its parameters are {_describe(kind)}.")
+    return kind(**parameters)
+
+
+def _describe(kind):
+    """Parameters of an effect with their units: "magnitude (m), time (s)"."""
+    kinds = kind.quantities()
+    return ", ".join(f"{f.name} ({kinds.get(f.name, 'a name')})" for f in fields(kind))
+
+
+def in_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:
+    """Effects in the order in which they act, however they were listed.
+
+    Parameters
+    ----------
+    effects : iterable of Effect
+        Known ones.
+
+    Raises
+    ------
+    ValueError
+        When a random one is there twice: both would draw from one stream.
+    """
+    order = {kind.name: number for number, kind in enumerate(known_effects())}
+    stages = list(STAGES)
+    ordered = sorted(effects, key=lambda e: (stages.index(e.stage), order[e.name], repr(e)))
+    random = [effect.name for effect in ordered if effect.random]
+    for name in random:
+        if random.count(name) > 1:
+            raise ValueError(
+                f"{name} is listed {random.count(name)} times; give one, with the root of the sum "
+                "of squares of the magnitudes."
+            )
+    return tuple(ordered)
+
+
+def apply_effects(
+    effects: Iterable[Effect],
+    stage: str,
+    value: Any,
+    reference: Reference,
+    streams: dict[str, np.random.Generator],
+) -> Any:
+    """A stage's value after all effects of that stage, in their fixed order.
+
+    Parameters
+    ----------
+    effects : iterable of Effect
+    stage : str
+        One of STAGES.
+    value
+        What the stage works on; see the table of stages in mlscorr.effects.
+    reference : Reference
+    streams : dict
+        Generator of each effect's name, as effect_streams gives them; they go on from block to
+        block, so that blocks of any size give the same.
+
+    Raises
+    ------
+    ValueError
+        For an unknown stage.
+    """
+    _known_stage(stage)
+    for effect in in_order(effects):
+        if effect.stage == stage:
+            value = effect.apply(value, reference, streams[effect.name])
+    return value
+
+
+def _known_stage(stage):
+    if stage not in STAGES:
+        raise ValueError(f"{stage!r} is an unknown stage; known are {', '.join(STAGES)}.")
+
+
+def effect_streams(rng: np.random.Generator) -> dict[str, np.random.Generator]:
+    """A random stream for every known effect by its name, whether it is used or not.
+
+    Those of registered effects stem from the last of the others, whose draws they leave alone.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    """
+    streams = rng.spawn(len(EFFECTS))
+    streams += streams[-1].spawn(len(_registered))
+    return {kind.name: s for kind, s in zip(known_effects(), streams, strict=True)}
 
 
 def register(kind: type[Effect]) -> type[Effect]:
@@ -103,155 +258,61 @@ def register(kind: type[Effect]) -> type[Effect]:
     return kind
 
 
-def known_effects() -> tuple[type[Effect], ...]:
-    """Classes of all effects: EFFECTS, and those that were registered, in their order."""
-    return (*EFFECTS, *_registered.values())
-
-
-def effects_by_name() -> dict[str, type[Effect]]:
-    """Classes of all effects by their names."""
-    return {kind.name: kind for kind in known_effects()}
-
-
-def effect_class(name: str) -> type[Effect]:
-    """The class of an effect by its name.
+def register_file(path: Path | str) -> tuple[type[Effect], ...]:
+    """Run a file that registers effects; they are known from then on.
 
     Parameters
     ----------
-    name : str
+    path : path
+        Of Python code, which runs as it is: take none that you wouldn't start yourself.
+
+    Returns
+    -------
+    tuple of Effect classes
+        Those that it registered.
 
     Raises
     ------
     ValueError
-        For an unknown name, with the nearest known one.
+        For a file that can't be run, or registers nothing.
+    FileNotFoundError
+        Where there is none.
     """
-    by_name = effects_by_name()
-    if name not in by_name:
-        near = get_close_matches(str(name), by_name, n=1, cutoff=0.0)[0]
+    path = Path(path)
+    before = set(known_effects())
+    if not path.is_file():
+        raise FileNotFoundError(f"{path} does not exist; give a file that registers effects.")
+    run_file(path)
+    effects = tuple(kind for kind in known_effects() if kind not in before)
+    if not effects:
         raise ValueError(
-            f"{name!r} is an unknown effect; the nearest known one is {near}. Is it your own? Then "
-            "give its file: --effects FILE."
+            f"{path} registers no effect: call mlscorr.effects.register with a class of yours, as "
+            "docs/own-simulator.md shows."
         )
-    return by_name[name]
+    return effects
 
 
-def make_effect(name: str, **parameters: Any) -> Effect:
-    """The effect of a name with its parameters, in the units that its class states.
+def run_file(path: Path) -> ModuleType:
+    """Run a Python file of the user's; the module that it makes.
 
     Parameters
     ----------
-    name : str
-    **parameters
-        As the class names them.
+    path : Path
 
     Raises
     ------
     ValueError
-        In one sentence for an unknown name (with the nearest known one), unknown or missing
-        parameters, and values beyond the largest credible one.
-
-    Examples
-    --------
-    >>> from mlscorr.effects import make_effect
-    >>> make_effect("time_offset", magnitude=0.002)
-    TimeOffset(magnitude=0.002)
-    >>> make_effect("boresight", magnitude=[200, 0, 0])
-    Traceback (most recent call last):
-    ValueError: boresight of 200 deg exceeds 10 deg; a mounting is known from its drawing to a
-    degree.
+        Names the file, and what it raised.
     """
-    kind = effect_class(name)
-    known = {field.name: field for field in fields(kind)}
-    unknown = [key for key in parameters if key not in known]
-    missing = [key for key, f in known.items() if f.default is MISSING and key not in parameters]
-    if unknown or missing:
-        if unknown:
-            fault = f"has no parameter {unknown[0]!r}"
-        else:
-            fault = f"lacks {missing[0]}"
-        raise ValueError(f"{name} {fault}; its parameters are {_describe(kind)}.")
-    return kind(**parameters)
-
-
-def in_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:
-    """Effects in the order in which they act, however they were listed.
-
-    Parameters
-    ----------
-    effects : iterable of Effect
-        Known ones.
-
-    Raises
-    ------
-    ValueError
-        When a random one is there twice: both would draw from one stream.
-    """
-    order = {kind.name: number for number, kind in enumerate(known_effects())}
-    stages = list(STAGES)
-    ordered = sorted(effects, key=lambda e: (stages.index(e.stage), order[e.name], repr(e)))
-    random = [effect.name for effect in ordered if effect.random]
-    for name in random:
-        if random.count(name) > 1:
-            raise ValueError(
-                f"{name} is listed {random.count(name)} times; give one, with the root of the sum "
-                "of squares of the magnitudes."
-            )
-    return tuple(ordered)
-
-
-def apply_effects(
-    effects: Iterable[Effect],
-    stage: str,
-    value: Any,
-    reference: Reference,
-    streams: dict[str, np.random.Generator],
-) -> Any:
-    """A stage's value after all effects of that stage, in their fixed order.
-
-    Parameters
-    ----------
-    effects : iterable of Effect
-    stage : str
-        One of STAGES.
-    value
-        What the stage works on; see the table of stages in mlscorr.effects.
-    reference : Reference
-    streams : dict
-        Generator of each effect's name, as effect_streams gives them; they go on from block to
-        block, so that blocks of any size give the same.
-
-    Raises
-    ------
-    ValueError
-        For an unknown stage.
-    """
-    _known_stage(stage)
-    for effect in in_order(effects):
-        if effect.stage == stage:
-            value = effect.apply(value, reference, streams[effect.name])
-    return value
-
-
-def effect_streams(rng: np.random.Generator) -> dict[str, np.random.Generator]:
-    """A random stream for every known effect by its name, whether it is used or not.
-
-    Those of registered effects stem from the last of the others, whose draws they leave alone.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-    """
-    streams = rng.spawn(len(EFFECTS))
-    streams += streams[-1].spawn(len(_registered))
-    return {kind.name: s for kind, s in zip(known_effects(), streams, strict=True)}
-
-
-def _known_stage(stage):
-    if stage not in STAGES:
-        raise ValueError(f"{stage!r} is an unknown stage; known are {', '.join(STAGES)}.")
-
-
-def _describe(kind):
-    """Parameters of an effect with their units: "magnitude (m), time (s)"."""
-    kinds = kind.quantities()
-    return ", ".join(f"{f.name} ({kinds.get(f.name, 'a name')})" for f in fields(kind))
+    spec = spec_from_file_location(f"user.{path.stem}", path)
+    if spec is None or spec.loader is None:
+        raise ValueError(f"{path} is no Python file: its name must end in .py.")
+    module = sys.modules[spec.name] = module_from_spec(spec)  # where dataclasses look for it
+    try:
+        spec.loader.exec_module(module)
+    except (Exception, SystemExit) as error:  # a user's code may raise anything
+        line = ""
+        if isinstance(error, SyntaxError) and error.lineno:
+            line = f" (line {error.lineno})"
+        raise ValueError(f"{path} can't be run{line}: {type(error).__name__}: {error}") from error
+    return module

@@ -1,15 +1,20 @@
-"""What an effect is: a frozen value that changes one stage of a survey, and says so in words."""
+"""What an effect is: a frozen value that changes one stage of a survey, and says so in words.
+
+A user's own effect is applied so that whatever its code does ends in a sentence.
+"""
 
 import re
-from dataclasses import MISSING, asdict, dataclass, fields, replace
+import sys
+from collections.abc import Callable
+from dataclasses import MISSING, asdict, dataclass, fields, is_dataclass, replace
 from functools import partial
+from traceback import extract_tb
 from typing import Any, ClassVar
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from mlscorr.effects._guard import checked_change
-from mlscorr.effects._quantity import Quantity
-from mlscorr.effects._size_estimate import SizeEstimate, amplitude, vector
+from mlscorr.effects._quantity import Quantity, SizeEstimate, amplitude, vector
 from mlscorr.effects.stages import STAGES, Reference
 from mlscorr.wording import known, size
 
@@ -103,7 +108,7 @@ class Effect:
         """
         is_own = not type(self).__module__.startswith(f"{__package__}.")
         if is_own:
-            change = partial(checked_change, self, self._change)
+            change = partial(_checked_change, self, self._change)
         else:
             change = self._change
         if np.any(self.magnitude):
@@ -209,3 +214,54 @@ class Effect:
             return None
         words = size(abs(number.estimate), number.sigma, cls.worded_unit or number.unit)
         return {"size": words, "side": cls.sides[number.estimate < 0]}
+
+
+def _checked_change(effect: Any, change: Callable, value: Any, *given: Any) -> Any:
+    """What a user's effect makes of the value of its stage, whose columns it can't write into."""
+    columns = {}
+    if is_dataclass(value):
+        columns = {f.name: getattr(value, f.name) for f in fields(value)}
+    arrays = [name for name, column in columns.items() if isinstance(column, np.ndarray)]
+    views = {name: np.broadcast_to(columns[name], columns[name].shape) for name in arrays}
+    try:
+        guarded = value
+        if views:
+            guarded = replace(value, **views)
+        changed = change(guarded, *given)
+        if not all(hasattr(changed, name) for name in columns):
+            raise TypeError(f"it gives a {type(changed).__name__}")
+        same = {name: columns[name] for name in arrays if getattr(changed, name) is views[name]}
+        if same:
+            changed = replace(changed, **same)
+        for name, column in columns.items() or [("divergence", value)]:
+            _check(name, column, getattr(changed, name, changed))
+    except (Exception, SystemExit) as error:  # a user's code may raise anything
+        file = getattr(sys.modules.get(type(effect).__module__), "__file__", "") or "no file"
+        lines = [
+            f"line {f.lineno}, " for f in extract_tb(error.__traceback__) if f.filename == file
+        ]
+        raise ValueError(
+            f"The effect {effect.name} ({''.join(lines[-1:])}{file}) can't be applied to the "
+            f"{type(value).__name__} of its stage, {effect.stage}: {type(error).__name__}: "
+            f"{str(error).rstrip('.')}. Mend its code, or leave it out; docs/own-simulator.md says "
+            "what it is given and gives."
+        ) from error
+    return changed
+
+
+def _check(name, old, new):
+    """Refuse a column that can't take the place of the old one."""
+    if new is old:
+        return
+    old, new = map(_numbers, (old, new))
+    if new.shape != old.shape or not np.can_cast(new.dtype, old.dtype, "same_kind"):
+        raise ValueError(f"{name} is {new.dtype} {new.shape}, not {old.dtype} {old.shape}")
+    if new.dtype.kind == "f" and (lost := np.isfinite(old) & ~np.isfinite(new)).any():
+        raise ValueError(f"of {name} {lost.sum()} of {lost.size} numbers are not a number")
+
+
+def _numbers(column):
+    """A column as an array, attitudes as quaternions."""
+    if isinstance(column, Rotation):
+        return column.as_quat()
+    return np.asarray(column)

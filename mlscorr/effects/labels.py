@@ -93,7 +93,7 @@ def parameter_title(name: str) -> str:
     """
     effect, _, part = name.partition(" ")
     part = part.replace("magnitude ", "").replace("(phase)", "")
-    return title(effect) + (f", {part}" if part else "")
+    return ", ".join(filter(None, [title(effect), part]))
 
 
 def _words(name):

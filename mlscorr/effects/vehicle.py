@@ -6,8 +6,7 @@ from typing import ClassVar
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mlscorr.effects._quantity import quantity
-from mlscorr.effects._size_estimate import SizeEstimate
+from mlscorr.effects._quantity import SizeEstimate, quantity
 from mlscorr.effects.effect import Effect
 from mlscorr.effects.stages import EAST_NORTH_UP, MAP
 from mlscorr.wording import DASH, joined, known, size
@@ -207,7 +206,9 @@ class PositionNoise(Effect):
             return {"size": f"{size(estimate, sigma, '')} times as large"}
         if "magnitude" in parameters:
             estimate, sigma, unit = parameters["magnitude"]
-            value = abs(estimate) if known(estimate) else None
+            value = None
+            if known(estimate):
+                value = abs(estimate)
             return {"size": f"{size(value, sigma, unit)} of scatter come on top"}
         return {"size": cls._windows_in_words(parameters)}
 
@@ -224,12 +225,13 @@ class PositionNoise(Effect):
             f"between gps_time {start:.0f} s and {start + length:.0f} s"
             for start, length in zip(starts, lengths, strict=True)
         ]
+        words = spans[:2]
         left = len(spans) - 2
         if left == 1:
-            more = ["once more"]
-        else:
-            more = [f"{left} times more"] if left > 1 else []
-        return f"up to {max(factors):.0f} times as large {joined([*spans[:2], *more])}"
+            words.append("once more")
+        elif left > 1:
+            words.append(f"{left} times more")
+        return f"up to {max(factors):.0f} times as large {joined(words)}"
 
     def _error(self, value, reference, rng):
         fixes = value.gps_time - value.gps_time[0]  # one a second

@@ -4,7 +4,6 @@ float64, SI units, radians inside; map axes E, N, H; body axes X right, Y forwar
 """
 
 from mlscorr.survey._open3d import line_geometry
-from mlscorr.survey.beliefs import SEARCH_RADIUS, Assumption, Pos, Scanner
 from mlscorr.survey.clouds import (
     COORDINATE_ROUNDING,
     NOISE_CLASSES,
@@ -14,11 +13,14 @@ from mlscorr.survey.clouds import (
     PointCloud,
     counted_on,
 )
-from mlscorr.survey.columns import Columns
-from mlscorr.survey.data_frame import AXES, columns_frame, rows_frame
+from mlscorr.survey.columns import AXES, Columns, columns_frame, rows_frame
 from mlscorr.survey.recording import (
+    SEARCH_RADIUS,
+    Assumption,
     InputFile,
     MountedScanner,
+    Pos,
+    Scanner,
     Survey,
     SurveyFileError,
     check_rng,

@@ -1,16 +1,20 @@
-"""Records whose fields are columns, one row for each of n things."""
+"""Records whose fields are columns, one row for each of n things; as data frames of pandas, too.
+
+pandas is loaded only for a data frame.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mlscorr.survey.data_frame import columns_frame
-
+if TYPE_CHECKING:
+    import pandas
+AXES = ("easting", "northing", "height")
 if TYPE_CHECKING:
     import pandas
 
@@ -44,7 +48,7 @@ class Columns:
         """All rows of some records, in their order."""
         names = [field.name for field in fields(cls)]
         columns = zip(*([getattr(part, name) for name in names] for part in parts), strict=True)
-        return cls(*(sum(c, ()) if isinstance(c[0], tuple) else np.concatenate(c) for c in columns))
+        return cls(*map(_joined, columns))
 
 
 def check_lengths(record: Any) -> None:
@@ -73,6 +77,12 @@ def check_lengths(record: Any) -> None:
         )
 
 
+def _joined(columns):
+    if isinstance(columns[0], tuple):
+        return sum(columns, ())
+    return np.concatenate(columns)
+
+
 def _selected(column, rows):
     if isinstance(column, tuple):
         return tuple(np.array(column, object)[rows])
@@ -92,3 +102,74 @@ def _named_columns(record):
             nested = {"": value}
         columns |= {f"{field.name}_{name}".rstrip("_"): part for name, part in nested.items()}
     return columns
+
+
+def rows_frame(rows: Iterable[Mapping[str, Any]]) -> pandas.DataFrame:
+    """A data frame of a document's rows, with a column for each number of a vector.
+
+    Parameters
+    ----------
+    rows : iterable of mapping
+        Vectors of three are E, N, H.
+
+    Raises
+    ------
+    ModuleNotFoundError
+        Without pandas; says the line that installs it.
+    """
+    frame = _pandas().DataFrame([dict(_cells(row)) for row in rows])
+    # a vector that is not known is None in its row, and NaN in the columns that others have
+    return frame.drop(columns=[name for name in frame if f"{name}_{AXES[0]}" in frame])
+
+
+def columns_frame(columns: Mapping[str, Sequence | np.ndarray]) -> pandas.DataFrame:
+    """A data frame of columns, with one for each number of a vector or matrix.
+
+    Parameters
+    ----------
+    columns : mapping
+        Arrays (n, ...) or sequences of n.
+
+    Raises
+    ------
+    ModuleNotFoundError
+        As rows_frame.
+    """
+    parts = [part for name, column in columns.items() for part in _parts(name, column)]
+    return _pandas().DataFrame(dict(parts))
+
+
+def _pandas():
+    try:
+        import pandas
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(
+            "A data frame needs pandas, which is not installed: pip install pandas"
+        ) from error
+    return pandas
+
+
+def _cells(row: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+    """Names and values of the columns of a row."""
+    for key, value in row.items():
+        is_vector = isinstance(value, list | tuple) and len(value) == len(AXES)
+        if is_vector:
+            parts = dict(zip(AXES, value, strict=True))
+        else:
+            parts = value
+        if isinstance(parts, Mapping):
+            yield from _cells(parts, f"{before}{key}_")
+        else:
+            yield f"{before}{key}", value
+
+
+def _parts(name: str, column) -> Iterator[tuple[str, Any]]:
+    """Names and values (n,) of the columns of an array (n, ...)."""
+    if np.ndim(column) < 2:
+        yield name, column
+        return
+    ends = range(1, np.shape(column)[1] + 1)
+    if len(ends) == len(AXES):
+        ends = AXES
+    for i, end in enumerate(ends):
+        yield from _parts(f"{name}_{end}", column[:, i])

@@ -220,8 +220,11 @@ class Trajectory(Summary):
         ----------
         rows : slice, or (n,) bool or (m,) int array
         """
-        columns = (getattr(self, field.name) for field in fields(self))
-        return _Epochs(*(None if column is None else column[rows] for column in columns))
+        columns = [getattr(self, field.name) for field in fields(self)]
+        for i, column in enumerate(columns):
+            if column is not None:
+                columns[i] = column[rows]
+        return _Epochs(*columns)
 
     @classmethod
     def concatenate(cls, parts: Iterable[Trajectory]) -> Trajectory:
@@ -237,8 +240,9 @@ class Trajectory(Summary):
         def joined(columns):
             if any(column is None for column in columns):
                 return None
-            is_attitude = isinstance(columns[0], Rotation)
-            return (Rotation.concatenate if is_attitude else np.concatenate)(columns)[order]
+            if isinstance(columns[0], Rotation):
+                return Rotation.concatenate(columns)[order]
+            return np.concatenate(columns)[order]
 
         return cls(*map(joined, zip(*table, strict=True)))
 

@@ -8,7 +8,7 @@ from mlscorr.effects import (
     Returns,
     make_effect,
 )
-from mlscorr.effects._pulses import pulse_number
+from mlscorr.effects.stages import pulse_number
 from tests.effects.bed import (
     REFERENCE,
     RETURNS,

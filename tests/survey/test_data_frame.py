@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mlscorr.survey import rows_frame
-from mlscorr.survey.data_frame import columns_frame
+from mlscorr.survey.columns import columns_frame
 from tests.beds.tied_passes import tied_passes
 
 

@@ -1,9 +1,9 @@
 """Clouds: LAS, LAZ and COPC byte by byte; E57, PLY and NPZ by way of a LAZ.
 
-- las, las_layout, las_points, las_windows, noise: points by chunks, all or within spans of time
+- las, las_layout, time_order: points by chunks, all or within spans of time
 - las_checks, las_crs, copies: what is wrong with a file before it is read
-- las_copy, las_output, las_writer, copc_writer, extra_bytes: corrected copies and new files
-- conversion, cloud_sources, e57, ply_clouds, ply: other formats, and meshes
+- las_copy, las_writer, copc_writer: corrected copies and new files
+- conversion, cloud_sources, e57, ply: other formats, and meshes
 """
 
 from mlscorr.io.clouds.conversion import (
@@ -14,20 +14,19 @@ from mlscorr.io.clouds.conversion import (
     written_name,
 )
 from mlscorr.io.clouds.copies import find_copies
-from mlscorr.io.clouds.extra_bytes import add_sigma_fields
 from mlscorr.io.clouds.las import (
     count_sources,
+    counted_noise,
     read_chunks,
+    read_windows,
     sample_gps_times,
     sha256,
     spread_records,
     timed_records,
 )
 from mlscorr.io.clouds.las_checks import read_layout
-from mlscorr.io.clouds.las_copy import CorrectedPart, write_parts
+from mlscorr.io.clouds.las_copy import CorrectedPart, add_sigma_fields, write_parts
 from mlscorr.io.clouds.las_crs import cloud_box, crs_conflict, stated_crs
 from mlscorr.io.clouds.las_layout import LasLayout
-from mlscorr.io.clouds.las_windows import read_windows
 from mlscorr.io.clouds.las_writer import cloud_writer
-from mlscorr.io.clouds.noise import counted_noise
 from mlscorr.io.clouds.ply import announced_faces, write_ply

@@ -128,7 +128,11 @@ class _Scan:
         """The largest value of a colour: that of the limits, or of the field where it has one."""
         largest = max(self._value("colorLimits", f"{name}Maximum") for name in COLOURS)
         field = max((float(self._prototype[name].maximum()) for name in self.colours), default=0.0)
-        return largest or (field if 0.0 < field <= np.iinfo(np.uint16).max else 255.0)
+        if largest:
+            return largest
+        if 0.0 < field <= np.iinfo(np.uint16).max:
+            return field
+        return 255.0
 
     @cached_property
     def singles(self):
@@ -175,7 +179,9 @@ class _Scan:
         names = ("x", "y", "z", "w")
         quaternion = [self._value("pose", "rotation", name) for name in names]
         shift = np.array([self._value("pose", "translation", name) for name in names[:3]])
-        return Rotation.from_quat(quaternion if any(quaternion) else [0, 0, 0, 1]), shift
+        if any(quaternion):
+            return Rotation.from_quat(quaternion), shift
+        return Rotation.identity(), shift
 
 
 def _scans(path, root):
@@ -218,10 +224,10 @@ def _source_block(scan, block, marks, start):
         xyz = from_polar(*xyz.T)
     check_precision(scan.path, scan.singles, xyz, block[TIME])
     rotation, shift = scan.pose
-    return SourceBlock(
-        rotation.apply(xyz) + shift if len(xyz) else xyz,
-        block[TIME] + start,
-        block.get(INTENSITY),
-        np.column_stack([block[name] for name in COLOURS]) if scan.colours else None,
-        int(np.count_nonzero(~is_valid)),
-    )
+    if len(xyz):
+        xyz = rotation.apply(xyz) + shift
+    colours = None
+    if scan.colours:
+        colours = np.column_stack([block[name] for name in COLOURS])
+    invalid = int(np.count_nonzero(~is_valid))
+    return SourceBlock(xyz, block[TIME] + start, block.get(INTENSITY), colours, invalid)

@@ -14,8 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.io.clouds._las_records import read_records
-from mlscorr.io.clouds.las_layout import LasLayout
+from mlscorr.io.clouds.las_layout import LasLayout, read_records
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.store import (
     Spool,

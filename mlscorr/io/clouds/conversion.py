@@ -18,8 +18,8 @@ from pyproj.exceptions import CRSError
 
 from mlscorr.io.clouds._cloud_sources import CloudSource
 from mlscorr.io.clouds._e57 import open_e57
-from mlscorr.io.clouds._ply_clouds import open_ply
 from mlscorr.io.clouds.las_writer import INTEGER_LIMIT, cloud_writer
+from mlscorr.io.clouds.ply import open_ply
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.store import (
     file_state,
@@ -163,19 +163,18 @@ def _convert(source, target, limit):
         for block in chain([first], blocks):
             number = len(block.xyz)
             _check_extent(source.path, block.xyz - first.xyz[0])
-            if block.intensity is None:
-                intensity = np.zeros(number)
-            else:
-                intensity = block.intensity
-            intensity = _in_16_bits((np.nan_to_num(intensity) - base) * gain)
+            intensity = np.zeros(number)
+            if block.intensity is not None:
+                intensity = np.nan_to_num(block.intensity)
+            intensity = _in_16_bits((intensity - base) * gain)
             is_timed = ~np.isin(block.gps_time, NO_TIMES)
             cloud = PointCloud(block.xyz, block.gps_time - taken * is_timed, intensity)
-            if block.colours is None:
+            colours = None
+            if has_colours:
                 colours = np.zeros((number, 3))
-            else:
-                colours = block.colours
-            colours = _in_16_bits(colours * (LARGEST / source.colour_limit))
-            laz.write(cloud, colours=colours if has_colours else None)
+                if block.colours is not None:
+                    colours = _in_16_bits(block.colours * (LARGEST / source.colour_limit))
+            laz.write(cloud, colours=colours)
             count += number
             done(number + block.invalid)
     note = _note(source, count, limit, scaled + crs_note)
@@ -221,7 +220,10 @@ def _scale(source, size, end):
         return 0.0, 1.0, "; it has no intensity, by which targets are seen"
     if low >= 0 and 1 < high <= LARGEST:
         return 0.0, 1.0, ""
-    base, top = (0.0, 1.0) if low >= 0 and high <= 1 else (min(low, 0.0), high)
+    base = min(low, 0.0)
+    top = high
+    if low >= 0 and high <= 1:
+        top = 1.0
     gain = LARGEST / max(top - base, np.finfo(float).tiny)
     return base, gain, f"; intensities of {low:g} to {high:g} as {gain:.5g} (value - {base:g})"
 
@@ -239,7 +241,8 @@ def _time_system(path, times):
     if not lacks_time(times).all():
         times = times[~lacks_time(times)]
     is_week = times.min() >= 0 and times.max() <= 2 * WEEK
-    return not is_week, ADJUSTMENT if times.min() >= ADJUSTMENT else 0.0
+    taken = ADJUSTMENT * (times.min() >= ADJUSTMENT)
+    return not is_week, taken
 
 
 def _known_crs(wkt):
@@ -259,17 +262,11 @@ def _note(source, count, limit, phrases):
         taken = f"the first {count} points of {source.points}"
     else:
         taken = f"{count} points"
-    invalid = 0 if limit else source.points - count
-    if invalid:
-        left = f"; {invalid} invalid points were left out"
-    else:
-        left = ""
+    if not limit and count < source.points:
+        phrases += f"; {source.points - count} invalid points were left out"
     if source.dropped:
-        dropped = f"; without its {', '.join(source.dropped)}"
-    else:
-        dropped = ""
+        phrases += f"; without its {', '.join(source.dropped)}"
     return (
         f"{source.path.name} was read through LAZ at {RESOLUTION * 1e3:g} mm, {taken} "
-        f"{source.parts}{phrases}{left}{dropped}. What is corrected is written as "
-        f"{written_name(source.path)}."
+        f"{source.parts}{phrases}. What is corrected is written as {written_name(source.path)}."
     )

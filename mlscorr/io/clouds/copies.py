@@ -14,12 +14,11 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.io.clouds._las_records import read_records
 from mlscorr.io.clouds.conversion import OPENERS, is_foreign, read_in_part
 from mlscorr.io.clouds.las import records_at
 from mlscorr.io.clouds.las_checks import HEADER_SIZES, read_layout
 from mlscorr.io.clouds.las_crs import cloud_box
-from mlscorr.io.clouds.las_layout import LasLayout
+from mlscorr.io.clouds.las_layout import LasLayout, read_records
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.store import is_remote, open_file
 from mlscorr.io.trajectories import ADJUSTMENT, WEEK

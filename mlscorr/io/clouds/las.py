@@ -1,4 +1,4 @@
-"""Points of LAS and LAZ files by chunks.
+"""Points of LAS and LAZ files by chunks, all or within spans of time, and the noise among them.
 
 lazrs shares decoding and encoding among the cores by itself; threads of our own gain nothing
 beside it (they waited on the same cores, and its single-threaded coders hold Python's lock).
@@ -6,20 +6,145 @@ beside it (they waited on the same cores, and its single-threaded coders hold Py
 
 import hashlib
 from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mlscorr.io.clouds._las_records import decoding_points, read_records
 from mlscorr.io.clouds._time_order import in_time_order
 from mlscorr.io.clouds.las_checks import read_layout
-from mlscorr.io.clouds.las_layout import LasLayout
-from mlscorr.io.clouds.noise import count_noise
+from mlscorr.io.clouds.las_layout import LasLayout, decoding_points, read_records
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.store import open_file
 from mlscorr.io.trajectories import lacks_time
 from mlscorr.survey import CloudFile, PointCloud
+
+
+def read_chunks(
+    cloud_file: CloudFile,
+    chunk_size: int = SETTINGS.chunk_points,
+    first: int = 0,
+    end: int | None = None,
+) -> Iterator[PointCloud]:
+    """Points of a cloud file by chunks, in file order, for all that measures.
+
+    Those of a COPC come in order of time. Points are left out that are flagged as noise: withheld,
+    or of one of the file's noise_classes; and those whose gps_time is not a number: nothing places
+    them on the trajectory.
+
+    Parameters
+    ----------
+    cloud_file : CloudFile
+    chunk_size : int
+        Points at a time.
+    first, end : int
+        Numbers of the points in the file at which to start, and to end before.
+
+    Yields
+    ------
+    PointCloud
+        With times in the trajectory's system.
+
+    Raises
+    ------
+    ValueError
+        For a file that is cut off or damaged.
+    """
+    layout = in_time_order(read_layout(cloud_file.path), cloud_file.new_week)
+    scale = layout.scale
+    offset = layout.offset
+    flagged = read = 0
+    for whole in read_records(layout, chunk_size, first, end):
+        records = whole[cloud_file.rows(whole["point_source_id"])]
+        read += len(records)
+        is_noise = layout.is_noise(records, cloud_file.noise_classes)
+        if is_noise.any():
+            flagged += int(np.count_nonzero(is_noise))
+            records = records[~is_noise]
+        xyz = np.empty((len(records), 3))
+        for axis, name in enumerate("XYZ"):
+            np.multiply(records[name], scale[axis], out=xyz[:, axis])
+        xyz += offset
+        times = cloud_file.trajectory_time(records["gps_time"])
+        cloud = PointCloud(xyz, times, records["intensity"].copy())
+        is_timed = np.isfinite(times)
+        if is_timed.any():
+            if not is_timed.all():
+                cloud = cloud[is_timed]
+            yield cloud
+    count = _count.get()
+    if count is not None:
+        part = None
+        if first > 0 or end not in (None, layout.points):
+            part = (first, end or layout.points)
+        count.add(cloud_file, part, flagged, read)
+
+
+def read_windows(
+    file: CloudFile, spans: np.ndarray, limit: int = SETTINGS.chunk_points
+) -> Iterator[PointCloud]:
+    """Points of a file that were measured about some spans of time; all of a short file.
+
+    Of a span with many points those about its middle are read.
+
+    Parameters
+    ----------
+    file : CloudFile
+        Its points in order of time.
+    spans : (k, 2) array
+        Starts and ends in the trajectory's time. Units: s.
+    limit : int
+        Number of points up to which a file is short, and a span has not many.
+
+    Yields
+    ------
+    PointCloud
+
+    Raises
+    ------
+    ValueError
+        Where points of a long file are not in order of time, or can't be decoded.
+    """
+    layout = in_time_order(read_layout(file.path), file.new_week)
+    if layout.points <= limit:
+        yield from read_chunks(file)
+        return
+    places, records = spread_records(layout)
+    times = file.counted(records["gps_time"])
+    if not (np.diff(times) >= 0).all():  # because of points without a time, perhaps
+        is_timed = ~lacks_time(records["gps_time"])
+        places = places[is_timed]
+        times = times[is_timed]
+    if len(times) < 2 or not (np.diff(times) >= 0).all():
+        raise ValueError(
+            f"The points of {file.path.name} are not in order of time: where a time stands in it "
+            "is known only once all are read."
+        )
+    done = 0
+    for span in np.asarray(spans) - file.time_constant:
+        if span[1] < times[0] or span[0] > times[-1]:
+            continue
+        first = max(done, _place(layout, file, places, times, span[0], 0))
+        end = _place(layout, file, places, times, span[1], 1)
+        surplus = max(0, end - first - limit)
+        first = first + surplus // 2
+        done = end - surplus // 2
+        if first < done:
+            yield from read_chunks(file, first=first, end=done)
+
+
+def _place(layout: LasLayout, file: CloudFile, places, times, time, side):
+    """Number of a point before (side 0) or behind (1) those of a time, by bisection."""
+    k = int(np.clip(np.searchsorted(times, time), 1, len(times) - 1))
+    bounds = [int(places[k - 1]), int(places[k]) + 1]
+    while bounds[1] - bounds[0] > SETTINGS.close_places:
+        middle = sum(bounds) // 2
+        time_there = file.counted(records_at(layout, [middle])["gps_time"])[0]
+        bounds[int(time_there >= time)] = middle
+    return bounds[side]
 
 
 def sample_gps_times(path: str | Path) -> tuple[int, bool, np.ndarray]:
@@ -78,76 +203,6 @@ def spread_records(layout: LasLayout) -> tuple[np.ndarray, np.ndarray]:
     return places, records_at(layout, places)
 
 
-def read_chunks(
-    cloud_file: CloudFile,
-    chunk_size: int = SETTINGS.chunk_points,
-    first: int = 0,
-    end: int | None = None,
-) -> Iterator[PointCloud]:
-    """Points of a cloud file by chunks, in file order, for all that measures.
-
-    Those of a COPC come in order of time. Points are left out that are flagged as noise: withheld,
-    or of one of the file's noise_classes; and those whose gps_time is not a number: nothing places
-    them on the trajectory.
-
-    Parameters
-    ----------
-    cloud_file : CloudFile
-    chunk_size : int
-        Points at a time.
-    first, end : int
-        Numbers of the points in the file at which to start, and to end before.
-
-    Yields
-    ------
-    PointCloud
-        With times in the trajectory's system.
-
-    Raises
-    ------
-    ValueError
-        For a file that is cut off or damaged.
-    """
-    layout = in_time_order(read_layout(cloud_file.path), cloud_file.new_week)
-    scale = layout.scale
-    offset = layout.offset
-    flagged = read = 0
-    for whole in read_records(layout, chunk_size, first, end):
-        records = whole[cloud_file.rows(whole["point_source_id"])]
-        read += len(records)
-        is_noise = layout.is_noise(records, cloud_file.noise_classes)
-        if is_noise.any():
-            flagged += int(np.count_nonzero(is_noise))
-            records = records[~is_noise]
-        xyz = np.empty((len(records), 3))
-        for axis, name in enumerate("XYZ"):
-            np.multiply(records[name], scale[axis], out=xyz[:, axis])
-        xyz += offset
-        times = cloud_file.trajectory_time(records["gps_time"])
-        cloud = PointCloud(xyz, times, records["intensity"].copy())
-        is_timed = np.isfinite(times)
-        if is_timed.any():
-            yield cloud if is_timed.all() else cloud[is_timed]
-    is_whole = first == 0 and end in (None, layout.points)
-    count_noise(cloud_file, None if is_whole else (first, end or layout.points), flagged, read)
-
-
-def sha256(path: str | Path) -> str:
-    """SHA-256 of a file.
-
-    Parameters
-    ----------
-    path : path
-
-    Returns
-    -------
-    str
-        Hexadecimal digits.
-    """
-    with open_file(path) as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
-
-
 def records_at(layout: LasLayout, places: ArrayLike) -> np.ndarray:
     """Records of a few points, of which only gps_time and point_source_id are sure to be decoded.
 
@@ -170,10 +225,11 @@ def records_at(layout: LasLayout, places: ArrayLike) -> np.ndarray:
         decoder = layout.decoder(file, threads=False, is_brief=True)
         for k, place in enumerate(places.tolist()):
             is_ahead = place >= reached and place // size == reached // size
-            raw = bytearray((place - reached if is_ahead else 0) * length + length)
             with decoding_points(layout, place, place + 1):
                 if not is_ahead:
                     decoder.seek(place)  # decodes the chunk from its start
+                    reached = place
+                raw = bytearray((place - reached + 1) * length)
                 decoder.decompress_many(raw)
             records[k] = np.frombuffer(raw[-length:], layout.record)[0]
             reached = place + 1
@@ -193,3 +249,97 @@ def count_sources(layout: LasLayout) -> np.ndarray:
     for records in read_records(layout, SETTINGS.chunk_points, is_brief=True):
         counts += np.bincount(records["point_source_id"], minlength=len(counts))
     return counts
+
+
+def sha256(path: str | Path) -> str:
+    """SHA-256 of a file.
+
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    str
+        Hexadecimal digits.
+    """
+    with open_file(path) as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+@dataclass
+class NoiseCount:
+    """Points that were left out as noise.
+
+    Parameters
+    ----------
+    parts : dict
+        Numbers of points flagged and read, by file and the part of it that was read (None for all).
+    """
+
+    parts: dict[CloudFile, dict[tuple[int, int] | None, tuple[int, int]]] = field(
+        default_factory=dict
+    )
+
+    def add(self, file: CloudFile, part: tuple[int, int] | None, flagged: int, read: int) -> None:
+        """Count what was read once, however often it is read again.
+
+        Parameters
+        ----------
+        file : CloudFile
+        part : (int, int) or None
+            First point, and the one behind the last; None for all of the file.
+        flagged, read : int
+            Number of points.
+        """
+        self.parts.setdefault(file, {})[part] = flagged, read
+
+    @property
+    def totals(self) -> tuple[int, int]:
+        """Number of points flagged as noise, and of all that were read."""
+        flagged = read = 0
+        for own in self.parts.values():
+            for counts in [own[None]] if None in own else own.values():
+                flagged += counts[0]
+                read += counts[1]
+        return flagged, read
+
+    @property
+    def sentence(self) -> str:
+        """Sentence on them; empty where there are none."""
+        flagged, read = self.totals
+        if not flagged:
+            return ""
+        classes = sorted({number for file in self.parts for number in file.noise_classes})
+        return _noise_sentence(flagged, read, classes)
+
+
+_count: ContextVar[NoiseCount | None] = ContextVar("count", default=None)
+
+
+def _noise_sentence(flagged: int, points: int, classes: list[int]) -> str:
+    """Sentence on points that are flagged as noise."""
+    kinds = "withheld"
+    if classes:
+        kinds += f" or of class {' or '.join(map(str, classes))}"
+    return (
+        f"{flagged} of {points} points read are flagged as noise ({kinds}). They take no part in "
+        "any measurement, and are corrected like all others; cloud.noise_classes in survey.toml "
+        "names other classes."
+    )
+
+
+@contextmanager
+def counted_noise() -> Iterator[NoiseCount]:
+    """Count the points that reading leaves out as noise until the block ends.
+
+    Yields
+    ------
+    NoiseCount
+    """
+    count = NoiseCount()
+    token = _count.set(count)
+    try:
+        yield count
+    finally:
+        _count.reset(token)

@@ -1,7 +1,7 @@
 """LAS and LAZ files, checked against their bytes before their points are read."""
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import BinaryIO
 
@@ -9,13 +9,13 @@ import lazrs
 import numpy as np
 from laspy import PointFormat, supported_point_formats
 
-from mlscorr.io.clouds._copc import check_hierarchy
-from mlscorr.io.clouds._las_points import decoding
 from mlscorr.io.clouds.conversion import converted, is_foreign
-from mlscorr.io.clouds.las_layout import LasLayout
+from mlscorr.io.clouds.las_layout import COPC, LasLayout, decoding
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.store import as_path, file_state, is_there, open_file
 
+INFO = struct.Struct("<5d2Q2d88x")  # centre, half edge, spacing; root page; first and last time
+ENTRY = np.dtype([("key", "(4,)<i4"), ("start", "<u8"), ("size", "<i4"), ("points", "<i4")])
 HEADER_SIZES = (227, 227, 227, 235, 375, 393)  # bytes, of LAS 1.0 to 1.5
 COPC_FORMATS = (6, 7, 8)  # COPC 1.0
 EVLR_HEADER = struct.Struct("<2x16sHQ32s")  # owner, record, length of data, description
@@ -43,8 +43,10 @@ def read_layout(path: str | Path) -> LasLayout:
     path = as_path(path)
     if not is_there(path):
         raise ValueError(f"There is no file {path}. Check cloud.files in survey.toml.")
-    source = path if is_foreign(path) else None
-    path = converted(path).path if source else path
+    source = None
+    if is_foreign(path):
+        source = path
+        path = converted(path).path
     size = file_state(path)[0]
     if not size:
         raise ValueError(f"{path} is empty (0 bytes): its copying was interrupted. Copy it anew.")
@@ -187,7 +189,7 @@ def _check_chunks(layout, file):
         if whole != layout.points:
             raise ValueError(_other_count(layout, whole))
     if layout.is_copc:
-        check_hierarchy(layout, file, chunks)
+        _check_hierarchy(layout, file, chunks)
     return table
 
 
@@ -257,7 +259,9 @@ def evlrs(layout: LasLayout, file: BinaryIO) -> Iterator[tuple[int, int]]:
     layout : LasLayout
     file : binary file
     """
-    position, count = layout.field("QI", 235) if layout.version >= (1, 4) else (0, 0)
+    if layout.version < (1, 4):
+        return
+    position, count = layout.field("QI", 235)
     for _ in range(count):
         file.seek(min(position, layout.size))  # of a damaged file it may lie anywhere
         header = file.read(EVLR_HEADER.size)
@@ -283,3 +287,61 @@ def variable_records(layout: LasLayout, user: bytes, record: int) -> list[bytes]
             if (owner[0].split(b"\0")[0], owner[1]) == (user, record):
                 data.append(file.read(size - EVLR_HEADER.size))
     return data
+
+
+def _check_hierarchy(layout: LasLayout, file: BinaryIO, chunks: Sequence[tuple[int, int]]) -> None:
+    """That each LAZ chunk of a COPC file is a node of its hierarchy, and each node a chunk."""
+    info = b"".join(layout.vlr_data(*COPC))
+    if len(info) != INFO.size:
+        raise ValueError(
+            f"{layout.path} is damaged: its COPC info VLR has {len(info)} bytes, not {INFO.size}. "
+            "Copy the file anew."
+        )
+    start, size = INFO.unpack(info)[5:7]
+    entries = np.concatenate([np.empty(0, ENTRY), *_pages(layout, file, start, size, len(chunks))])
+    nodes = np.sort(entries[entries["points"] > 0], order="start")
+    points, sizes = np.array(chunks, np.int64).T
+    starts = len(layout.head) + 8 + np.cumsum(sizes) - sizes  # behind the position of their table
+    same = len(nodes) == len(chunks) and (
+        np.array_equal(nodes["start"], starts)
+        and np.array_equal(nodes["size"], sizes)
+        and np.array_equal(nodes["points"], points)
+    )
+    if not same:
+        raise ValueError(
+            f"{layout.path} is damaged: its COPC hierarchy has {len(nodes)} nodes of "
+            f"{nodes['points'].sum(dtype=np.int64)} points, its LAZ chunks are {len(chunks)} of "
+            f"{points.sum()}, and they are not the same ones. A program that knows no COPC may "
+            "have rewritten it. Write it anew: pdal translate IN.copc.laz OUT.laz."
+        )
+
+
+def _pages(layout, file, start, size, chunks) -> Iterator[np.ndarray]:
+    """Entries of each page of a hierarchy."""
+    pages = [(start, size)]
+    known = {start}
+    while pages:
+        start, size = pages.pop()
+        if start + size > layout.size:
+            raise ValueError(
+                f"{layout.path} is cut off: its COPC hierarchy should reach to byte "
+                f"{start + size} of {layout.size}. Its writing or copying was interrupted; copy it "
+                "anew."
+            )
+        if size <= 0 or size % ENTRY.itemsize:
+            raise ValueError(
+                f"{layout.path} is damaged: {size} bytes are no page of a COPC hierarchy. Copy it "
+                "anew."
+            )
+        file.seek(start)
+        entries = np.frombuffer(file.read(size), ENTRY)
+        yield entries
+        for entry in entries[entries["points"] == -1]:  # nodes that are on a page of their own
+            page = int(entry["start"]), int(entry["size"])
+            if page[0] in known or len(known) > chunks:  # a page in circles
+                raise ValueError(
+                    f"{layout.path} is damaged: its COPC hierarchy has page {page[0]} twice, or "
+                    f"more pages than chunks ({chunks}). Copy it anew."
+                )
+            known.add(page[0])
+            pages.append(page)

@@ -1,4 +1,4 @@
-"""What a LAS or LAZ file says of itself, kept as the bytes that it is.
+"""What a LAS or LAZ file says of itself, kept as the bytes that it is, and its point records.
 
 laspy says what point formats and extra bytes are made of, lazrs decodes the points. Header and
 VLRs are kept as bytes, not read and written anew by laspy, which cannot leave alone what nobody
@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Collection, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -21,7 +22,7 @@ import lazrs
 import numpy as np
 from laspy import PointFormat
 
-from mlscorr.io.clouds._las_points import ChunkedPoints, PlainPoints
+from mlscorr.io.store import open_file
 from mlscorr.io.trajectories import ADJUSTMENT
 
 VLR_HEADER = struct.Struct("<2x16sHH32s")  # owner, record, length of data, description
@@ -131,7 +132,9 @@ class LasLayout:
     @property
     def points(self) -> int:
         """Number of points."""
-        return self.field(*(("Q", 247) if self.version >= (1, 4) else ("I", 107)))[0]
+        if self.version >= (1, 4):
+            return self.field("Q", 247)[0]
+        return self.field("I", 107)[0]
 
     @property
     def scale(self) -> np.ndarray:
@@ -148,7 +151,10 @@ class LasLayout:
         """Type of a point record: the fields that are used here by name, the others by length."""
         fields = PointFormat(self.point_format).dtype().fields
         names = ["X", "Y", "Z", "intensity", "gps_time", "point_source_id"]
-        names += [NEW_FLAGS, NEW_CLASS] if self.point_format >= 6 else [OLD_CLASS]
+        if self.point_format >= 6:
+            names += [NEW_FLAGS, NEW_CLASS]
+        else:
+            names.append(OLD_CLASS)
         kinds, starts = zip(*(fields[name][:2] for name in names), strict=True)
         form: Any = {"names": names, "formats": kinds, "offsets": starts}
         return np.dtype(form | {"itemsize": self.record_length})
@@ -241,7 +247,10 @@ class LasLayout:
         kept = [self.head[a:b] for a, b in self.vlrs if self.owner(a) != (user, record)]
         if data is not None:
             kept.append(VLR_HEADER.pack(user, record, len(data), description) + data)
-        between = self.head[self.vlrs[-1][1] if self.vlrs else header_size :]
+        end = header_size
+        if self.vlrs:
+            end = self.vlrs[-1][1]
+        between = self.head[end:]
         head = bytearray(self.head[:header_size] + b"".join(kept) + between)
         struct.pack_into("<II", head, 96, len(head), len(kept))
         return bytes(head)
@@ -270,8 +279,10 @@ class LasLayout:
     @property
     def chunk_size(self) -> int:
         """Number of points that are decoded together; 1 where it is none or differs by chunk."""
-        vlr = lazrs.LazVlr(self.laszip) if self.is_compressed else None
-        if vlr is None or vlr.uses_variable_size_chunks():
+        if not self.is_compressed:
+            return 1
+        vlr = lazrs.LazVlr(self.laszip)
+        if vlr.uses_variable_size_chunks():
             return 1
         return vlr.chunk_size()
 
@@ -314,14 +325,208 @@ class LasLayout:
         """
         file.seek(len(self.head))
         if not self.is_compressed:
-            return PlainPoints(file, len(self.head), self.record_length)
-        brief = lazrs.SELECTIVE_DECOMPRESS_GPS_TIME | lazrs.SELECTIVE_DECOMPRESS_POINT_SOURCE_ID
-        fields = brief if is_brief else lazrs.SELECTIVE_DECOMPRESS_ALL
+            return _PlainPoints(file, len(self.head), self.record_length)
+        fields = lazrs.SELECTIVE_DECOMPRESS_ALL
+        if is_brief:
+            fields = lazrs.SELECTIVE_DECOMPRESS_GPS_TIME
+            fields |= lazrs.SELECTIVE_DECOMPRESS_POINT_SOURCE_ID
         selection = lazrs.DecompressionSelection(fields)
         if lazrs.LazVlr(self.laszip).uses_variable_size_chunks():
-            return ChunkedPoints(file, self.laszip, selection)
+            return _ChunkedPoints(file, self.laszip, selection)
         if threads:
-            kind = lazrs.ParLasZipDecompressor
-        else:
-            kind = lazrs.LasZipDecompressor
-        return kind(file, self.laszip, selection)
+            return lazrs.ParLasZipDecompressor(file, self.laszip, selection)
+        return lazrs.LasZipDecompressor(file, self.laszip, selection)
+
+
+def read_records(
+    layout: LasLayout,
+    chunk_size: int,
+    first: int = 0,
+    end: int | None = None,
+    is_brief: bool = False,
+) -> Iterator[np.ndarray]:
+    """Records chunk by chunk, each in the memory of the one before.
+
+    Parameters
+    ----------
+    layout : LasLayout
+    chunk_size : int
+        Points at a time.
+    first, end : int
+        As of read_chunks.
+    is_brief : bool
+        Whether gps_time and point_source_id do.
+
+    Yields
+    ------
+    (n,) structured array
+
+    Raises
+    ------
+    ValueError
+        For points that cannot be decoded.
+    """
+    length = layout.record_length
+    last = layout.points if end is None else end
+    buffer = np.empty(min(chunk_size, last - first) * length, np.uint8)
+    with open_file(layout.path) as file:
+        decoder = layout.decoder(file, is_brief=is_brief)
+        if first:
+            decoder.seek(first)
+        for start in range(first, last, chunk_size):
+            stop = min(start + chunk_size, last)
+            raw = buffer[: (stop - start) * length]
+            with decoding_points(layout, start, stop):
+                decoder.decompress_many(raw)
+            yield raw.view(layout.record)
+
+
+def decoding_points(layout: LasLayout, first: int, end: int) -> AbstractContextManager:
+    """Where lazrs reads some points of a file."""
+    if end - first > 1:
+        points = f"Points {first} to {end - 1}"
+    else:
+        points = f"Point {first}"
+    return decoding(f"{points} of {layout.points} in {layout.path} cannot be decoded")
+
+
+@contextmanager
+def decoding(message: str) -> Iterator[None]:
+    """Where lazrs works: its errors, and what it aborts with, become a sentence.
+
+    Parameters
+    ----------
+    message : str
+        What can't be read. It ends where lazrs' own words follow in brackets.
+
+    Raises
+    ------
+    ValueError
+    """
+    try:
+        yield
+    except BaseException as error:
+        # a Rust panic derives from BaseException, and has no name that could be imported
+        if not isinstance(error, lazrs.LazrsError) and type(error).__name__ != "PanicException":
+            raise
+        raise ValueError(
+            f"{message} ({error}). The file is cut off or damaged; copy it anew."
+        ) from error
+
+
+class _PlainPoints:
+    """Uncompressed points, read as lazrs reads the compressed ones.
+
+    Parameters
+    ----------
+    file : binary file
+        Open for reading.
+    start : int
+        Byte where the points start.
+    record_length : int
+        Units: bytes.
+    """
+
+    def __init__(self, file: BinaryIO, start: int, record_length: int):
+        self._file: Any = file
+        self._start = start
+        self._length = record_length
+
+    def seek(self, point: int) -> None:
+        """Go on with a point.
+
+        Parameters
+        ----------
+        point : int
+            Its number.
+        """
+        self._file.seek(self._start + point * self._length)
+
+    def decompress_many(self, buffer: bytearray | np.ndarray) -> None:
+        """Fill a buffer with the points that follow.
+
+        Parameters
+        ----------
+        buffer : writable buffer of whole points
+
+        Raises
+        ------
+        lazrs.LazrsError
+            Where points are missing.
+        """
+        if self._file.readinto(buffer) != len(buffer):
+            raise lazrs.LazrsError("the file ends")
+
+
+class _ChunkedPoints:
+    """Reads points as lazrs' decompressors do, whose seek goes astray where chunks differ in size.
+
+    Parameters
+    ----------
+    file : binary file
+        Open for reading where the points start.
+    laszip : bytes
+        Data of the LASzip VLR.
+    selection : lazrs.DecompressionSelection
+        Which fields are decoded.
+    """
+
+    def __init__(self, file: BinaryIO, laszip: bytes, selection: lazrs.DecompressionSelection):
+        self._file = file
+        self._laszip = laszip
+        self._selection = selection
+        vlr = lazrs.LazVlr(laszip)
+        self._length = vlr.item_size()
+        self._chunks = lazrs.read_chunk_table(file, vlr)  # leaves the file at the first chunk
+        points, sizes = np.array(self._chunks, np.int64).T
+        self._firsts = np.cumsum(points) - points  # numbers of the chunks' first points
+        self._starts = file.tell() + np.cumsum(sizes) - sizes
+        self._next = 0
+        self._held = np.empty(0, np.uint8)
+
+    def seek(self, point: int) -> None:
+        """Go on with a point.
+
+        Parameters
+        ----------
+        point : int
+            Its number.
+        """
+        self._next = int(np.searchsorted(self._firsts, point, side="right")) - 1
+        before = point - int(self._firsts[self._next])
+        self._held = self._decoded(1)[before * self._length :]
+
+    def decompress_many(self, buffer: bytearray | np.ndarray) -> None:
+        """Fill a buffer with the points that follow.
+
+        Parameters
+        ----------
+        buffer : writable buffer of whole points
+
+        Raises
+        ------
+        lazrs.LazrsError
+            Where points are missing or can't be decoded.
+        """
+        rest = np.frombuffer(buffer, np.uint8)
+        while len(rest):
+            if not len(self._held):
+                self._held = self._decoded(len(rest) // self._length)
+            taken = min(len(rest), len(self._held))
+            rest[:taken] = self._held[:taken]
+            rest = rest[taken:]
+            self._held = self._held[taken:]
+
+    def _decoded(self, points):
+        """Bytes of the next chunks, which hold so many points at least, if there are as many."""
+        if self._next == len(self._chunks):
+            raise lazrs.LazrsError("the file ends")
+        end = self._next + 1
+        end = max(end, int(np.searchsorted(self._firsts, self._firsts[self._next] + points)))
+        run = self._chunks[self._next : end]
+        self._file.seek(int(self._starts[self._next]))
+        data = self._file.read(sum(size for _, size in run))
+        decoded = np.empty(sum(count for count, _ in run) * self._length, np.uint8)
+        lazrs.decompress_points_with_chunk_table(data, self._laszip, decoded, run, self._selection)
+        self._next = end
+        return decoded

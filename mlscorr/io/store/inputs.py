@@ -1,12 +1,66 @@
-"""Files that are read, and whether they are still those that were read."""
+"""Files that are read: which each is, and whether it is still the one that was read.
 
+A file is told by its size, time of change, and bytes of its head and tail.
+"""
+
+from __future__ import annotations
+
+import hashlib
 from collections.abc import Sequence
-from dataclasses import astuple
+from dataclasses import astuple, dataclass, replace
 from pathlib import Path
 
-from mlscorr.io.store.identity import FileIdentity
-from mlscorr.io.store.storage import as_path
+from mlscorr.io.settings import SETTINGS
+from mlscorr.io.store.storage import ETAG, as_path, file_state, open_file
 from mlscorr.survey import InputFile
+
+
+@dataclass(frozen=True)
+class FileIdentity:
+    """What a file is told by without reading all of it.
+
+    Parameters
+    ----------
+    size : int
+        Units: bytes.
+    changed : int or str
+        Time of the last change (ns), or a store's ETag.
+    digest : str
+        SHA-256 of its first and last bytes; of none where an ETag tells contents apart.
+    """
+
+    size: int
+    changed: int | str
+    digest: str
+
+    @classmethod
+    def of(cls, path: str | Path) -> FileIdentity:
+        """That of a file as it stands.
+
+        Parameters
+        ----------
+        path : path
+
+        Raises
+        ------
+        OSError
+            Where it can't be read.
+        """
+        size, changed = file_state(path)
+        hashed = hashlib.sha256()
+        if not str(changed).startswith(ETAG):
+            with open_file(path, is_scattered=True) as file:
+                hashed.update(file.read(SETTINGS.identified_bytes))
+                file.seek(max(0, size - SETTINGS.identified_bytes))
+                hashed.update(file.read(SETTINGS.identified_bytes))
+        return cls(size, changed, hashed.hexdigest())
+
+    @property
+    def content(self) -> FileIdentity:
+        """The same without the time of the last change, where the digest tells of the contents."""
+        if str(self.changed).startswith(ETAG):
+            return self
+        return replace(self, changed=0)
 
 
 def input_file(what: str, path: str | Path) -> InputFile:
@@ -44,10 +98,9 @@ def check_unchanged(inputs: Sequence[InputFile]) -> None:
     if changed:
         file = changed[0]
         state = _state(changed[0].path)
+        size = "it is gone"
         if any(state):
             size = f"{state[0]} bytes now, {file.state[0]} then"
-        else:
-            size = "it is gone"
         raise OSError(
             f"{len(changed)} of {len(inputs)} input files were replaced or changed since they were "
             f"read (first: the {file.what} {file.path}, {size}): another program may still be "

@@ -1,5 +1,9 @@
-"""Results: a folder that appears whole or not at all, and JSON documents."""
+"""Results: a folder of a disk that appears whole or not at all, single files, and JSON documents.
 
+What isn't whole yet stands beside its place, locked by the process that writes it.
+"""
+
+import ctypes
 import errno
 import glob
 import json
@@ -7,11 +11,11 @@ import math
 import os
 import secrets
 import shutil
+import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
-from mlscorr.io.store._folders import exchange, move_into, remove, take_along
 from mlscorr.io.store.inputs import check_unchanged
 from mlscorr.io.store.publishing import check_contents, publish, scratch_folder
 from mlscorr.io.store.storage import as_path, is_remote
@@ -21,7 +25,6 @@ try:
     import fcntl
 except ImportError:  # Windows: no folder or run has a lock, and what killed runs leave stays
     fcntl = None
-
 PART = ".part"  # ends the name of what isn't whole yet
 
 
@@ -70,16 +73,16 @@ def check_output(
     own = {(out / name).resolve(): Path(name) for name in (*folders, "")}
     pairs = zip(files, places, strict=True)
     held = [str(own[where] / path.name) for path, two in pairs for where in two if where in own]
-    check_contents(out, held, [] if overwrite else _entries(out))
+    present = [] if overwrite else _entries(out)
+    check_contents(out, held, present)
     _place(out)
 
 
 def _entries(out):
     """Names in a folder, but those of results that aren't whole yet."""
-    if out.is_dir():
-        names = sorted(path.name for path in out.iterdir())
-    else:
-        names = []
+    if not out.is_dir():
+        return []
+    names = sorted(path.name for path in out.iterdir())
     return [n for n in names if not (n.startswith(_prefix(out)) and n.endswith(PART))]
 
 
@@ -103,11 +106,13 @@ def _place(out):
     except OSError as error:
         if out.is_dir() and os.access(out, os.W_OK):
             return out.resolve()
-        refusing, cause = (out, "not writable") if probe.exists() else (above, error.strerror)
         lacks = "used" if out.is_dir() else "made"
+        if probe.exists():
+            refusal = f"{out} takes no folder (not writable)"
+        else:
+            refusal = f"{above} takes no folder ({error.strerror})"
         raise OSError(
-            f"the output folder {out} can't be {lacks}: {refusing} takes no folder ({cause}). "
-            "Choose another place."
+            f"the output folder {out} can't be {lacks}: {refusal}. Choose another place."
         ) from None
     finally:  # wherever an interruption left it
         for folder in (probe, inside):
@@ -119,35 +124,6 @@ def _place(out):
 def _part(out, place):
     """A name for what isn't whole yet, known before it is made, so that it can be removed."""
     return place / f"{_prefix(out)}{secrets.token_hex(8)}{PART}"
-
-
-@contextmanager
-def output_file(path: str | Path) -> Iterator[Path]:
-    """A file to write into, which takes its name only when all went well.
-
-    It stands beside the path until then. A file there is replaced.
-
-    Parameters
-    ----------
-    path : path
-
-    Yields
-    ------
-    Path
-        The file to write into.
-    """
-    path = as_path(path)
-    if is_remote(path):
-        with scratch_folder() as folder:
-            yield folder / path.name
-            publish(folder / path.name, path)
-        return
-    part = path.with_name(path.name + PART)
-    try:
-        yield part
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
 
 
 @contextmanager
@@ -245,10 +221,105 @@ def _finish(part, out, overwrite):
             "They were left as they are, and nothing of this run was kept. Choose another folder."
         )
     if is_inside:
-        move_into(out, part)
+        _move_into(out, part)
     else:
-        take_along(out, part)
-        exchange(out, part)
+        _take_along(out, part)
+        _exchange(out, part)
+
+
+def _take_along(out: Path, part: Path) -> None:
+    """Link into part what out holds beside it, so that part can take its place."""
+    for path in sorted(out.rglob("*")):
+        twin = part / path.relative_to(out)
+        is_folder = path.is_dir() and not path.is_symlink()
+        if os.path.lexists(twin):
+            if is_folder != twin.is_dir():
+                raise IsADirectoryError(f"{path} is a folder, where a file belongs.")
+        elif is_folder:
+            twin.mkdir()
+        else:
+            try:
+                os.link(path, twin, follow_symlinks=False)
+            except OSError:  # a disk that knows no links, or files of another user
+                shutil.copy2(path, twin, follow_symlinks=False)
+
+
+def _exchange(out: Path, part: Path) -> None:
+    """Exchange two folders, at once where the system can."""
+    rename = None
+    if os.name != "nt":
+        rename = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
+    # AT_FDCWD and RENAME_EXCHANGE of linux/fs.h
+    here = -100
+    swap = 2
+    if rename is None or rename(here, os.fsencode(part), here, os.fsencode(out), swap):
+        _move_into(out, part)
+
+
+def _move_into(out: Path, part: Path) -> None:
+    """Move the files of part into out file by file; on failure what they replace is put back."""
+    files = [path.relative_to(part) for path in sorted(part.rglob("*")) if path.is_file()]
+    replaced = Path(tempfile.mkdtemp(dir=part))
+    made = []
+    try:
+        for file in files:
+            if not (out / file).parent.exists():
+                (out / file).parent.mkdir()
+                made.append(file.parent)
+            if (out / file).is_dir():
+                raise IsADirectoryError(f"{out / file} is a folder, where a file belongs.")
+            if (out / file).exists():
+                (replaced / file).parent.mkdir(exist_ok=True)
+                os.replace(out / file, replaced / file)
+            os.replace(part / file, out / file)
+    except BaseException:
+        for file in files:
+            if not (part / file).exists():
+                (out / file).unlink(missing_ok=True)
+            if (replaced / file).exists():
+                os.replace(replaced / file, out / file)
+        for folder in made:
+            (out / folder).rmdir()
+        raise
+
+
+def remove(folder: Path) -> None:
+    """Remove a folder, also when an impatient user interrupts once more."""
+    while folder.exists():
+        try:
+            shutil.rmtree(folder, ignore_errors=True)
+            return
+        except KeyboardInterrupt:
+            continue
+
+
+@contextmanager
+def output_file(path: str | Path) -> Iterator[Path]:
+    """A file to write into, which takes its name only when all went well.
+
+    It stands beside the path until then. A file there is replaced.
+
+    Parameters
+    ----------
+    path : path
+
+    Yields
+    ------
+    Path
+        The file to write into.
+    """
+    path = as_path(path)
+    if is_remote(path):
+        with scratch_folder() as folder:
+            yield folder / path.name
+            publish(folder / path.name, path)
+        return
+    part = path.with_name(path.name + PART)
+    try:
+        yield part
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
 
 
 def document(name: str, content: dict) -> dict:

@@ -25,9 +25,15 @@ def _holding(variable: ContextVar, value: Any) -> Iterator[None]:
         variable.reset(token)
 
 
-def glance() -> AbstractContextManager[None]:
-    """Take the first points of large files only, for what must be done in seconds."""
-    return _holding(_limit, SETTINGS.glanced_points)
+def glance(points: int = SETTINGS.glanced_points) -> AbstractContextManager[None]:
+    """Take the first points of large files only, for what must be done in seconds.
+
+    Parameters
+    ----------
+    points : int
+        How many of each file.
+    """
+    return _holding(_limit, points)
 
 
 def announced(progress: Any) -> AbstractContextManager[None]:

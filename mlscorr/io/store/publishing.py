@@ -13,8 +13,7 @@ from time import monotonic, sleep
 from typing import Any, TextIO, cast
 
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.store.opening import read_bytes
-from mlscorr.io.store.storage import WEB, asking, check_bucket, is_remote, is_there
+from mlscorr.io.store.storage import WEB, asking, check_bucket, is_remote, is_there, read_bytes
 from mlscorr.wording import counted
 
 S3 = ("s3", "s3a")  # schemes of stores that take a file in parts, side by side
@@ -92,9 +91,11 @@ def publish(source: Path, target: Any) -> None:
     if not is_remote(target):
         os.replace(source, target)
         return
-    parts = {"chunksize": SETTINGS.uploaded_bytes, "max_concurrency": 2}
+    parts = {}
+    if target.protocol in S3:
+        parts = {"chunksize": SETTINGS.uploaded_bytes, "max_concurrency": 2}
     with asking(target):
-        target.fs.put_file(str(source), target.path, **(parts if target.protocol in S3 else {}))
+        target.fs.put_file(str(source), target.path, **parts)
         target.fs.invalidate_cache()
 
 

@@ -1,21 +1,27 @@
-"""Paths and URLs: which files are there, in a store as on a disk.
+"""Paths and URLs: which files are there, and their bytes, in a store as on a disk.
 
 A URL is a UPath of universal_pathlib, which has pathlib's interface; neither it nor fsspec is
 imported before there is a URL. Settings of a store (endpoint, credentials) are those of its own
 tools and of fsspec, in the environment, so that workers have them too.
 """
 
+import glob
+import io
+import math
 import os
 import posixpath
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, cast
 
-from mlscorr.io.store.patterns import names_like
+import numpy as np
 
+from mlscorr.io.settings import SETTINGS
+
+ALL_FOLDERS = "**"
 ETAG = "ETag"  # begins what a store tells contents apart by
 URL = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+://")  # a drive of Windows has a single letter
 BUCKETS = ("s3", "s3a", "gs", "gcs")  # schemes of stores that have them
@@ -63,9 +69,9 @@ def as_path(name: str | Path) -> Path:
     ImportError
         Where the package is missing that reads it.
     """
-    if is_remote(name) or not is_url(name):
-        if is_remote(name):
-            return cast(Path, name)
+    if is_remote(name):
+        return cast(Path, name)
+    if not is_url(name):
         return Path(name)
     scheme = str(name).partition("://")[0]
     try:
@@ -167,41 +173,6 @@ def is_folder(path: Path) -> bool:
         return cast(Any, path).fs.isdir(cast(Any, path).path)
 
 
-def files_like(folder: Path, pattern: str) -> list[Path]:
-    """Files by a pattern, in order of their names.
-
-    Parameters
-    ----------
-    folder : Path
-    pattern : str
-        From the folder, or a URL. On a disk ``**`` enters each folder once, whatever links to it.
-
-    Raises
-    ------
-    ValueError
-        For a pattern of a web server.
-    OSError
-        As is_there.
-    """
-    if not is_url(pattern) and not is_remote(folder):
-        stem, end = posixpath.splitext(pattern)  # endings in capitals are as good
-        names = {pattern, stem + end.lower(), stem + end.upper()}
-        paths = {folder / match for name in names for match in names_like(folder, name)}
-        return sorted(path for path in paths if not path.is_dir())
-    path: Any = as_path(pattern) if is_url(pattern) else resolved(folder / pattern)
-    if path.protocol in WEB:
-        raise ValueError(
-            f"{path} is a pattern of a web server, which lists nothing: name each file."
-        )
-    with asking(path):
-        path.fs.invalidate_cache()
-        infos = path.fs.glob(path.path, detail=True)
-        names = sorted(name for name, info in infos.items() if info["type"] != "directory")
-    if not names:
-        check_bucket(path)
-    return [as_path(path.fs.unstrip_protocol(name)) for name in names]
-
-
 def file_state(path: str | Path) -> tuple[int, int | str]:
     """Size of a file (bytes), and time of its last change (ns); of one in a store, its ETag.
 
@@ -219,11 +190,9 @@ def file_state(path: str | Path) -> tuple[int, int | str]:
         return state.st_size, state.st_mtime_ns
     with asking(path):
         info = _info(path)
-    tag = info.get("ETag") or info.get("etag")
-    if tag:
+    changed = str(info.get("LastModified") or info.get("created"))
+    if tag := info.get("ETag") or info.get("etag"):
         changed = f"{ETAG} {tag}"
-    else:
-        changed = str(info.get("LastModified") or info.get("created"))
     return info.get("size") or 0, changed
 
 
@@ -287,3 +256,231 @@ def check_bucket(path: Any) -> None:
         raise FileNotFoundError(
             f"{path} can't be read: there is no bucket {bucket} at this endpoint."
         ) from None
+
+
+def open_file(
+    path: str | Path,
+    encoding: str | None = None,
+    newline: str | None = None,
+    errors: str = "strict",
+    is_scattered: bool = False,
+) -> Any:
+    """A file open for reading, of text where its encoding is given; of a store by ranges.
+
+    Parameters
+    ----------
+    path : path
+    encoding, newline, errors
+        As of open.
+    is_scattered : bool
+        Whether bytes here and there are read, not all in a row: a store gives less at a time.
+
+    Raises
+    ------
+    OSError
+        Where it can't be read; in a ``with`` also where a library hid that behind its own error.
+    """
+    if not is_remote(path):
+        if encoding is None:
+            return open(path, "rb")
+        return open(path, encoding=encoding, errors=errors, newline=newline)
+    size = SETTINGS.identified_bytes if is_scattered else SETTINGS.copied_bytes
+    reader = _Reader(_Ranges(path, size))
+    if encoding:
+        return io.TextIOWrapper(reader, encoding, errors, newline)
+    return reader
+
+
+class _Ranges(io.RawIOBase):
+    """A file of a store, fetched by blocks, of which the last few are kept."""
+
+    def __init__(self, path, block_size):
+        super().__init__()
+        self.name = str(path)
+        self.interruption = None
+        with asking(path):
+            path.fs.invalidate_cache(path.path)
+            how = {"block_size": block_size, "cache_type": "blockcache"}
+            self._path, self._file = path, path.fs.open(path.path, "rb", **how)
+        if not self._file.seekable():
+            raise OSError(f"{path} can't be read by ranges: its server has none. Copy it first.")
+
+    def readable(self):
+        return True
+
+    def seekable(self):
+        return True
+
+    def seek(self, offset, whence=io.SEEK_SET):
+        return self._file.seek(offset, whence)
+
+    def readinto(self, buffer):
+        try:
+            with asking(self._path):
+                data = self._file.read(len(buffer))
+        except OSError as error:
+            self.interruption = error
+            raise
+        buffer[: len(data)] = data
+        return len(data)
+
+    def close(self):
+        if not self.closed:
+            self._file.close()
+        super().close()
+
+
+class _Reader(io.BufferedReader):
+    """Raises what the store did, and not what a decoder made of it."""
+
+    def __exit__(self, kind, error, trace):
+        interruption = self.raw.interruption
+        super().__exit__(kind, error, trace)
+        if error is not None and interruption is not None:
+            raise interruption
+
+
+def read_bytes(path: str | Path) -> bytes:
+    """All of a file.
+
+    Parameters
+    ----------
+    path : path
+    """
+    if is_remote(path):
+        store: Any = path
+        with asking(store):
+            return store.fs.cat_file(store.path)
+    return Path(path).read_bytes()
+
+
+def read_doubles(path: str | Path, start: int = 0, count: int = -1) -> np.ndarray:
+    """Doubles (n,) of a binary file, little-endian.
+
+    Parameters
+    ----------
+    path : path
+    start : int
+        Number of the first.
+    count : int
+        How many; all that are left if negative.
+    """
+    size = -1
+    if count >= 0:
+        size = 8 * count
+    with open_file(path) as file:
+        file.seek(8 * start)
+        data = bytearray(file.read(size))
+    return np.frombuffer(data, "<f8", len(data) // 8)
+
+
+def files_like(folder: Path, pattern: str) -> list[Path]:
+    """Files by a pattern, in order of their names.
+
+    Parameters
+    ----------
+    folder : Path
+    pattern : str
+        From the folder, or a URL. On a disk ``**`` enters each folder once, whatever links to it.
+
+    Raises
+    ------
+    ValueError
+        For a pattern of a web server.
+    OSError
+        As is_there.
+    """
+    if not is_url(pattern) and not is_remote(folder):
+        stem, end = posixpath.splitext(pattern)  # endings in capitals are as good
+        names = {pattern, stem + end.lower(), stem + end.upper()}
+        paths = {folder / match for name in names for match in _names_like(folder, name)}
+        return sorted(path for path in paths if not path.is_dir())
+    path: Any = as_path(pattern) if is_url(pattern) else resolved(folder / pattern)
+    if path.protocol in WEB:
+        raise ValueError(
+            f"{path} is a pattern of a web server, which lists nothing: name each file."
+        )
+    with asking(path):
+        path.fs.invalidate_cache()
+        infos = path.fs.glob(path.path, detail=True)
+        names = sorted(name for name, info in infos.items() if info["type"] != "directory")
+    if not names:
+        check_bucket(path)
+    return [as_path(path.fs.unstrip_protocol(name)) for name in names]
+
+
+def _names_like(folder: Path, pattern: str) -> set[str]:
+    """Names of files and folders by a pattern, from a folder."""
+    # Python's own ** follows a link each time that it meets it: two folders that link to each
+    # other are entered in every order, some 2^40 times before the system refuses
+    parts = re.split(r"[\\/]" if os.sep == "\\" else "/", pattern)
+    if ALL_FOLDERS not in parts:
+        return set(glob.glob(pattern, root_dir=folder))
+    place = parts.index(ALL_FOLDERS)
+    before = "/".join([*parts[:place], ""])
+    behind = "/".join(parts[place + 1 :]) or "*"
+    names = set()
+    tops = [""]
+    if before:
+        tops = glob.glob(before, root_dir=folder)
+    for top in tops:
+        for below in folders_below(folder / top):
+            name = Path(top) / below.relative_to(folder / top)
+            names |= {str(name / file) for file in _names_like(below, behind)}
+    return names
+
+
+def folders_below(
+    folder: Path, depth: float = math.inf, is_wanted: Callable[[Path], bool] = lambda _: True
+) -> Iterator[Path]:
+    """A folder and those within it that are not hidden; links are followed, each folder comes once.
+
+    Folders themselves come before links to them. A link to a folder that holds the link, or the
+    first folder, is not followed.
+
+    Parameters
+    ----------
+    folder : Path
+    depth : float
+        Number of levels below the folder.
+    is_wanted : function of a Path
+        Whether one of the folders within it is entered.
+
+    Yields
+    ------
+    Path
+    """
+    top = os.path.realpath(folder)
+    entered = set()
+    waiting = [(folder, 0)]
+    links: list[tuple[Path, int]] = []
+    while waiting or links:
+        here, level = waiting.pop() if waiting else links.pop(0)
+        real = os.path.realpath(here)
+        if real in entered:
+            continue
+        entered.add(real)
+        if level and not is_wanted(here):
+            continue
+        yield here
+        if level >= depth:
+            continue
+        for path in _folders_in(here):
+            if not path.is_symlink():
+                waiting.append((path, level + 1))
+            elif not any(_holds(os.path.realpath(path), inner) for inner in (real, top)):
+                links.append((path, level + 1))
+
+
+def _folders_in(folder):
+    """Folders in a folder, links to folders among them; none in one that may not be read."""
+    try:
+        names = sorted(os.listdir(folder), reverse=True)
+    except OSError:
+        return []
+    return [folder / name for name in names if name[0] != "." and (folder / name).is_dir()]
+
+
+def _holds(folder, inner):
+    """Return True if a real path is that of a folder, or lies below it."""
+    return inner == folder or inner.startswith(os.path.join(folder, ""))

@@ -15,10 +15,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mlscorr.io.store import publishing
-from mlscorr.io.store._folders import remove
-from mlscorr.io.store.opening import read_bytes
-from mlscorr.io.store.output import PART, fcntl
-from mlscorr.io.store.storage import is_remote, is_there
+from mlscorr.io.store.output import PART, fcntl, remove
+from mlscorr.io.store.storage import is_remote, is_there, read_bytes
 
 SUFFIX = ".result"
 LOCK = "lock"

@@ -9,7 +9,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.store.opening import open_file
+from mlscorr.io.store.storage import open_file
 
 ENCODING = "utf-8-sig"  # UTF-8, with or without a byte order mark
 ENCODINGS = {ENCODING: "UTF-8", "utf-16": "UTF-16", "gb18030": "GB 18030", "cp1252": "Windows-1252"}

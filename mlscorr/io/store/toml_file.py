@@ -1,7 +1,13 @@
-"""TOML files read into pydantic models, with one sentence on each thing that is wrong in them."""
+"""TOML files read into pydantic models, with one sentence on each thing that is wrong in them.
 
+A value that only the user knows is an open place, marked by "?", until it is filled in.
+"""
+
+import json
 import re
 import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args
 
@@ -12,16 +18,24 @@ from pydantic import (
     ValidationError,
 )
 
-from mlscorr.io.store.open_places import check_answered
-from mlscorr.io.store.opening import read_bytes
-from mlscorr.io.store.storage import as_path, is_folder, is_there
+from mlscorr.io.store.storage import as_path, is_folder, is_there, read_bytes
 from mlscorr.io.store.text_files import ENCODING, nearest, shown, warn_of_cut
+from mlscorr.survey import SurveyFileError
+from mlscorr.wording import counted
 
+MARK = "?"  # stands for a value that is still open; no key can have it
 Model = TypeVar("Model", bound=BaseModel)
-
-
 # The same known keys as those that the next sentence names
-REPEATED = re.compile(r"; known are ([^.]+)\.(?= \S+ is an unknown key; known are \1\.)")
+_REPEATED = re.compile(r"; known are ([^.]+)\.(?= \S+ is an unknown key; known are \1\.)")
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Meters = Annotated[float, Field(ge=-100, le=100, allow_inf_nan=False)]
+Coordinate = Annotated[float, Field(allow_inf_nan=False)]
+Degrees = Annotated[float, Field(ge=-360, le=360, allow_inf_nan=False)]
+Three = Field(min_length=3, max_length=3)
+Six = Field(min_length=6, max_length=6)
+Column = Annotated[str, Field(min_length=1)] | Annotated[int, Field(ge=1)] | None
+PointSource = Annotated[int, Field(ge=0, le=65535)]  # 16 bits of a LAS point
+Share = Annotated[float, Field(ge=-1, le=1, allow_inf_nan=False)]
 
 
 class TomlSection(BaseModel):
@@ -72,7 +86,7 @@ def read_toml(path: str | Path, model: type[Model], kind: str) -> Model:
         raise ValueError(
             f"{path} can't be read: brackets are nested too deep, or a number has too many digits."
         ) from None
-    check_answered(path, document)
+    _check_answered(path, document)
     validated = validate(str(path), document, model)
     warn_of_cut(path)
     return validated
@@ -97,7 +111,7 @@ def validate(source: str, document: dict[str, Any], model: type[Model]) -> Model
         return model.model_validate(document)
     except ValidationError as error:
         sentences = " ".join(_sentence(item, model) for item in _causes(error.errors()))
-        raise ValueError(f"{source}: {REPEATED.sub('.', sentences)}") from None
+        raise ValueError(f"{source}: {_REPEATED.sub('.', sentences)}") from None
 
 
 def _causes(items):
@@ -161,28 +175,112 @@ def _sections(annotation):
     return [section for part in get_args(annotation) for section in _sections(part)]
 
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+@dataclass(frozen=True)
+class OpenPlace:
+    """A key of survey.toml whose value only the user knows.
+
+    Parameters
+    ----------
+    keys : tuple of str
+        Sections and key, from the outermost.
+    examples : tuple
+        Values that it may have, the likeliest first; empty where none can be named.
+    about : str
+        Meaning of the value, in a few words.
+    """
+
+    keys: tuple[str, ...]
+    examples: tuple[Any, ...] = ()
+    about: str = ""
+
+    @property
+    def key(self) -> str:
+        """The dotted key, as TOML has it.
+
+        Examples
+        --------
+        >>> OpenPlace(("control", "words", "Tafel 0,6")).key
+        'control.words."Tafel 0,6"'
+        """
+        return ".".join(map(_quoted, self.keys))
+
+    @property
+    def option(self) -> str:
+        """The option of init that gives the value.
+
+        Examples
+        --------
+        >>> OpenPlace(("control", "size"), (0.6,)).option
+        "--set 'control.size = 0.6'"
+        """
+        value = "..."
+        if self.examples:
+            value = json.dumps(self.examples[0], ensure_ascii=False)
+        return f"--set '{self.key} = {value}'"
+
+    def __str__(self) -> str:
+        values = ", ".join(json.dumps(value, ensure_ascii=False) for value in self.examples)
+        if self.about and values:
+            return f"{self.about}: {values}"
+        return self.about or values
 
 
-Meters = Annotated[float, Field(ge=-100, le=100, allow_inf_nan=False)]
+def _quoted(key):
+    """A key as TOML has it: bare where it can be."""
+    is_bare = key.isascii() and key.replace("_", "").replace("-", "").isalnum()
+    if is_bare:
+        return key
+    return json.dumps(key, ensure_ascii=False)
 
 
-Coordinate = Annotated[float, Field(allow_inf_nan=False)]
+PLACE_OF_CRS = OpenPlace(("crs",), (), 'projected CRS of cloud and control, as "EPSG:32650"')
 
 
-Degrees = Annotated[float, Field(ge=-360, le=360, allow_inf_nan=False)]
+class OpenQuestion(ValueError):
+    """A fault of the input that values in survey.toml can mend.
+
+    Parameters
+    ----------
+    sentence : str
+    places : sequence of OpenPlace
+        What survey.toml must say; empty where it can't mend the fault.
+    """
+
+    def __init__(self, sentence: str, places: Sequence[OpenPlace] = ()):
+        super().__init__(sentence)
+        self.places = tuple(places)
 
 
-Three = Field(min_length=3, max_length=3)
+def places_of(error: BaseException) -> tuple[OpenPlace, ...]:
+    """Places whose values can mend what an error names.
+
+    Parameters
+    ----------
+    error : exception
+    """
+    if isinstance(error, OpenQuestion):
+        return error.places
+    return ()
 
 
-Six = Field(min_length=6, max_length=6)
+def _check_answered(path: Path, document: Mapping[str, Any]) -> None:
+    """Refuse a TOML document with open places."""
+    keys = [OpenPlace(keys).key for keys in _open_keys(document, ())]
+    if keys:
+        number = counted(len(keys), "open place")
+        raise SurveyFileError(
+            f'{path} has {number}: {", ".join(keys)}. Replace each "{MARK}" with the value; the '
+            "comment behind it names what is possible."
+        )
 
 
-Column = Annotated[str, Field(min_length=1)] | Annotated[int, Field(ge=1)] | None
-
-
-PointSource = Annotated[int, Field(ge=0, le=65535)]  # 16 bits of a LAS point
-
-
-Share = Annotated[float, Field(ge=-1, le=1, allow_inf_nan=False)]
+def _open_keys(value, keys):
+    """Keys of the values that are still open, sections in lists numbered from 1."""
+    if value == MARK:
+        return [keys]
+    if isinstance(value, Mapping):
+        return [path for key, part in value.items() for path in _open_keys(part, (*keys, key))]
+    if isinstance(value, list):
+        numbered = enumerate(value, start=1)
+        return [path for n, part in numbered for path in _open_keys(part, (*keys, str(n)))]
+    return []

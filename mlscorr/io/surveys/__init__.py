@@ -1,7 +1,7 @@
 """survey.toml and project.toml, and all files that they name, as one Survey or Project.
 
 - survey_file, project_file: read whole, with all that is wrong in one error
-- survey_sections, project_sections: what these files may state
+- survey_sections: what they may state
 - survey_paths, point_owners: which file belongs to what, and which point to whom
 - survey_copy, folder_roles, simulated_clouds, crs_checks: survey.toml written anew, found, checked
 """
@@ -10,13 +10,13 @@ from mlscorr.io.surveys.crs_checks import check_area, crs_notes
 from mlscorr.io.surveys.folder_roles import SIMULATED, FileRole, sort_files
 from mlscorr.io.surveys.point_owners import check_belongings, mounted_scanners
 from mlscorr.io.surveys.project_file import (
+    SHARED_TILES,
     DriveParts,
     ProjectParts,
     is_project,
     read_project,
     stated_project,
 )
-from mlscorr.io.surveys.project_sections import SHARED_TILES
 from mlscorr.io.surveys.simulated_clouds import simulated_survey
 from mlscorr.io.surveys.survey_copy import mounting_values, write_survey_copy
 from mlscorr.io.surveys.survey_file import (

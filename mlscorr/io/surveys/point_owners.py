@@ -159,10 +159,9 @@ def mounted_scanners(
     if isinstance(settings.scanner, ScannerSection):
         mounting = _mounting(settings.mounting)
         return (MountedScanner("", settings.scanner.scanner(), mounting, clouds),)
+    measured = {}
     if clouds:
         measured = _measured(path, settings.scanners, clouds)
-    else:
-        measured = {}
     return tuple(
         MountedScanner(
             name, section.scanner(), _mounting(section.mounting), tuple(measured.get(name, ()))

@@ -1,15 +1,18 @@
 """project.toml: several drives, one control list, and what is believed of all of them."""
 
+import re
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Annotated, Literal, NamedTuple, Self
 
 import numpy as np
+from pydantic import Field, model_validator
 from scipy.spatial.transform import Rotation
 
 from mlscorr.io.clouds import find_copies
 from mlscorr.io.store import (
+    TomlSection,
     as_path,
     beside,
     input_file,
@@ -19,9 +22,14 @@ from mlscorr.io.store import (
     read_toml,
     resolved,
 )
-from mlscorr.io.surveys._surveyed_points import read_surveyed
-from mlscorr.io.surveys.project_sections import ProjectFile
-from mlscorr.io.surveys.survey_file import SurveyParts, read_parts, read_survey_file, survey_toml
+from mlscorr.io.surveys import survey_sections
+from mlscorr.io.surveys.survey_file import (
+    SurveyParts,
+    read_parts,
+    read_survey_file,
+    read_surveyed,
+    survey_toml,
+)
 from mlscorr.io.surveys.survey_paths import (
     SurveyPaths,
     check_distinct,
@@ -34,9 +42,87 @@ from mlscorr.io.tables import NOTHING_SURVEYED
 from mlscorr.io.trajectories import check_crs, check_systems
 from mlscorr.survey import ControlPoints, InputFile, Trajectory
 
+FOLDER_NAME = re.compile(r"[^\\/:*?\"<>|\x00-\x1f.][^\\/:*?\"<>|\x00-\x1f]*")  # on any system
+SHARED_TILES = "tiles"  # folder of the corrected files of more than one drive
+RESERVED = ("tasks", SHARED_TILES, "log.txt", "project.json", "project.html")  # beside the drives
 FILE_NAME = "project.toml"
 BELIEFS = ("pos", "matching", "ties")  # sections that hold for all drives
 SHARED = ("mounting", "scanner", *BELIEFS)  # and those that hold where a drive has none of its own
+
+
+class TilesSection(TomlSection):
+    """All cloud files of the project, the system of their times, and which points are noise."""
+
+    files: Annotated[list[str], Field(min_length=1)] | None = None
+    gps_time: Literal["auto", "week", "standard"] = "auto"
+    noise_classes: survey_sections.NoiseClasses
+
+
+class DriveSection(TomlSection):
+    """A drive: a survey.toml, or files and a trajectory."""
+
+    name: Annotated[str, Field(min_length=1)] | None = None
+    survey: str | None = None
+    files: Annotated[list[str], Field(min_length=1)] | None = None
+    point_source_ids: Annotated[list[survey_sections.PointSource], Field(min_length=1)] | None = (
+        None
+    )
+    trajectory: survey_sections.Trajectories | None = None
+    mounting: survey_sections.CalibratedMountingSection | None = None
+    scanner: survey_sections.Scanners | None = None
+
+    @model_validator(mode="after")
+    def _is_whole(self) -> Self:
+        own = ("files", "trajectory", "mounting", "scanner")
+        given = [name for name in own if getattr(self, name) is not None]
+        if self.survey is not None and given:
+            raise ValueError(
+                f"a drive is a survey.toml or has {given[0]} of its own, not both: say it there"
+            )
+        if self.survey is None and (self.files is None or self.trajectory is None):
+            raise ValueError(
+                "give a drive its survey (a survey.toml), or files and [drive.trajectory]"
+            )
+        return self
+
+
+class ProjectFile(survey_sections.CommonSections):
+    """What stands in project.toml, in its own units (deg)."""
+
+    cloud: TilesSection = TilesSection()
+    drive: Annotated[list[DriveSection], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _names_drives(self) -> Self:
+        names = [name for name, _ in self.drives]
+        count = Counter(map(str.casefold, names))
+        if doubled := [name for name, number in count.items() if number > 1]:
+            raise ValueError(
+                f"the {len(names)} [[drive]] need names of their own, as each is a folder of the "
+                f"results: {len(doubled)} in use twice or more (first: {doubled[0]})"
+            )
+        if wrong := [n for n in names if n.casefold() in RESERVED or not FOLDER_NAME.fullmatch(n)]:
+            raise ValueError(
+                f"{len(wrong)} of the {len(names)} drives have a name that can't be a folder of "
+                f"the results (first: {wrong[0]!r})"
+            )
+        return self
+
+    @property
+    def drives(self) -> list[tuple[str, DriveSection]]:
+        """Each [[drive]] with its name, or that of its folder, or its number from 1."""
+        return [
+            (section.name or _folder(section) or f"drive-{number}", section)
+            for number, section in enumerate(self.drive, start=1)
+        ]
+
+
+def _folder(section):
+    """Name of the folder of a drive's survey.toml."""
+    path = Path(section.survey or "")
+    if path.suffix:
+        return path.parent.name
+    return path.name
 
 
 class StatedDrive(NamedTuple):

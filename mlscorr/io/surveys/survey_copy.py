@@ -122,9 +122,13 @@ def _set_mounting(section, mounting, note):
     if mounting.covariance is not None:
         sigma = _set_covariance(section, mounting.covariance)
         is_line = isinstance(section, InlineTable)  # TOML has comments behind it alone
-        if note or not is_line:
-            trivia = section.trivia if is_line else sigma.trivia
-            trivia.comment_ws, trivia.comment = ("  ", f"# {note}") if note else ("", "")
+        trivia = section.trivia if is_line else sigma.trivia
+        if note:
+            trivia.comment_ws = "  "
+            trivia.comment = f"# {note}"
+        elif not is_line:
+            trivia.comment_ws = ""
+            trivia.comment = ""
 
 
 def _set_covariance(section, covariance):

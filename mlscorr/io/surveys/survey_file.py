@@ -1,9 +1,14 @@
-"""survey.toml and the files it names, as one Survey."""
+"""survey.toml and the files it names, as one Survey.
+
+Surveyed points are scaled where they are in ground distances, and lie near the drive.
+"""
 
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+
+import numpy as np
 
 from mlscorr.io.clouds import (
     converted,
@@ -14,13 +19,26 @@ from mlscorr.io.clouds import (
     spread_records,
 )
 from mlscorr.io.store import as_path, input_file, is_folder, is_there, read_toml
-from mlscorr.io.surveys._surveyed_points import read_surveyed
 from mlscorr.io.surveys.crs_checks import crs_notes
 from mlscorr.io.surveys.point_owners import check_belongings, mounted_scanners, scanner_notes
 from mlscorr.io.surveys.survey_paths import SurveyPaths, files_of
 from mlscorr.io.surveys.survey_sections import PlannedSurveyFile, SurveyFile
-from mlscorr.io.tables import ControlList
-from mlscorr.io.trajectories import ADJUSTMENT, Sessions, check_crs, match_times, read_sessions
+from mlscorr.io.tables import (
+    NOTHING_SURVEYED,
+    ControlList,
+    ControlSection,
+    check_together,
+    holds_points,
+    read_control,
+)
+from mlscorr.io.trajectories import (
+    ADJUSTMENT,
+    Sessions,
+    check_crs,
+    map_factors,
+    match_times,
+    read_sessions,
+)
 from mlscorr.survey import (
     NOISE_CLASSES,
     CloudFile,
@@ -28,6 +46,7 @@ from mlscorr.survey import (
     Pos,
     Scanner,
     Survey,
+    SurveyFileError,
     Trajectory,
 )
 
@@ -234,10 +253,7 @@ def read_survey_file(path: str | Path, planned: bool = False) -> PlannedSurveyFi
         Names the line of bad TOML, or every key that is unknown (with the nearest known one),
         missing, or of the wrong type.
     """
-    if planned:
-        sections = PlannedSurveyFile
-    else:
-        sections = SurveyFile
+    sections = PlannedSurveyFile if planned else SurveyFile
     settings = read_toml(survey_toml(path), sections, "it")
     if settings.crs is not None:
         check_crs(settings.crs)
@@ -353,3 +369,62 @@ def cloud_file(
     if layout.time_offset:
         taken = f"; written less {ADJUSTMENT + layout.time_offset:.0f} s, as its header states"
     return file, f"gps_time of {path.name}: {match}{taken}."
+
+
+def read_surveyed(
+    path: Path | None, section: ControlSection, trajectory: Trajectory, crs: str | None = None
+) -> ControlList:
+    """Points of a list that lies near a trajectory; none of none, and of an empty file.
+
+    Parameters
+    ----------
+    path : Path or None
+    section : ControlSection
+    trajectory : Trajectory
+    crs : str, optional
+        Of the survey, for control in ground distances.
+
+    Raises
+    ------
+    ValueError
+        As of read_control and check_together.
+    """
+    if path is None or not holds_points(path):
+        return NOTHING_SURVEYED
+    points = _scaled(read_control(path, section, trajectory), section, crs)
+    check_together(path, points.control + points.check, trajectory)
+    return points
+
+
+def _scaled(points, section, crs):
+    """Points whose eastings and northings are multiplied as [control] says, about its origin.
+
+    Without a scale_origin it is the middle of the control points (of all, where all are check
+    points), which then stays where it is.
+    """
+    if section.scale_factor is None:
+        return points
+    about = points.control if len(points.control) else points.check
+    middle = about.position.mean(axis=0)
+    origin = np.array([*(section.scale_origin or middle[:2]), 0.0])
+    if section.scale_factor == "ground":
+        if crs is None:
+            raise SurveyFileError(
+                'scale_factor = "ground" under [control] takes the scale of the map, and '
+                "survey.toml has no crs: add it, or give scale_factor as a number."
+            )
+        ground = map_factors(crs, middle)
+        factor = ground.combined
+        source = f"scale_factor under [control], from ground distances to {crs}: {ground}"
+    else:
+        factor = float(section.scale_factor)
+        source = "scale_factor under [control]"
+    sentence = (
+        f"Eastings and northings of the control were multiplied by {factor:.7f} about E "
+        f"{origin[0]:.3f}, N {origin[1]:.3f} m ({source})."
+    )
+    control, check = (
+        replace(part, position=origin + (part.position - origin) * [factor, factor, 1.0])
+        for part in (points.control, points.check)
+    )
+    return ControlList(control, check, " ".join(filter(None, [points.layout, sentence])))

@@ -155,9 +155,8 @@ def matching(path: Path, key: str, name: str) -> list[Path]:
 
 def _holds_results(folder):
     """Whether a run wrote a folder, or a project it."""
-    return any(is_there(folder / name) for name in RESULTS) or is_there(
-        folder.parent / "project.json"
-    )
+    documents = [folder / name for name in RESULTS] + [folder.parent / "project.json"]
+    return any(is_there(path) for path in documents)
 
 
 def given_file(path: Path, key: str, name: str | None) -> Path | None:

@@ -69,9 +69,8 @@ class CalibratedMountingSection(MountingSection):
             mounting = replace(mounting, measured=sigma)
         if np.isnan(sigma).any():
             return mounting
-        if self.correlation is None:
-            correlation = np.eye(6)
-        else:
+        correlation = np.eye(6)
+        if self.correlation is not None:
             correlation = np.array(self.correlation)
         return replace(mounting, covariance=correlation * np.outer(sigma, sigma))
 

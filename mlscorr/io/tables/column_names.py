@@ -1,7 +1,7 @@
 """Names and units of columns, and words in their cells, as others write them.
 
 All known words stand in columns.toml beside this module, by language, for a surveyor to read and
-extend. Here they are compared with those of a table.
+extend. Here they are compared with those of a table, and joined by what survey.toml states of one.
 """
 
 from __future__ import annotations
@@ -11,12 +11,14 @@ import tomllib
 import unicodedata
 from collections.abc import Collection, Mapping, Sequence
 from importlib.resources import files
-from typing import NamedTuple
+from typing import Annotated, Literal, NamedTuple, Self
 
-from mlscorr.io.store import shown
+from pydantic import Field, model_validator
+
+from mlscorr.io.store import Column, Coordinate, Positive, TomlSection, shown
 
 ANGLES = ("roll", "pitch", "heading")
-BRACKETS = re.compile(r"[\[(<]\s*([^\])>]*?)\s*[\])>]\s*$")
+_BRACKETS = re.compile(r"[\[(<]\s*([^\])>]*?)\s*[\])>]\s*$")
 
 
 def plain(name: str) -> str:
@@ -31,7 +33,7 @@ def plain(name: str) -> str:
     >>> plain("Pkt.-Nr."), plain("Höhe [m]"), plain("H-Ell"), plain("Nordwert (ETRS89/UTM)")
     ('pktnr', 'höhe', 'hell', 'nordwert')
     """
-    words = BRACKETS.sub("", unicodedata.normalize("NFKC", name).casefold())
+    words = _BRACKETS.sub("", unicodedata.normalize("NFKC", name).casefold())
     return re.sub(r"[\s_.\-/:,'\"]+", "", words)
 
 
@@ -51,7 +53,7 @@ WORDS = {column: _plain_words(words) for column, words in _KNOWN["words"].items(
 UNITS = {  # to m, deg and s
     name: unit["size"] for our, unit in _KNOWN["units"].items() for name in (our, *unit["names"])
 }
-REFUSED_UNITS = {name.casefold() for name in _KNOWN["refused"]["units"]}
+_REFUSED_UNITS = {name.casefold() for name in _KNOWN["refused"]["units"]}
 
 
 def section_of(names: Collection[str]) -> str:
@@ -65,6 +67,80 @@ def section_of(names: Collection[str]) -> str:
     if "name" in names:
         return "control"
     return "trajectory"
+
+
+def unit_of(name: str) -> str | None:
+    """The unit in brackets at the end of a name, known or foreign; None without one.
+
+    Parameters
+    ----------
+    name : str
+
+    Examples
+    --------
+    >>> unit_of("东坐标(m)"), unit_of("Elev [US survey ft]"), unit_of("Height (ellipsoidal)")
+    ('m', 'us survey ft', None)
+    """
+    match = _BRACKETS.search(unicodedata.normalize("NFKC", name).casefold())
+    unit = re.sub(r"^in\s+", "", match[1]) if match else ""  # as in: height (in m)
+    if unit in UNITS or is_foreign(unit):
+        return unit
+    return None
+
+
+def is_foreign(unit: str) -> bool:
+    """Return True if a unit is one that is not read.
+
+    Parameters
+    ----------
+    unit : str
+    """
+    return not _REFUSED_UNITS.isdisjoint(unit.split())
+
+
+def find_meanings(
+    cells: Sequence[str],
+    names: Mapping[str, Collection[str]],
+    chosen: Mapping[str, str | int] | None = None,
+) -> dict[str, list[int]]:
+    """Positions of the columns that each of our names may mean.
+
+    A column under our own name goes before others, and one that the user chose before all.
+
+    Parameters
+    ----------
+    cells : sequence of str
+        A header.
+    names : mapping
+        Our name to the plain names of others.
+    chosen : mapping, optional
+        Our name to the one in the header.
+
+    Returns
+    -------
+    dict
+        Without those that no column may mean.
+
+    Examples
+    --------
+    >>> find_meanings(["Pkt", "X", "Y", "Elev", "H-Ell"], CONTROL_NAMES)
+    {'x': [1], 'y': [2], 'height': [3, 4], 'name': [0]}
+    """
+    known = [plain(cell) for cell in cells]
+    exact = [cell.strip().casefold() for cell in cells]
+    meanings = {}
+    for name, others in names.items():
+        column = (chosen or {}).get(name)
+        among = known
+        words = others
+        if column is not None:
+            among = exact
+            words = [str(column).strip().casefold()]
+        elif plain(name) in known:
+            words = [plain(name)]
+        if positions := [i for i, cell in enumerate(among) if cell and cell in words]:
+            meanings[name] = positions
+    return meanings
 
 
 class OfficeWord(NamedTuple):
@@ -151,75 +227,63 @@ def meant(column: str, cell: str, words: Mapping[str, OfficeWord] | None = None)
     return next(known, cell.casefold())
 
 
-def unit_of(name: str) -> str | None:
-    """The unit in brackets at the end of a name, known or foreign; None without one.
+class PlaceColumns(TomlSection):
+    """Our names of columns with those in a table, or with their numbers from 1."""
 
-    Parameters
-    ----------
-    name : str
+    easting: Column = None
+    northing: Column = None
+    height: Column = None
 
-    Examples
-    --------
-    >>> unit_of("东坐标(m)"), unit_of("Elev [US survey ft]"), unit_of("Height (ellipsoidal)")
-    ('m', 'us survey ft', None)
-    """
-    match = BRACKETS.search(unicodedata.normalize("NFKC", name).casefold())
-    unit = re.sub(r"^in\s+", "", match[1]) if match else ""  # as in: height (in m)
-    if unit in UNITS or is_foreign(unit):
-        return unit
-    return None
+    @model_validator(mode="after")
+    def _are_of_one_kind(self) -> Self:
+        if len({type(column) for column in self.chosen.values()}) > 1:
+            raise ValueError("give names of columns or numbers of columns, not both")
+        return self
 
-
-def is_foreign(unit: str) -> bool:
-    """Return True if a unit is one that is not read.
-
-    Parameters
-    ----------
-    unit : str
-    """
-    return not REFUSED_UNITS.isdisjoint(unit.split())
+    @property
+    def chosen(self) -> dict[str, str | int]:
+        """Those that are given."""
+        return {name: column for name, column in self if column is not None}
 
 
-def find_meanings(
-    cells: Sequence[str],
-    names: Mapping[str, Collection[str]],
-    chosen: Mapping[str, str | int] | None = None,
-) -> dict[str, list[int]]:
-    """Positions of the columns that each of our names may mean.
+class _ControlColumns(PlaceColumns):
+    """Which column of a control list is what."""
 
-    A column under our own name goes before others, and one that the user chose before all.
+    name: Column = None
+    sigma: Column = None
+    sigma_horizontal: Column = None
+    sigma_vertical: Column = None
+    kind: Column = None
+    size: Column = None
+    role: Column = None
 
-    Parameters
-    ----------
-    cells : sequence of str
-        A header.
-    names : mapping
-        Our name to the plain names of others.
-    chosen : mapping, optional
-        Our name to the one in the header.
 
-    Returns
-    -------
-    dict
-        Without those that no column may mean.
+class ControlSection(TomlSection):
+    """The file of the surveyed points, and what all of them are where it does not say so."""
 
-    Examples
-    --------
-    >>> find_meanings(["Pkt", "X", "Y", "Elev", "H-Ell"], CONTROL_NAMES)
-    {'x': [1], 'y': [2], 'height': [3, 4], 'name': [0]}
-    """
-    known = [plain(cell) for cell in cells]
-    exact = [cell.strip().casefold() for cell in cells]
-    meanings = {}
-    for name, others in names.items():
-        column = (chosen or {}).get(name)
-        among = known
-        words = others
-        if column is not None:
-            among = exact
-            words = [str(column).strip().casefold()]
-        elif plain(name) in known:
-            words = [plain(name)]
-        if positions := [i for i, cell in enumerate(among) if cell and cell in words]:
-            meanings[name] = positions
-    return meanings
+    file: str
+    kind: str | None = None
+    size: Positive | None = None  # m
+    sigma: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = None  # m: E/N, H
+    check: list[str] = Field(default_factory=list)  # names of check points, or patterns
+    words: dict[str, str] = Field(default_factory=dict)  # of an office: to "circle 0.6", "check"
+    columns: _ControlColumns = _ControlColumns()
+    # By what eastings and northings are multiplied; "ground": by the map's own factor there
+    scale_factor: Annotated[float, Field(ge=0.99, le=1.01)] | Literal["ground"] | None = None
+    scale_origin: Annotated[list[Coordinate], Field(min_length=2, max_length=2)] | None = None  # m
+
+    @model_validator(mode="after")
+    def _scales_about_an_origin(self) -> Self:
+        if self.scale_origin is not None and self.scale_factor is None:
+            raise ValueError('scale_origin needs a scale_factor: a number, or "ground"')
+        return self
+
+    @model_validator(mode="after")
+    def _are_words_known(self) -> Self:
+        _ = self.meanings
+        return self
+
+    @property
+    def meanings(self) -> dict[str, OfficeWord]:
+        """Words of the office, without case and surplus blanks, with their meanings."""
+        return {same_word(word): OfficeWord.of(text) for word, text in self.words.items()}

@@ -1,16 +1,30 @@
-"""Surveyed targets from control.csv, and from lists as others write them."""
+"""Surveyed targets from control.csv, and from lists as others write them.
+
+Of a list, all faults in its rows are told at once, and what is doubtful warns.
+"""
 
 import re
 import warnings
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-from mlscorr.io.store import ENCODING, as_path, open_file, shown, warn_of_cut
-from mlscorr.io.tables._sheets import SUFFIX
-from mlscorr.io.tables.column_names import CONTROL_NAMES, WORDS, meant, same_word
-from mlscorr.io.tables.control_faults import doubled_names, refuse, row_doubts, row_faults
+from mlscorr.io.settings import SETTINGS
+from mlscorr.io.store import (
+    ENCODING,
+    OpenPlace,
+    OpenQuestion,
+    as_path,
+    nearest,
+    open_file,
+    shown,
+    warn_of_cut,
+)
+from mlscorr.io.tables.column_names import CONTROL_NAMES, WORDS, ControlSection, meant, same_word
 from mlscorr.io.tables.control_lists import (
     HINTS,
     NORMAL,
@@ -27,14 +41,15 @@ from mlscorr.io.tables.control_lists import (
     word_places,
 )
 from mlscorr.io.tables.layout_search import read_layout
-from mlscorr.io.tables.table_rows import read_rows
-from mlscorr.io.tables.table_sections import ControlSection
+from mlscorr.io.tables.table_rows import SUFFIX, read_rows
 from mlscorr.survey import AXES, ControlPoints, Trajectory
 
+_OWN_WORDS = "Say under [control] words in survey.toml what an office's own words mean."
+_AMBIGUOUS = {"cp": " It is short for control point and for check point alike: write gcp or check."}
 COLUMNS = ("name", *AXES, *SIGMAS, "kind", "size", "role")
-ROLES = tuple(WORDS["role"])
-SEXAGESIMAL = re.compile(r"-?\d{1,3}[°: ]\s*\d{1,2}['′: ]")  # degrees and minutes
-NOTHING_GIVEN = ControlSection(file="")
+_ROLES = tuple(WORDS["role"])
+_SEXAGESIMAL = re.compile(r"-?\d{1,3}[°: ]\s*\d{1,2}['′: ]")  # degrees and minutes
+_NOTHING_GIVEN = ControlSection(file="")
 
 
 class ControlList(NamedTuple):
@@ -54,7 +69,7 @@ class ControlList(NamedTuple):
 
 
 def read_control(
-    path: str | Path, section: ControlSection = NOTHING_GIVEN, trajectory: Trajectory | None = None
+    path: str | Path, section: ControlSection = _NOTHING_GIVEN, trajectory: Trajectory | None = None
 ) -> ControlList:
     """Points of control.csv, or of a list as total stations and offices write it.
 
@@ -84,37 +99,43 @@ def read_control(
         Of sigmas with which points hardly count, of points at one place, and of a column that isn't
         used and may be that of the roles.
     """
-    rules = CONTROL_NAMES, lacking, section.columns.chosen, unnamed_columns, HINTS
-    layout = read_layout(path, COLUMNS, (NORMAL,), *rules)
-    layout, given = (layout, {}) if layout.is_own else complete(layout, section, NORMAL)
+    chosen = section.columns.chosen
+    layout = read_layout(
+        path, COLUMNS, (NORMAL,), CONTROL_NAMES, lacking, chosen, unnamed_columns, HINTS
+    )
+    given = {}
+    if not layout.is_own:
+        layout, given = complete(layout, section, NORMAL)
     lines = list(read_rows(layout, exact=True))
     if not lines:
         raise ValueError(f"{path} has a header but no points.")
     meanings = section.meanings
     rows, faults = _values(layout, lines, meanings)
     rows = [given | row for row in rows]  # of a word's own size before that of all points
-    refuse(path, [*faults, *doubled_names(path, rows)])
+    _refuse(path, [*faults, *_doubled_names(path, rows)])
+    all_cells = [cells for _, cells in lines]
     if not layout.is_own:
-        check_unused(layout, [cells for _, cells in lines], given, meanings)
-        for doubt in () if section.check else role_doubts(layout, [cells for _, cells in lines]):
-            warnings.warn(doubt, stacklevel=2)
+        check_unused(layout, all_cells, given, meanings)
+        if not section.check:
+            for doubt in role_doubts(layout, all_cells):
+                warnings.warn(doubt, stacklevel=2)
     has_axes = "x" in layout.columns
     layout, rows = placed(layout, with_check_points(path, rows, section.check), trajectory)
-    points = [(f"{shown(row['name'])} of {path}", row) for row in rows]
-    faults = [(who, fault) for who, row in points for fault in row_faults(row)]
-    unknown = unknown_words(layout, [cells for _, cells in lines], meanings)
-    others = [row | {"kind": next(iter(WORDS["kind"])), "role": ROLES[0]} for row in rows]
-    is_mended = not any(fault for row in others for fault in row_faults(row))
-    refuse(path, faults, word_places(unknown) if is_mended else ())
-    for doubt in row_doubts(path, rows):
+    faults = [
+        (f"{shown(row['name'])} of {path}", fault) for row in rows for fault in _row_faults(row)
+    ]
+    others = [row | {"kind": next(iter(WORDS["kind"])), "role": _ROLES[0]} for row in rows]
+    places = []
+    if not any(fault for row in others for fault in _row_faults(row)):  # words alone are wrong
+        places = word_places(unknown_words(layout, all_cells, meanings))
+    _refuse(path, faults, places)
+    for doubt in _row_doubts(path, rows):
         warnings.warn(doubt, stacklevel=2)
-    control, check = (_points([row for row in rows if row["role"] == role]) for role in ROLES)
+    control, check = (_points([row for row in rows if row["role"] == role]) for role in _ROLES)
     if layout.sheet is None and layout.encoding != "utf-16":
         warn_of_cut(path)
-    is_plain = layout.is_own and not layout.unused
-    if is_plain:
-        sentence = None
-    else:
+    sentence = None
+    if not layout.is_own or layout.unused:
         sentence = sentence_on(layout, has_axes, given, section.check)
     return ControlList(control, check, sentence)
 
@@ -149,11 +170,9 @@ def _values(layout, lines, meanings):
                 row[name] = _value(layout, name, cells[i], meanings)
             except ValueError as fault:
                 faults.append((line, str(fault)))
-        kind = layout.columns.get("kind")
-        if kind is None:
-            word = None
-        else:
-            word = meanings.get(same_word(cells[kind]))
+        word = None
+        if "kind" in layout.columns:
+            word = meanings.get(same_word(cells[layout.columns["kind"]]))
         if word is not None and word.size is not None:
             size = row.setdefault("size", word.size)
             if size != word.size:
@@ -176,8 +195,9 @@ def _value(layout, name, cell, meanings):
     try:
         number = layout.number(cell) * layout.factors.get(name, 1.0)
     except ValueError:
-        angle = " It looks like an angle: project it to m, in the crs of survey.toml."
-        way_out = angle * bool(SEXAGESIMAL.match(cell))
+        way_out = ""
+        if _SEXAGESIMAL.match(cell):
+            way_out = " It looks like an angle: project it to m, in the crs of survey.toml."
         raise ValueError(
             f"has the {name} '{shown(cell)}', which is not a number.{way_out}"
         ) from None
@@ -206,3 +226,124 @@ def _points(rows):
 
 NO_POINTS = _points([])
 NOTHING_SURVEYED = ControlList(NO_POINTS, NO_POINTS)
+
+
+class ListError(OpenQuestion):
+    """Faults in the rows of a file, and their number.
+
+    Parameters
+    ----------
+    sentence : str
+    number : int
+    places : sequence of OpenPlace
+        What survey.toml must say, where that mends all of them.
+    """
+
+    def __init__(self, sentence: str, number: int, places: Sequence[OpenPlace] = ()):
+        super().__init__(sentence, places)
+        self.number = number
+
+
+def _refuse(
+    path: str | Path, faults: Iterable[tuple[object, str]], places: Sequence[OpenPlace] = ()
+) -> None:
+    """Raise all that is wrong with the rows of a file at once, what is wrong alike as one."""
+    groups: dict[str, list[object]] = {}
+    for who, what in faults:
+        groups.setdefault(what, []).append(who)
+    sentences = []
+    for what, (who, *others) in groups.items():
+        if others:
+            sentences.append(f"{who} and {len(others)} more have{what.removeprefix('has')}")
+        else:
+            sentences.append(f"{who} {what}")
+    number = len(sentences)
+    limit = SETTINGS.named_faults
+    if number > 1:
+        sentences = [f"{path} has {number} faults.", *sentences[:limit]]
+    if number > limit:
+        sentences.append(f"And {number - limit} more like these.")
+    if places:
+        sentences.append(_OWN_WORDS)
+    if sentences:
+        raise ListError(" ".join(sentences), number, places)
+
+
+def _doubled_names(path, rows):
+    """The pair (file, what is wrong) of names that stand more than once."""
+    count = Counter(row.get("name", "") for row in rows)
+    doubled = [name for name, number in count.items() if number > 1 and name]
+    if doubled:
+        names = shown(", ".join(doubled))
+        yield path, f"names {names} more than once; every point needs a name of its own."
+
+
+def _row_faults(row):
+    """What is wrong with each value of a point's row that can't be meant."""
+    smallest, largest = SETTINGS.target_size
+    for key, words in WORDS.items():
+        if row[key] not in words:
+            hint = _AMBIGUOUS.get(row[key], "")
+            if key == "kind" and (near := nearest(row[key], words)):  # words of roles are alike
+                hint = f" Is {near} meant?{hint}"
+            yield f"has the unknown {key} '{shown(row[key])}'; known are {_known(words)}.{hint}"
+    if not smallest <= row["size"] <= largest:
+        yield (
+            f"has the size {row['size']:g} m, outside [{smallest:g}, {largest:g}] m: "
+            f"{_likely_unit(row['size'])}"
+        )
+    for key in AXES:
+        if abs(row[key]) > SETTINGS.largest_coordinate:
+            yield (
+                f"has the {key} {row[key]:g} m, beyond {SETTINGS.largest_coordinate:g} m: "
+                "no map reaches that far (millimetres?)."
+            )
+    for key in SIGMAS:
+        if row[key] <= 0:
+            yield f"has the {key} {row[key]:g} m; it must be greater than zero."
+    normal = [row.get(name, np.nan) for name in NORMAL]
+    if np.isfinite(normal).any() and not (np.isfinite(normal).all() and np.any(normal)):
+        yield f"has the normal {normal}; give three numbers, not all zero, or none."
+
+
+def _known(words):
+    """Our words, each with those of others."""
+    translated = [f"{our} ({', '.join(others)})" for our, others in words.items() if others]
+    untranslated = [our for our, others in words.items() if not others]
+    return ", ".join([*translated, *untranslated])
+
+
+def _likely_unit(size):
+    """What may be meant by a size that can't be metres."""
+    if size <= 0:
+        return "a diameter or edge is positive."
+    smallest, largest = SETTINGS.target_size
+    sizes = {"centimetres": size / 100, "millimetres": size / 1000}
+    usual = np.sqrt(smallest * largest)
+    unit = min(sizes, key=lambda unit: abs(np.log(sizes[unit] / usual)))
+    if smallest <= sizes[unit] <= largest:
+        return f"{unit}? Then give {sizes[unit]:g}."
+    return "sizes are in metres; is the decimal point misplaced, or another unit meant?"
+
+
+def _row_doubts(path, rows):
+    """A sentence on sigmas with which points hardly count, and one on points at one place."""
+    coarse = [(row, key) for row in rows for key in SIGMAS if row[key] > SETTINGS.coarse_sigma]
+    if coarse:
+        row, key = coarse[0]
+        others = ""
+        if len(coarse) > 1:
+            others = f", nor will {len(coarse) - 1} more sigmas"
+        yield (
+            f"{shown(row['name'])} of {path} has the {key} {row[key]:g} m and will hardly count "
+            f"(millimetres?){others}."
+        )
+    smallest = SETTINGS.target_size[0]  # m: nearer to one another two targets can't be
+    near = cKDTree([[row[axis] for axis in AXES] for row in rows]).query_pairs(smallest)
+    pairs = [[rows[i] for i in pair] for pair in sorted(near)]
+    twice = [f"{a['name']} and {b['name']}" for a, b in pairs if a["kind"] == b["kind"]]
+    if twice:
+        yield (
+            f"{path} gives one place two names: {shown(', '.join(twice))}. No observation tells "
+            "them apart, so neither counts: leave one of the two out."
+        )

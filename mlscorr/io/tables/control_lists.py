@@ -11,22 +11,27 @@ import numpy as np
 
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.store import OpenPlace, OpenQuestion, listed, shown
-from mlscorr.io.tables.column_names import CONTROL_NAMES, WORDS, OfficeWord, meant, same_word
-from mlscorr.io.tables.layouts import NUMBER, TableLayout
-from mlscorr.io.tables.missing_columns import missing_sentence
+from mlscorr.io.tables.column_names import (
+    CONTROL_NAMES,
+    WORDS,
+    ControlSection,
+    OfficeWord,
+    meant,
+    same_word,
+)
+from mlscorr.io.tables.layout_search import missing_sentence
 from mlscorr.io.tables.nearness import distance_of
-from mlscorr.io.tables.table_rows import read_rows
-from mlscorr.io.tables.table_sections import ControlSection
+from mlscorr.io.tables.table_rows import NUMBER, TableLayout, read_rows
 from mlscorr.survey import AXES, SurveyFileError, Trajectory
 
 SIGMAS = ("sigma_horizontal", "sigma_vertical")
 NORMAL = ("normal_e", "normal_n", "normal_h")
 HINTS = {("easting", "latitude"): (" Latitude and longitude must be projected first.", ())}
-EXAMPLES = {
+_EXAMPLES = {
     **dict.fromkeys(SIGMAS, "sigma = [0.003, 0.004] (horizontal, vertical)"),
     **{"kind": 'kind = "circle"', "size": "size = 0.6"},
 }
-PLACES = {
+_PLACES = {
     **dict.fromkeys(
         SIGMAS,
         OpenPlace(("control", "sigma"), ([0.003, 0.004],), "m, one sigma: E and N each, height"),
@@ -34,7 +39,7 @@ PLACES = {
     "kind": OpenPlace(("control", "kind"), tuple(WORDS["kind"]), "shape of all targets"),
     "size": OpenPlace(("control", "size"), (0.6,), "m, diameter or edge of all targets"),
 }
-UNNAMED_AXES = ("x", "y")  # either may point east
+_UNNAMED_AXES = ("x", "y")  # either may point east
 
 
 class AxesError(OpenQuestion):
@@ -48,8 +53,10 @@ def lacking(names: Collection[str]) -> list[str]:
     ----------
     names : collection of str
     """
-    place = AXES[2:] if set(UNNAMED_AXES) <= set(names) else AXES
-    return [name for name in ("name", *place) if name not in names]
+    present = set(names)
+    if present.issuperset(_UNNAMED_AXES):
+        present.update(AXES[:2])
+    return [name for name in ("name", *AXES) if name not in present]
 
 
 def unnamed_columns(cells: Sequence[str]) -> dict[str, int]:
@@ -67,7 +74,7 @@ def unnamed_columns(cells: Sequence[str]) -> dict[str, int]:
     """
     if len(cells) < 4 or not cells[0] or not all(map(NUMBER.fullmatch, cells[1:4])):
         return {}
-    return dict(zip(("name", *UNNAMED_AXES, "height"), range(4), strict=True))
+    return dict(zip(("name", *_UNNAMED_AXES, "height"), range(4), strict=True))
 
 
 def complete(
@@ -95,16 +102,24 @@ def complete(
     ValueError
         For what neither gives.
     """
-    columns = layout.columns
-    needless = set() if set(group) <= set(columns) else set(group)
+    columns = dict(layout.columns)
+    needless = set()
+    if not set(group) <= set(columns):
+        needless.update(group)
     if {"easting", "northing"} <= set(columns):
-        needless.update(UNNAMED_AXES)
+        needless.update(_UNNAMED_AXES)
     columns = {name: i for name, i in columns.items() if name not in needless}
     horizontal, vertical = section.sigma or (None, None)
-    kind = section.kind and meant("kind", section.kind)
-    given = {"sigma_horizontal": horizontal, "sigma_vertical": vertical, "kind": kind}
-    given |= {"size": section.size, "role": "control"}
-    present = set(columns) | (set(SIGMAS) if "sigma" in columns else set())
+    given = {
+        "sigma_horizontal": horizontal,
+        "sigma_vertical": vertical,
+        "kind": section.kind and meant("kind", section.kind),
+        "size": section.size,
+        "role": "control",
+    }
+    present = set(columns)
+    if "sigma" in columns:
+        present.update(SIGMAS)
     given = {name: value for name, value in given.items() if name not in present}
     missing = [name for name, value in given.items() if value is None]
     if missing:
@@ -129,15 +144,14 @@ def _are_sized(layout, rows, meanings):
 def _unstated(layout, rows, missing, meanings):
     """The error on what neither a list nor survey.toml says of its points."""
     header = layout.header
+    used = set()
     if header:
         used = {header[i] for i in layout.columns.values()}
-    else:
-        used = set()
     seeming = {
         name: header[i] for name, i in _columns_of_words(layout, rows, meanings) if name in missing
     }
     sentence = missing_sentence(layout.path, header, missing, used, CONTROL_NAMES, seeming)
-    values = ", ".join(dict.fromkeys(EXAMPLES[name] for name in missing))
+    values = ", ".join(dict.fromkeys(_EXAMPLES[name] for name in missing))
     sentence += (
         f" A value for all points may stand under [control] in survey.toml, lengths in m: {values}."
     )
@@ -150,7 +164,7 @@ def _unstated(layout, rows, missing, meanings):
             f" The column {shown(header[column])} holds {first_words}: name it as columns.kind, "
             "and give each word its meaning under [control] words."
         )
-        places = word_places({("kind", cell): None for cell in words.values()})
+        places = word_places([("kind", cell) for cell in words.values()])
     elif "kind" in layout.columns:  # whose words are not known either
         places = word_places(unknown_words(layout, rows, meanings))
     examples = [OfficeWord.of(place.examples[0]) for place in places]
@@ -160,18 +174,19 @@ def _unstated(layout, rows, missing, meanings):
         if name in seeming:
             key = ("control", "columns", name)
             places.insert(0, OpenPlace(key, (seeming[name],), f"column of the {name}"))
-        elif not (name == "size" and are_sized) and PLACES[name] not in places:
-            places.append(PLACES[name])
+        elif not (name == "size" and are_sized) and _PLACES[name] not in places:
+            places.append(_PLACES[name])
     return OpenQuestion(sentence, places)
 
 
 def _likely_kinds(layout, rows):
     """Position of the one column that isn't used and holds few words, in all rows; else None."""
     candidates = []
-    for i in layout.unused if layout.header else ():
-        words = {same_word(row[i]) if i < len(row) else "" for row in rows}
+    for i in layout.unused:
+        words = {same_word(cell) for cell in _cells(rows, i)}
+        is_in_all = all(i < len(row) for row in rows)
         are_words = all(any(c.isalpha() for c in word) for word in words)
-        if are_words and 2 * len(words) <= len(rows):
+        if is_in_all and are_words and 2 * len(words) <= len(rows):
             candidates.append(i)
     if len(candidates) == 1:
         return candidates[0]
@@ -180,7 +195,7 @@ def _likely_kinds(layout, rows):
 
 def unknown_words(
     layout: TableLayout, rows: Sequence[Sequence[str]], meanings: Mapping[str, OfficeWord]
-) -> dict[tuple[str, str], None]:
+) -> list[tuple[str, str]]:
     """Pairs (column, word) of a list's roles and kinds that are not known, each once, in order.
 
     Parameters
@@ -199,7 +214,7 @@ def unknown_words(
             cell = row[layout.columns[name]]
             if meant(name, cell, meanings) not in words:
                 unknown.setdefault((name, same_word(cell)), cell)
-    return {(name, cell): None for (name, _), cell in unknown.items()}
+    return [(name, cell) for (name, _), cell in unknown.items()]
 
 
 def word_places(words: Iterable[tuple[str, str]]) -> list[OpenPlace]:
@@ -221,10 +236,12 @@ def _likely_meanings(name, word):
     kinds = list(WORDS[name])
     if name != "kind":
         return tuple(kinds)
-    number = re.search(r"\d+(?:[.,]\d+)?", word)
-    size = float(number[0].replace(",", ".")) if number else 0.0
+    text = ""
     smallest, largest = SETTINGS.target_size
-    text = f" {size:g}" if smallest <= size <= largest else ""
+    if number := re.search(r"\d+(?:[.,]\d+)?", word):
+        size = float(number[0].replace(",", "."))
+        if smallest <= size <= largest:
+            text = f" {size:g}"
     named = [kind for kind in kinds if any(meant("kind", part) == kind for part in word.split())]
     return tuple(f"{kind}{text}" for kind in dict.fromkeys([*named, *kinds]))
 
@@ -274,7 +291,9 @@ def role_doubts(layout: TableLayout, rows: Sequence[Sequence[str]]) -> Iterator[
     rows : sequence of sequences of str
         All cells.
     """
-    for i in layout.unused if "role" not in layout.columns else ():
+    if "role" in layout.columns:
+        return
+    for i in layout.unused:
         words = _cells(rows, i) - {""}
         column = shown(layout.header[i])
         is_few = 1 < len(words) <= len(WORDS["role"]) < len(rows)
@@ -319,13 +338,14 @@ def with_check_points(
     ValueError
         For a pattern that fits no point.
     """
+    rows = list(rows)
     for pattern in patterns:
-        if not any(fnmatchcase(row["name"], pattern) for row in rows):
+        places = [i for i, row in enumerate(rows) if fnmatchcase(row["name"], pattern)]
+        if not places:
             raise SurveyFileError(f"control.check names '{shown(pattern)}', no point of {path}.")
-    return [
-        row | {"role": "check"} if any(fnmatchcase(row["name"], p) for p in patterns) else row
-        for row in rows
-    ]
+        for i in places:
+            rows[i] = rows[i] | {"role": "check"}
+    return rows
 
 
 def placed(
@@ -362,25 +382,30 @@ def placed(
 
 def _axes_east_and_north(layout, rows, trajectory):
     """X and Y in the order in which they are easting and northing."""
-    position = np.array([[row[axis] for axis in UNNAMED_AXES] for row in rows])
-    near = [
-        trajectory is not None and distance_of(places, trajectory) < SETTINGS.near
-        for places in (position, position[:, ::-1])
-    ]
-    if near[0] != near[1]:
-        if near[0]:
-            return UNNAMED_AXES
-        return UNNAMED_AXES[::-1]
-    x, y = (layout.name_of(axis) for axis in UNNAMED_AXES)
-    named = [
-        OpenPlace(("control", "columns", our), (x, y), f"column of the {our}") for our in AXES[:2]
-    ]
+    position = np.array([[row[axis] for axis in _UNNAMED_AXES] for row in rows])
+    is_near = is_swapped_near = False
+    if trajectory is not None:
+        is_near = distance_of(position, trajectory) < SETTINGS.near
+        is_swapped_near = distance_of(position[:, ::-1], trajectory) < SETTINGS.near
+    if is_near and not is_swapped_near:
+        return _UNNAMED_AXES
+    if is_swapped_near and not is_near:
+        return _UNNAMED_AXES[::-1]
+    x, y = (layout.name_of(axis) for axis in _UNNAMED_AXES)
+    places = []
+    orders = "neither order lies"
+    if is_near:
+        orders = "both orders lie"
+        if layout.header:
+            places = [
+                OpenPlace(("control", "columns", our), (x, y), f"column of the {our}")
+                for our in AXES[:2]
+            ]
     raise AxesError(
         f"{layout.path} does not say which of {x} and {y} is easting, for X points east here and "
-        f"north there, and {'both orders lie' if near[0] else 'neither order lies'} within "
-        f"{SETTINGS.near / 1e3:g} km of the trajectory. Name them easting and northing, or say "
-        "which is which under [control.columns] in survey.toml.",
-        named if layout.header and near[0] else (),
+        f"north there, and {orders} within {SETTINGS.near / 1e3:g} km of the trajectory. Name "
+        "them easting and northing, or say which is which under [control.columns] in survey.toml.",
+        places,
     )
 
 
@@ -398,11 +423,17 @@ def sentence_on(
     patterns : sequence of str
         Of check points.
     """
-    axes = ", easting and northing told by the trajectory" * has_axes
-    values = [f"{k} {shown(v) if isinstance(v, str) else f'{v:g} m'}" for k, v in given.items()]
-    values += [f"but check for {shown(', '.join(patterns))}"] * bool(patterns)
+    parts = [str(layout)]
+    if has_axes:
+        parts.append(", easting and northing told by the trajectory")
+    values = []
+    for name, value in given.items():
+        if isinstance(value, str):
+            values.append(f"{name} {shown(value)}")
+        else:
+            values.append(f"{name} {value:g} m")
+    if patterns:
+        values.append(f"but check for {shown(', '.join(patterns))}")
     if values:
-        given_to_all = f"; of all points: {', '.join(values)}"
-    else:
-        given_to_all = ""
-    return f"{layout}{axes}{given_to_all}{layout.not_used}."
+        parts.append(f"; of all points: {', '.join(values)}")
+    return f"{''.join(parts)}{layout.not_used}."

@@ -1,8 +1,9 @@
-"""The layout of a table: our own columns, or those of others, found by their names.
+"""The layout of a table: of our own columns, or of those of others, found by their names.
 
-Nothing is guessed in silence: what was understood is a sentence of its own, and what can be
-understood in two ways is refused. The separator is the one that parts a row into all names that are
-needed; csv.Sniffer takes decimal commas for separators, and finds none below lines of comments.
+Nothing is guessed in silence: what was understood is a sentence of its own, what can be understood
+in two ways is refused, and of a column that is missing it is said what to write in survey.toml. The
+separator is the one that parts a row into all names that are needed; csv.Sniffer takes decimal
+commas for separators, and finds none below lines of comments.
 """
 
 import re
@@ -17,26 +18,35 @@ from mlscorr.io.store import (
     OpenQuestion,
     as_path,
     encoding_of,
+    listed,
+    nearest,
     open_file,
     shown,
 )
-from mlscorr.io.tables._sheets import SUFFIX, read_sheets
-from mlscorr.io.tables.column_names import UNITS, find_meanings, is_foreign, section_of, unit_of
-from mlscorr.io.tables.layouts import (
+from mlscorr.io.tables.column_names import (
+    UNITS,
+    find_meanings,
+    is_foreign,
+    plain,
+    section_of,
+    unit_of,
+)
+from mlscorr.io.tables.table_rows import (
     COMMENT_MARKS,
     NUMBER,
     SEPARATORS,
+    SUFFIX,
     TableLayout,
     is_comment,
     not_text,
+    read_sheets,
     split,
 )
-from mlscorr.io.tables.missing_columns import check_chosen, missing_columns
 from mlscorr.survey import SurveyFileError
 
-WORDS = ("name", "kind", "role")  # columns that hold no numbers
-BRACKETED = re.compile(r"[(\[].*[)\]]")
-THOUSANDS = re.compile(r"[+-]?\d{1,3}(['’\s]\d{3})+([.,]\d*)?")
+_TEXT_COLUMNS = ("name", "kind", "role")  # columns that hold no numbers
+_BRACKETED = re.compile(r"[(\[].*[)\]]")
+_THOUSANDS = re.compile(r"[+-]?\d{1,3}(['’\s]\d{3})+([.,]\d*)?")
 
 
 def read_layout(
@@ -90,10 +100,10 @@ def read_layout(
     header = likely_header(path, names)
     meanings = find_meanings(header, names, chosen)
     missing = lacking(meanings)
-    check_chosen(path, missing, chosen or {})
+    _check_chosen(path, missing, chosen or {})
     if refusal and not meanings:  # names that are known are those of a table
         raise refusal
-    raise missing_columns(path, header, missing, meanings, names, hints)
+    raise _missing_columns(path, header, missing, meanings, names, hints)
 
 
 def read_header(path: str | Path) -> tuple[list[str], int]:
@@ -211,7 +221,7 @@ def _numbered(positions):
     """A function that gives these columns where the cells of a row there are numbers."""
 
     def columns(cells):
-        numbers = [i for name, i in positions.items() if name not in WORDS]
+        numbers = [i for name, i in positions.items() if name not in _TEXT_COLUMNS]
         is_row = max(positions.values()) < len(cells)
         if is_row and all(NUMBER.fullmatch(cells[i]) for i in numbers):
             return positions
@@ -227,8 +237,12 @@ def _parted_tables(path) -> Iterator[tuple[TableLayout, list[tuple[int, list[str
             yield TableLayout(path, (), 0, {}, sheet=sheet), rows[: SETTINGS.sampled_lines]
         return
     encoding = encoding_of(path)
-    lines = _first_lines(path, encoding) if encoding else []
-    for separator in SEPARATORS if lines else ():
+    if encoding is None:
+        return
+    lines = _first_lines(path, encoding)
+    if not lines:
+        return
+    for separator in SEPARATORS:
         layout = TableLayout(path, (), 0, {}, separator, encoding=encoding)
         yield layout, [(number, split(line, separator)) for number, line in lines]
 
@@ -253,7 +267,7 @@ def _named_layout(start, rows, names, lacking, chosen):
         meanings = find_meanings(cells, names, chosen)
         if lacking(meanings):
             continue
-        check_chosen(start.path, set(chosen) - set(meanings), chosen)
+        _check_chosen(start.path, set(chosen) - set(meanings), chosen)
         columns = {name: positions[0] for name, positions in meanings.items()}
         layout = replace(start, header=tuple(cells), lines=number, columns=columns)
         below = [row for row in rows[place + 1 :] if not is_comment(row[1])]
@@ -268,10 +282,28 @@ def _named_layout(start, rows, names, lacking, chosen):
     return None
 
 
+def _uncommented(cells):
+    """Cells of a header that may stand behind a comment mark."""
+    if cells and cells[0].startswith(COMMENT_MARKS):
+        first = cells[0].lstrip("".join(COMMENT_MARKS)).strip()
+        if first:
+            return [first, *cells[1:]]
+        return cells[1:]
+    return cells
+
+
+def _holds_units(cells, columns):
+    """Whether the row below a header has units in place of values: known ones, or in brackets."""
+    texts = [cells[i].strip("()[] ").casefold() for i in columns.values() if i < len(cells)]
+    are_units = all(not text or text in UNITS or is_foreign(text) for text in texts)
+    return any(texts) and (are_units or bool(_BRACKETED.fullmatch(" ".join(cells).strip())))
+
+
 def _parted(layout, rows):
     """The layout and its rows where these are parted otherwise than the names, as in POSPac's."""
-    is_whole = not rows or len(rows[0]) > 1
-    for separator in () if is_whole else SEPARATORS:
+    if not rows or len(rows[0]) > 1:
+        return layout, rows
+    for separator in SEPARATORS:
         parted = [split(row[0], separator) for row in rows]
         if len(parted[0]) == len(layout.header):
             return replace(layout, separator=separator), parted
@@ -303,29 +335,14 @@ def _check_doubled(layout, meanings, rows, section):
 def _unnamed_layout(start, rows, is_numbered, unnamed):
     """The layout of a table without a header: its first row, or the first with what was chosen."""
     rows = [row for row in rows if not (row[1] and row[1][0].startswith(COMMENT_MARKS))]
-    for place, (number, cells) in enumerate(rows if is_numbered else rows[:1]):
+    for place, (number, cells) in enumerate(rows):
         columns = unnamed(cells)
         if columns:
             layout = replace(start, lines=number - 1, columns=dict(columns))
             return _with_units_and_decimals(layout, [], [row for _, row in rows[place:]])
+        if not is_numbered:
+            return None
     return None
-
-
-def _uncommented(cells):
-    """Cells of a header that may stand behind a comment mark."""
-    if cells and cells[0].startswith(COMMENT_MARKS):
-        first = cells[0].lstrip("".join(COMMENT_MARKS)).strip()
-        if first:
-            return [first, *cells[1:]]
-        return cells[1:]
-    return cells
-
-
-def _holds_units(cells, columns):
-    """Whether the row below a header has units in place of values: known ones, or in brackets."""
-    texts = [cells[i].strip("()[] ").casefold() for i in columns.values() if i < len(cells)]
-    are_units = all(not text or text in UNITS or is_foreign(text) for text in texts)
-    return any(texts) and (are_units or bool(BRACKETED.fullmatch(" ".join(cells).strip())))
 
 
 def _with_units_and_decimals(layout, units, rows):
@@ -341,10 +358,10 @@ def _with_units_and_decimals(layout, units, rows):
             )
         if unit is not None and UNITS[unit] != 1.0:
             factors[name] = UNITS[unit]
-    places = [i for name, i in layout.columns.items() if name not in WORDS]
+    places = [i for name, i in layout.columns.items() if name not in _TEXT_COLUMNS]
     cells = [row[i] for row in rows for i in places if i < len(row)]
     numbers = [cell for cell in cells if NUMBER.fullmatch(cell.replace(".", "").replace(",", ""))]
-    if marked := [cell for cell in cells if THOUSANDS.fullmatch(cell)]:
+    if marked := [cell for cell in cells if _THOUSANDS.fullmatch(cell)]:
         raise ValueError(f"{path} has thousands marks ('{shown(marked[0])}'): omit them.")
     commas, points = ([cell for cell in numbers if mark in cell] for mark in ",.")
     if commas and points:
@@ -371,3 +388,110 @@ def likely_header(path: str | Path, names: Mapping[str, Collection[str]]) -> lis
     tables = [rows for _, rows in _parted_tables(as_path(path))]
     rows = [_uncommented(cells) for table in tables for _, cells in table]
     return max(rows, key=lambda cells: (len(find_meanings(cells, names)), len(cells)), default=[])
+
+
+def _check_chosen(path: Path, missing: Collection[str], chosen: Mapping[str, str | int]) -> None:
+    """Refuse columns that survey.toml names and the table does not have."""
+    for name in sorted(set(missing) & set(chosen)):
+        raise SurveyFileError(
+            f"{path} has no column '{chosen[name]}', which survey.toml names the {name}."
+        )
+
+
+def _missing_columns(
+    path: str | Path,
+    header: Sequence[str],
+    missing: Sequence[str],
+    meanings: Mapping[str, Sequence[int]],
+    names: Mapping[str, Collection[str]],
+    hints: Mapping[tuple[str, str], tuple[str, Sequence[OpenPlace]]] | None = None,
+) -> OpenQuestion:
+    """The error on a table without columns that are needed."""
+    used = {header[i] for positions in meanings.values() for i in positions}
+    hinted = [
+        hint
+        for (name, other), hint in (hints or {}).items()
+        if name in missing and other in meanings
+    ]
+    sentence = missing_sentence(path, header, missing, used, names)
+    if hinted:
+        places = [place for _, of_hint in hinted for place in of_hint]
+    else:
+        places = _likely_places(header, missing, used, names)
+    return OpenQuestion(sentence + "".join(way_out for way_out, _ in hinted), places)
+
+
+def missing_sentence(
+    path: str | Path,
+    header: Sequence[str],
+    missing: Sequence[str],
+    used: Collection[str],
+    names: Mapping[str, Collection[str]],
+    seeming: Mapping[str, str] | None = None,
+) -> str:
+    """A sentence on columns that are missing, and on the one that may be meant, if one is like it.
+
+    Parameters
+    ----------
+    path : path
+    header : sequence of str
+    missing : sequence of str
+        Our names.
+    used : collection of str
+        Names in the header that mean something else.
+    names : mapping
+        See find_meanings.
+    seeming : mapping, optional
+        Our name to the column whose cells are like it.
+    """
+    others = [cell for cell in header if cell and cell not in used]
+    near = _near_columns(others, missing, names) | dict(seeming or {})
+    candidates = [name for name in missing if name in near]
+    hint = ""
+    section = section_of(names)
+    numbers = sum(NUMBER.fullmatch(cell) is not None for cell in header)
+    if numbers > 2:
+        hint = (
+            f" It has no header: number its columns under [{section}.columns] in survey.toml, as "
+            "easting = 2."
+        )
+    elif {"easting", "northing", "height"} <= set(missing):
+        hint = " It holds no coordinates: is another file meant?"
+        if numbers == 2:
+            hint = " It seems to hold a plan without heights: each point needs its own."
+    elif candidates:
+        name = candidates[0]
+        column = shown(near[candidates[0]])
+        hint = (
+            f" {name} may be meant by '{column}': if so, say under [{section}] in survey.toml, as "
+            f"columns.{name} = '{column}'."
+        )
+    elif others:
+        hint = (
+            f" If another one of these is meant, say which under [{section}] in survey.toml, as "
+            f"columns.{missing[0]} = '...'."
+        )
+    if "gps_time" in missing and "utc" in near.get("gps_time", "").casefold():
+        hint += " Times in UTC need trajectory.time_constant, too: 18 s since 2017."
+    has = listed(header, SETTINGS.named_columns) or "no header"
+    return f"{path} has no column {', '.join(missing)}; it has {has}.{hint}"
+
+
+def _near_columns(others, missing, names):
+    """Our names with the column of others whose name is spelt like each."""
+    known = {name: our for our, words in names.items() for name in (plain(our), *words)}
+    near = {known.get(nearest(plain(cell), known) or ""): cell for cell in others}
+    near |= {name: cell for name in missing if (cell := nearest(name, others))}
+    if in_utc := [cell for cell in others if "utc" in cell.casefold()]:
+        near["gps_time"] = in_utc[0]
+    return near
+
+
+def _likely_places(header, missing, used, names):
+    """Places that name columns, where one of the header is spelt like each that is missing."""
+    others = [cell for cell in header if cell and cell not in used]
+    near = _near_columns(others, missing, names)
+    if not set(missing) <= set(near) or len({near[name] for name in missing}) < len(missing):
+        return []
+    keys = [(section_of(names), "columns", name) for name in missing]
+    return [OpenPlace(key, (near[key[-1]],), f"column of the {key[-1]}") for key in keys]

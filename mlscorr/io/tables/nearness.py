@@ -33,21 +33,8 @@ def check_together(path: Path, points: ControlPoints, trajectory: Trajectory) ->
         Of heights that seem to be in feet.
     """
     distance = distance_of(points.position[:, :2], trajectory)
-    orders = [(1, 0, 2), *permutations(range(3))]  # the usual exchange first
-    for order in orders if distance > SETTINGS.near else ():
-        swapped = distance_of(points.position[:, order[:2]], trajectory)
-        if swapped < SETTINGS.near:
-            under = [f"{AXES[i]} under {AXES[column]}" for i, column in enumerate(order)]
-            if order == orders[0]:
-                what = "Easting and northing"
-            else:
-                what = f"Columns ({', '.join(under)})"
-            raise ValueError(
-                f"{what} seem to be swapped in {path}: its nearest point lies "
-                f"{distance / 1e3:.0f} km from the trajectory as it stands, {swapped:.0f} m when "
-                f"they are exchanged. Exchange the {'two ' * (order == orders[0])}columns, or say "
-                "which is which under [control.columns] in survey.toml."
-            )
+    if distance > SETTINGS.near:
+        _check_order(path, points.position, trajectory, distance)
     if distance > SETTINGS.far:
         raise ValueError(
             f"The control nearest to the trajectory lies {distance / 1e3:.1f} km from it "
@@ -60,6 +47,26 @@ def check_together(path: Path, points: ControlPoints, trajectory: Trajectory) ->
             f"The heights of {owner} may be in feet: only multiplied by {FOOT} are control and "
             "trajectory at like heights. Convert them to m, or both to one system of heights.",
             stacklevel=2,
+        )
+
+
+def _check_order(path, position, trajectory, distance):
+    """Refuse columns that lie near the trajectory when they are exchanged."""
+    usual = (1, 0, 2)
+    for order in (usual, *permutations(range(3))):
+        swapped = distance_of(position[:, order[:2]], trajectory)
+        if swapped >= SETTINGS.near:
+            continue
+        under = [f"{AXES[i]} under {AXES[column]}" for i, column in enumerate(order)]
+        what = f"Columns ({', '.join(under)})"
+        columns = "columns"
+        if order == usual:
+            what = "Easting and northing"
+            columns = "two columns"
+        raise ValueError(
+            f"{what} seem to be swapped in {path}: its nearest point lies {distance / 1e3:.0f} km "
+            f"from the trajectory as it stands, {swapped:.0f} m when they are exchanged. Exchange "
+            f"the {columns}, or say which is which under [control.columns] in survey.toml."
         )
 
 

@@ -27,9 +27,8 @@ def write_targets_csv(path: str | Path, targets: Sequence[dict]) -> None:
             for vector in vectors
             for value in (target[vector] or (None,) * len(AXES))
         ]
-        if target["gps_time"] is None:
-            time = ""
-        else:
+        time = ""
+        if target["gps_time"] is not None:
             time = f"{target['gps_time']:.6f}"
         first = (target["name"], target["pass"] or "", time, target["role"])
         used, scanned = (str(target[key]).lower() for key in ("used", "scanned"))

@@ -1,19 +1,221 @@
-"""Rows of tables, and their numbers."""
+"""A table of text or of a workbook: how it is laid out, its rows, and their numbers.
+
+A layout says where the rows start, how they are parted, and what their columns mean; with it a
+table of others is read as one of our own.
+"""
 
 import csv
 import re
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mlscorr.io.store import ENCODING, is_remote, open_file, shown
-from mlscorr.io.tables._sheets import read_sheets
-from mlscorr.io.tables.layouts import SEPARATORS, TableLayout, is_comment, not_text
+from mlscorr.io.store import ENCODING, ENCODINGS, is_remote, open_file, shown
+from mlscorr.io.tables.column_names import plain
 
-DATE = re.compile(r"\d+[-/:.]\d+[-/:.]\d+")  # of a day or a time of day
+SUFFIX = ".xlsx"
+SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}  # the surest first
+NUMBER = re.compile(r"[+-]?\d+([.,]\d*)?(e[+-]?\d+)?", re.IGNORECASE)
+COMMENT_MARKS = ("#", "%", "!", "//")
+_DATE = re.compile(r"\d+[-/:.]\d+[-/:.]\d+")  # of a day or a time of day
+
+
+@dataclass(frozen=True)
+class TableLayout:
+    """Where the rows of a table start, how they are parted, and what their columns are.
+
+    Parameters
+    ----------
+    path : Path
+    header : tuple of str
+        As it stands there; empty where columns have no names.
+    lines : int
+        Number of lines down to the first row.
+    columns : dict
+        Our name of a column to its position.
+    separator, decimal, encoding : str
+    factors : dict
+        Our name to what its unit is in m, deg or s, where a unit is given.
+    sheet : str, optional
+        Of a workbook.
+    is_own : bool
+        Whether header and separator are our own, so that there was nothing to understand.
+    """
+
+    path: Path
+    header: tuple[str, ...]
+    lines: int
+    columns: dict[str, int]
+    separator: str = ","
+    decimal: str = "."
+    encoding: str = ENCODING
+    factors: dict[str, float] = field(default_factory=dict)
+    sheet: str | None = None
+    is_own: bool = False
+
+    def __str__(self) -> str:
+        """What was understood, without a full stop."""
+        parts = []
+        identical = []
+        for name in sorted(self.columns, key=self.columns.__getitem__):
+            if plain(self.name_of(name)) == plain(name):
+                identical.append(name)
+            else:
+                parts.append(f"{name} = {self.name_of(name)}")
+        if identical:
+            parts.append(f"{', '.join(identical)} by name")
+        if self.sheet:
+            form = [f"sheet {shown(self.sheet)}"]
+        else:
+            form = [SEPARATORS[self.separator]]
+        form.append("decimal comma" if self.decimal == "," else "decimal point")
+        if self.encoding != ENCODING:
+            form.append(f"letters of {ENCODINGS[self.encoding]}")
+        return f"{self.path.name} was read as {', '.join(parts)} ({', '.join(form)})"
+
+    @property
+    def unused(self) -> list[int]:
+        """Positions of the columns that have a name and aren't used."""
+        used = self.columns.values()
+        return [i for i, name in enumerate(self.header) if name and i not in used]
+
+    @property
+    def not_used(self) -> str:
+        """Words on the columns that aren't used; nothing without such."""
+        names = ", ".join(shown(self.header[i]) for i in self.unused)
+        if names:
+            return f"; not used: {names}"
+        return ""
+
+    def name_of(self, column: str) -> str:
+        """What a column is called in the table, or its number from 1.
+
+        Parameters
+        ----------
+        column : str
+            Our name.
+        """
+        place = self.columns[column]
+        if self.header:
+            return shown(self.header[place])
+        return f"column {place + 1}"
+
+    def number(self, cell: str) -> float:
+        """The number in a cell.
+
+        Parameters
+        ----------
+        cell : str
+
+        Raises
+        ------
+        ValueError
+            For anything else: points in numbers with decimal commas too, and 1_000.
+        """
+        if "_" in cell or (self.decimal == "," and "." in cell):
+            raise ValueError(cell)
+        return float(cell.replace(self.decimal, "."))
+
+
+def split(line: str, separator: str) -> list[str]:
+    """Cells of a line, stripped; blanks in a row part as one does.
+
+    Parameters
+    ----------
+    line : str
+    separator : str
+
+    Examples
+    --------
+    >>> split('P1   532012,49 "at the gate"', " "), split("P1; 1,5 ;", ";")
+    (['P1', '532012,49', 'at the gate'], ['P1', '1,5', ''])
+    """
+    text = " ".join(line.split()) if separator == " " else line
+    try:
+        cells = next(csv.reader([text], delimiter=separator, skipinitialspace=True), [])
+    except csv.Error:
+        return [text]
+    return [cell.strip() for cell in cells]
+
+
+def is_comment(cells: Sequence[str]) -> bool:
+    """Whether a row holds nothing, or starts as a comment does.
+
+    Parameters
+    ----------
+    cells : sequence of str
+    """
+    return not any(cells) or cells[0].startswith(COMMENT_MARKS)
+
+
+def not_text(path: Path) -> str:
+    """The sentence on a file that is no text.
+
+    Parameters
+    ----------
+    path : Path
+    """
+    return (
+        f"{path} is not a text file in UTF-8. Save it anew as comma-separated values in UTF-8; "
+        "letters such as umlauts are the likely cause, or a workbook that is not .xlsx."
+    )
+
+
+def read_sheets(path: str | Path) -> list[tuple[str, list[tuple[int, list[str]]]]]:
+    """Name and rows of each sheet, a row with its number from 1; rows without a value are left out.
+
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    list of (str, list of (int, list of str))
+        Numbers with a decimal point and all their digits, dates as ISO 8601.
+
+    Raises
+    ------
+    ValueError
+        For a file that is no workbook.
+    """
+    import zipfile
+    from xml.etree.ElementTree import ParseError
+
+    from openpyxl import load_workbook
+    from openpyxl.utils.exceptions import InvalidFileException
+
+    with warnings.catch_warnings(action="ignore"):  # of styles and rules, which are not read
+        try:
+            book = load_workbook(path, read_only=True, data_only=True)
+        except (zipfile.BadZipFile, InvalidFileException, ParseError, KeyError, ValueError):
+            raise ValueError(
+                f"{path} is no workbook of Excel, or it is damaged: save it anew as .xlsx or as "
+                "comma-separated values."
+            ) from None
+        sheets = []
+        try:
+            for sheet in book.worksheets:
+                rows = []
+                for number, values in enumerate(sheet.iter_rows(values_only=True), start=1):
+                    cells = [_text(value) for value in values]
+                    if any(cells):
+                        rows.append((number, cells))
+                sheets.append((sheet.title, rows))
+        finally:
+            book.close()
+    return sheets
+
+
+def _text(value):
+    if value is None:
+        return ""
+    if hasattr(value, "isoformat"):
+        return value.isoformat(" ")
+    return str(value).strip()
 
 
 def read_rows(layout: TableLayout, exact: bool = False) -> Iterator[tuple[str, list[str]]]:
@@ -37,6 +239,7 @@ def read_rows(layout: TableLayout, exact: bool = False) -> Iterator[tuple[str, l
         For a row that is too short or too long, and a file that is not text.
     """
     is_parted_by_blanks = layout.separator == " " and not layout.sheet
+    is_strict = exact or not layout.is_own
     if not layout.is_own:
         exact = is_parted_by_blanks
     width = len(layout.header)
@@ -53,7 +256,6 @@ def read_rows(layout: TableLayout, exact: bool = False) -> Iterator[tuple[str, l
             while width and len(cells) > width and not cells[-1]:
                 del cells[-1]
         line = f"Line {number} of {layout.path}"
-        is_strict = exact or not layout.is_own
         if is_strict and layout.separator != " " and 0 < width < len(cells):
             raise ValueError(_too_wide(line, len(cells), width))
         if len(cells) < least or (exact and len(cells) != width):
@@ -155,8 +357,7 @@ def _loaded(layout, converters, is_plain):
 def _plain_lines(layout):
     """Rows of numbers of any layout, parted by tabs and with decimal points."""
     for _, cells in read_rows(layout):
-        line = "\t".join(cells)
-        yield line.replace(",", ".") if layout.decimal == "," else line
+        yield "\t".join(cells).replace(layout.decimal, ".")
 
 
 def _check_width(path, lines, width):
@@ -184,9 +385,12 @@ def _first_bad(layout, converters):
             try:
                 converters.get(column, layout.number)(cell)
             except ValueError:
-                place = f"where a number belongs (column {column + 1})."
-                way_out = " It seems to be a date or a time of day: give seconds."
-                return f"{line} has '{shown(cell)}' {place}{way_out * bool(DATE.match(cell))}"
+                sentence = (
+                    f"{line} has '{shown(cell)}' where a number belongs (column {column + 1})."
+                )
+                if _DATE.match(cell):
+                    sentence += " It seems to be a date or a time of day: give seconds."
+                return sentence
     return ""
 
 

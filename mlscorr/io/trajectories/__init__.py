@@ -1,16 +1,19 @@
 """Trajectories: from SBET, TRJ, POF, POQ, CSV and tables of others, and back to CSV, SBET and TUM.
 
 - trajectory, trajectory_sessions: one file, and several that are joined in time
-- sbet, pof, trj, trajectory_tables, positions, poses, pos_error_series: the formats
+- sbet, pof, trj, trajectory_tables, poses, trajectory_exports: the formats, read and written
 - conventions, course, projection: attitudes and positions brought into the map
-- time_systems, leap_seconds: the constant between the times of cloud and trajectory
+- time_systems: the constant between the times of cloud and trajectory
 """
 
-from mlscorr.io.trajectories.conventions import QUATERNION
+from mlscorr.io.trajectories.conventions import QUATERNION, SessionSection, TrajectorySection
 from mlscorr.io.trajectories.pof import POF_SUFFIX, POQ_SUFFIX
-from mlscorr.io.trajectories.pos_error_series import PosErrorSeries, read_pos_error_series
-from mlscorr.io.trajectories.poses import read_poses, utm_zone
-from mlscorr.io.trajectories.positions import POSITION_SUFFIX, position_file
+from mlscorr.io.trajectories.poses import (
+    PosErrorSeries,
+    read_pos_error_series,
+    read_poses,
+    utm_zone,
+)
 from mlscorr.io.trajectories.projection import (
     MapFactors,
     check_crs,
@@ -34,8 +37,7 @@ from mlscorr.io.trajectories.time_systems import (
     utc_lag,
 )
 from mlscorr.io.trajectories.trajectory import read_trajectory, write_trajectory_csv
-from mlscorr.io.trajectories.trajectory_exports import check_exports, export_trajectory
-from mlscorr.io.trajectories.trajectory_sections import SessionSection, TrajectorySection
+from mlscorr.io.trajectories.trajectory_exports import check_exports, export_trajectory, write_weak
 from mlscorr.io.trajectories.trajectory_sessions import (
     SessionFile,
     Sessions,
@@ -45,5 +47,9 @@ from mlscorr.io.trajectories.trajectory_sessions import (
     read_sessions,
     with_sigmas,
 )
-from mlscorr.io.trajectories.trajectory_tables import COLUMNS, tum_columns
-from mlscorr.io.trajectories.weak_files import write_weak
+from mlscorr.io.trajectories.trajectory_tables import (
+    COLUMNS,
+    POSITION_SUFFIX,
+    position_file,
+    tum_columns,
+)

@@ -111,9 +111,8 @@ def check_units(path: Path, gps_time: np.ndarray, position: np.ndarray, angles: 
     beside = _folded(np.radians(heading) - course)  # of a turned POS it scatters as of any
     scatter = np.degrees(np.median(np.abs(_folded(beside - _middle(beside)))))
     gon = np.degrees(median_difference(np.radians(GON * heading), course))
-    if (
-        degrees > SETTINGS.course_offset and gon < scatter / 2
-    ):  # a turned POS scatters as a car does
+    # a turned POS scatters as a car does
+    if degrees > SETTINGS.course_offset and gon < scatter / 2:
         raise OpenQuestion(
             f"The angles of {path} seem to be gon where degrees belong: the heading fits the "
             f"course over ground to {gon:.1f} deg when taken as gon, to {degrees:.1f} deg when "

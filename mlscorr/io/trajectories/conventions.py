@@ -1,18 +1,19 @@
-"""Attitudes in the conventions of others, brought into our own."""
+"""Attitudes in the conventions of others, as survey.toml states them, brought into our own."""
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import Field
 from scipy.spatial.transform import Rotation
 
 from mlscorr.frames import angles_from_attitude
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.store import PLACE_OF_CRS, OpenPlace, OpenQuestion
-from mlscorr.io.tables import ANGLES
+from mlscorr.io.store import PLACE_OF_CRS, Column, OpenPlace, OpenQuestion, PointSource, TomlSection
+from mlscorr.io.tables import ANGLES, PlaceColumns
 from mlscorr.io.trajectories._course import heading_and_course, median_difference
 from mlscorr.io.trajectories.projection import convergence_at, project
-from mlscorr.io.trajectories.trajectory_sections import TrajectorySection
 from mlscorr.survey import AXES
 
 QUATERNION = ("qx", "qy", "qz", "qw")
@@ -22,6 +23,54 @@ OUR_AXES = {  # right, forward and up in the body axes of others, as columns
     "forward-left-up": np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
     "forward-right-down": np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]),
 }
+
+
+class TrajectoryColumns(PlaceColumns):
+    """Which column of a trajectory is what."""
+
+    gps_time: Column = None
+    latitude: Column = None
+    longitude: Column = None
+    roll: Column = None
+    pitch: Column = None
+    heading: Column = None
+    qx: Column = None
+    qy: Column = None
+    qz: Column = None
+    qw: Column = None
+    sigma_easting: Column = None
+    sigma_northing: Column = None
+    sigma_height: Column = None
+    sigma_roll: Column = None
+    sigma_pitch: Column = None
+    sigma_heading: Column = None
+
+
+class TrajectorySection(TomlSection):
+    """The trajectory's file, the accuracy of an SBET, columns and conventions of others."""
+
+    file: str
+    accuracy: str | None = None
+    time_constant: Annotated[float, Field(allow_inf_nan=False)] = 0.0  # s, added to its times
+    columns: TrajectoryColumns = TrajectoryColumns()
+    angles: Literal["deg", "rad", "gon"] | None = None
+    heading: (
+        Literal[
+            "clockwise from grid north", "clockwise from true north", "counterclockwise from east"
+        ]
+        | None
+    ) = None
+    pitch: Literal["nose up", "nose down"] | None = None
+    roll: Literal["right side down", "right side up"] | None = None
+    axes: Literal["right-forward-up", "forward-left-up", "forward-right-down"] | None = None
+    corrected_by: list[str] = Field(default_factory=list)  # names of control points
+
+
+class SessionSection(TrajectorySection):
+    """One of several trajectories, and the points that it belongs to."""
+
+    files: Annotated[list[str], Field(min_length=1)] | None = None
+    point_source_ids: Annotated[list[PointSource], Field(min_length=1)] | None = None
 
 
 @dataclass(frozen=True)

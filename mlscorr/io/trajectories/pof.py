@@ -13,8 +13,7 @@ import numpy as np
 
 from mlscorr.io.store import as_path, read_bytes
 from mlscorr.io.tables import check_finite
-from mlscorr.io.trajectories._leap_seconds import leap_seconds
-from mlscorr.io.trajectories.time_systems import DAY, counting_on
+from mlscorr.io.trajectories.time_systems import DAY, counting_on, leap_seconds
 from mlscorr.survey import WEEK
 
 POF_SUFFIX = ".pof"

@@ -1,4 +1,4 @@
-"""Paths that a simulated vehicle follows, from files of several kinds.
+"""What a simulated POS takes from real ones: the path that it follows, and series of its errors.
 
 A path is moved to where the simulation wants it, so only its shape, its attitude and its timing
 matter. An attitude is taken only from files whose convention is known (our own CSV, SBET);
@@ -20,8 +20,9 @@ from mlscorr.io.trajectories.sbet import SBET_FIELDS
 from mlscorr.io.trajectories.time_systems import count_on
 from mlscorr.io.trajectories.trajectory import SBET_SUFFIXES, read_trajectory
 
-POS_COLUMNS = ("time", "latitude", "longitude", "height")  # then sigmas, of a .pos
-LAYOUTS = (  # time, east, north, up of CSV files with an attitude of unknown convention
+_SERIES_COLUMNS = ("time", *"NED", *(f"velocity {axis}" for axis in "NED"), "roll", "pitch", "yaw")
+_POS_COLUMNS = ("time", "latitude", "longitude", "height")  # then sigmas, of a .pos
+_LAYOUTS = (  # time, east, north, up of CSV files with an attitude of unknown convention
     ("gpstime", "easting", "northing", "altitude"),  # pyboreas
     ("gps_time", "x", "y", "z"),  # NovAtel as SensorsCalibration exports it
 )
@@ -73,7 +74,7 @@ def read_poses(path: str | Path) -> Poses:
         return _checked(path, _read_pos(path))
     if suffix == ".csv":
         header, lines = read_header(path)
-        for layout in LAYOUTS:
+        for layout in _LAYOUTS:
             if set(layout) <= set(header):
                 columns = {name: header.index(name) for name in layout}
                 table = TableLayout(path, tuple(header), lines, columns, is_own=True)
@@ -83,7 +84,10 @@ def read_poses(path: str | Path) -> Poses:
             f"{path} has the unknown suffix '{path.suffix}'; a path is .csv, .pos or SBET "
             f"({', '.join(SBET_SUFFIXES)})."
         )
-    trajectory = read_trajectory(path, _sbet_zone(path) if suffix in SBET_SUFFIXES else None)
+    crs = None
+    if suffix in SBET_SUFFIXES:
+        crs = _sbet_zone(path)
+    trajectory = read_trajectory(path, crs)
     return Poses(trajectory.gps_time, trajectory.position, trajectory.attitude)
 
 
@@ -107,7 +111,7 @@ def _read_pos(path):
             )
     except ValueError as error:
         raise ValueError(
-            f"{path} is not a table of {', '.join(POS_COLUMNS)} (s, deg, deg, m): {error}"
+            f"{path} is not a table of {', '.join(_POS_COLUMNS)} (s, deg, deg, m): {error}"
         ) from None
     to_map = Transformer.from_crs("EPSG:4326", utm_zone(*table[0, 1:3]), always_xy=True)
     table[:, 1], table[:, 2] = to_map.transform(table[:, 2], table[:, 1])
@@ -136,7 +140,9 @@ def utm_zone(latitude: float, longitude: float) -> str:
     ('EPSG:32650', 'EPSG:32756')
     """
     zone = int(np.floor((longitude + 180.0) / 6.0)) % 60 + 1
-    return f"EPSG:{(32600 if latitude >= 0 else 32700) + zone}"
+    if latitude >= 0:
+        return f"EPSG:326{zone:02d}"
+    return f"EPSG:327{zone:02d}"
 
 
 def _seconds(cell):
@@ -153,3 +159,55 @@ def _seconds(cell):
     if time > SETTINGS.microseconds:
         return time / 1e6
     return time
+
+
+@dataclass(frozen=True)
+class PosErrorSeries:
+    """Recorded minus true pose over time.
+
+    Parameters
+    ----------
+    gps_time : (n,) array
+        Increasing. Units: s.
+    position : (n, 3) array
+        E, N, H. Units: m.
+    attitude : (n, 3) array
+        Roll, pitch, heading. Units: rad.
+    """
+
+    gps_time: np.ndarray
+    position: np.ndarray
+    attitude: np.ndarray
+
+
+def read_pos_error_series(path: str | Path) -> PosErrorSeries:
+    """Errors of an .err file: time (s), N, E, D (m), three velocities, roll, pitch, yaw (deg).
+
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    PosErrorSeries
+
+    Raises
+    ------
+    ValueError
+        For a file that is not such a table of numbers, or whose times don't increase.
+    """
+    try:
+        table = np.loadtxt(path, ndmin=2, comments="#")
+    except (ValueError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path} is not a table of numbers: {str(error).rstrip('.')}.") from None
+    if len(table) < 2 or table.shape[1] != len(_SERIES_COLUMNS):
+        raise ValueError(
+            f"{path} has {len(table)} rows of {table.shape[-1]} columns; at least 2 rows of "
+            f"{len(_SERIES_COLUMNS)} are expected: {', '.join(_SERIES_COLUMNS)}."
+        )
+    check_finite(path, table, "row")
+    gps_time, north, east, down = table[:, :4].T
+    check_increasing(path, gps_time, "row")
+    return PosErrorSeries(
+        gps_time, np.column_stack([east, north, -down]), np.radians(table[:, -3:])
+    )

@@ -79,11 +79,10 @@ class MapFactors:
 
     def __str__(self) -> str:
         """The factors in words."""
+        words = f"scale factor of the projection {self.projection:.6f}"
         if self.height != 1:
-            height = f", height factor {self.height:.6f}"
-        else:
-            height = ""
-        return f"scale factor of the projection {self.projection:.6f}{height}"
+            words += f", height factor {self.height:.6f}"
+        return words
 
 
 def map_factors(crs: str, place: np.ndarray) -> MapFactors:
@@ -277,4 +276,6 @@ def map_of(crs: CRS) -> Proj:
     ----------
     crs : pyproj.CRS
     """
-    return Proj(crs.sub_crs_list[0] if crs.is_compound else crs)
+    if crs.is_compound:
+        return Proj(crs.sub_crs_list[0])
+    return Proj(crs)

@@ -129,13 +129,12 @@ def _in_map(path, crs, record, accuracy, constant):
     try:
         position, convergence = project(crs, record)
         heading = record["heading"] - record["wander"] - convergence
-        return Trajectory(
-            record["gps_time"],
-            position,
-            attitude_from_angles(record["roll"], record["pitch"], heading),
-            *(_sigmas(accuracy, record["gps_time"], constant) if accuracy else (None, None)),
-            weeks=record.get("weeks"),
-        )
+        attitude = attitude_from_angles(record["roll"], record["pitch"], heading)
+        sigmas = (None, None)
+        if accuracy:
+            sigmas = _sigmas(accuracy, record["gps_time"], constant)
+        weeks = record.get("weeks")
+        return Trajectory(record["gps_time"], position, attitude, *sigmas, weeks=weeks)
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
 
@@ -185,10 +184,7 @@ def _check_radians(path, record):
     for name, limit in LIMITS.items():
         worst = np.abs(record[name]).max()
         if worst > limit * (1 + 1e-9):
-            if worst <= 360:
-                cause = "it may be in degrees"
-            else:
-                cause = "the file may not be an SBET"
+            cause = "it may be in degrees" if worst <= 360 else "the file may not be an SBET"
             raise ValueError(
                 f"{path} has a {name} of {worst:.6g} where radians up to {limit:.4f} belong: "
                 f"{cause}."
@@ -217,7 +213,8 @@ def _counted_on(accuracy, gps_time):
 
 def _sigmas(path, gps_time, constant):
     """Sigmas (n, 3) of E, N, H (m) and roll, pitch, heading (rad) at the trajectory's times."""
-    if is_poq := as_path(path).suffix.lower() == POQ_SUFFIX:
+    is_poq = as_path(path).suffix.lower() == POQ_SUFFIX
+    if is_poq:
         record = read_poq(path)
     else:
         record = _read_records(path, SMRMSG_FIELDS, "smrmsg")
@@ -236,4 +233,6 @@ def _sigmas(path, gps_time, constant):
     if min(position.min(), attitude.min()) < 0:
         kind = "a POQ" if is_poq else "smrmsg"
         raise ValueError(f"the accuracy file {path} holds negative sigmas: it may not be {kind}.")
-    return position, attitude if is_poq else np.radians(attitude / 60)
+    if not is_poq:  # arc minutes
+        attitude = np.radians(attitude / 60)
+    return position, attitude

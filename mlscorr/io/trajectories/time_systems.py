@@ -7,17 +7,18 @@ plain GPS seconds are found under either flag.
 
 import warnings
 from dataclasses import dataclass, replace
-from datetime import date, timedelta
+from datetime import date, datetime, timedelta
+from importlib.resources import files
 from itertools import product
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.trajectories._leap_seconds import EPOCH, leap_seconds
 from mlscorr.survey import WEEK, Trajectory, counted_on
 from mlscorr.wording import percent
 
+EPOCH = date(1980, 1, 6)  # when both were the same
 DAY = 86400.0  # s
 ADJUSTMENT = 1e9  # s
 NO_TIMES = (0.0, -1.0)  # what programs write where a point has no time
@@ -167,6 +168,173 @@ def _match(times, is_standard, trajectory, setting):
     return preferred or _best(candidates, times, trajectory, _others(flagged, times))
 
 
+def _check_precision(name, times):
+    """Warn of times all of which single precision can hold; refuse them where it is too coarse."""
+    rounded = times.astype(np.float32)
+    step = float(np.spacing(np.abs(rounded).max()))
+    if step <= SETTINGS.single_time_step or (rounded != times).any():
+        return
+    sentence = (
+        f"The times of {name} [{times.min():.3f}, {times.max():.3f}] s were rounded to single "
+        f"precision, in steps of {step:.2g} s, in which a vehicle moves on: export gps_time in "
+        "double precision."
+    )
+    if usual_systems(times) != ("week",):
+        raise ValueError(sentence)
+    warnings.warn(sentence, stacklevel=3)  # drift hardly changes within an eighth of a second
+
+
+def _candidates(times, span):
+    """Constants (s) as a list of (constant, cloud system, trajectory system), simplest first."""
+    middle = np.median(times)
+    goal = np.mean(span)
+    candidates = [(0.0, system, system) for system in SYSTEMS]
+    candidates += [(WEEK * k, "week", "week") for k in (-1, 1)]  # one of the two rolled over
+    to_gps = {"standard": ADJUSTMENT, "gps": 0.0}
+    for cloud, added in to_gps.items():  # to seconds of week, or to the other continuous system
+        week = np.floor((middle + added) / WEEK)
+        candidates += [(added - WEEK * (week + k), cloud, "week") for k in (0, -1, 1)]
+        candidates += [(added - taken, cloud, t) for t, taken in to_gps.items() if t != cloud]
+    for system, taken in to_gps.items():  # from seconds of week
+        week = np.floor((goal + taken) / WEEK)
+        candidates += [(WEEK * (week + k) - taken, "week", system) for k in (0, -1, 1)]
+    return candidates
+
+
+def _inside(times, passes, constant):
+    """Share of the times that fall inside passes (k, 2) of the trajectory, or its span (2,)."""
+    starts, ends = np.reshape(passes, (-1, 2)).T
+    number = np.searchsorted(starts, times + constant, side="right") - 1
+    return np.mean((number >= 0) & (times + constant <= ends[number]))
+
+
+def _best(candidates, times, trajectory, systems):
+    """The TimeMatch with most times in passes, or else in all, the first of equals; or None."""
+    for passes in (trajectory.passes, trajectory.gps_time[[0, -1]]):  # gaps hold any by chance
+        fits = [
+            TimeMatch(float(constant), cloud, system, float(inside))
+            for flagged in systems
+            for constant, cloud, system in candidates
+            if cloud == flagged
+            and (inside := _inside(times, passes, constant)) >= SETTINGS.covered_share
+        ]
+        if fits:
+            return max(fits, key=lambda match: match.inside)
+    return None
+
+
+def usual_systems(times: np.ndarray) -> tuple[str, ...]:
+    """Names of the systems whose range times lie in, the likelier first.
+
+    Parameters
+    ----------
+    times : (n,) array
+        Units: s.
+    """
+    if times.min() >= 0 and times.max() <= 2 * WEEK:
+        return ("week",)
+    if times.min() >= ADJUSTMENT:
+        return ("gps",)
+    if times.min() >= SETTINGS.earliest_time:
+        return ("gps", "standard")
+    return ("standard",)
+
+
+def _settle_equal(match, times):
+    """Name the system of equal times by their size: a constant of zero says nothing of it."""
+    usual = usual_systems(times)
+    if match.constant != 0.0 or match.cloud_system in usual:
+        return match
+    return replace(match, cloud_system=usual[0], trajectory_system=usual[0])
+
+
+def _others(flagged, times):
+    """The systems that the header does not name, the likelier by the size of the times first."""
+    usual = usual_systems(times)
+    others = [system for system in SYSTEMS if system != flagged]
+    return sorted(others, key=lambda system: system not in usual)
+
+
+def _other_systems(lag, earlier):
+    """Pairs (s, name) of what systems beside GPS time differ from it by, up to whole weeks."""
+    days = range(1, 7) if earlier <= DAY else ()  # else of another day, not seconds of the day
+    unix = (EPOCH - date(1970, 1, 1)).days * DAY - lag
+    differences = {lag: "UTC", unix: "Unix time", unix % WEEK: "Unix time"}
+    differences |= {day * DAY: "seconds of the day" for day in days}
+    return [(sign * s, system) for s, system in differences.items() for sign in (1, -1)]
+
+
+def _nothing_fits(name, times, span, setting):
+    """A sentence with both spans, the likely cause and the way out."""
+    candidates = _candidates(times, span)
+    shares = [(_inside(times, span, constant), cloud) for constant, cloud, _ in candidates]
+    largest = max(inside for inside, cloud in shares if setting in ("auto", cloud))
+    spans = (
+        f"the sampled times of {name}, [{times.min():.3f}, {times.max():.3f}] s, lie inside the "
+        f"trajectory [{span[0]:.3f}, {span[1]:.3f}] s"
+    )
+    share = f"Only {percent(largest)} of" if largest > 0 else "None of"
+    constants = [constant for constant, cloud, _ in candidates if setting in ("auto", cloud)]
+    systems = _other_systems(utc_lag(span, times), min(times.max(), span[1]))
+    for constant, (later, system) in product(constants, systems):
+        if _inside(times, span, constant + later) == 1.0:
+            return (
+                f"{share} {spans}, but all would with {later:+.0f} s: one of both may be in "
+                f"{system}, or the trajectory covers a part of the cloud. Export both in GPS time "
+                f"and whole; if it is {system}, add {-later:.0f} to trajectory.time_constant (s) "
+                "in survey.toml instead."
+            )
+    if largest > 0:
+        return (
+            f"{share} {spans}: the trajectory covers a part of the cloud. Export the whole "
+            "trajectory, or clip the cloud to it."
+        )
+    if setting == "auto" or max(shares)[0] < SETTINGS.covered_share:
+        return (
+            f"None of {spans}, neither as they are nor as seconds of week, adjusted standard GPS "
+            "time or plain GPS seconds: cloud and trajectory may be of different days, or one of "
+            "them may be in UTC, local time or milliseconds. Check that both are of one drive."
+        )
+    return (
+        f'None of {spans}, taken as {NAMES[setting]}, which cloud.gps_time = "{setting}" in '
+        'survey.toml asks for. Try cloud.gps_time = "auto".'
+    )
+
+
+def utc_lag(*times: np.ndarray) -> int:
+    """GPS time minus UTC on the day of times, by the first that tell it, or else today's. Units: s.
+
+    Parameters
+    ----------
+    *times : (n,) arrays
+        Of cloud or trajectory, each in its own system. Units: s.
+    """
+    for some in times:
+        if (system := usual_systems(some)[0]) != "week":
+            seconds = float(some[0]) + ADJUSTMENT * (system == "standard")
+            # of garbage too, to the 23rd century
+            return leap_seconds(EPOCH + timedelta(days=np.clip(seconds / DAY, 0, 1e5)))
+    return leap_seconds(date.max)
+
+
+def leap_seconds(day: date) -> int:
+    """GPS time minus UTC on a day, by the table of the IANA time zone database. Units: s.
+
+    Parameters
+    ----------
+    day : date
+
+    Examples
+    --------
+    >>> leap_seconds(date(2016, 12, 31)), leap_seconds(date(2017, 1, 1))
+    (17, 18)
+    """
+    table = (files("tzdata.zoneinfo") / "leapseconds").read_text(encoding="utf-8")
+    rows = [line.split() for line in table.splitlines() if line.startswith("Leap")]
+    ends = [datetime.strptime(" ".join(row[1:4]), "%Y %b %d").date() for row in rows]
+    return sum(EPOCH <= end < day for end in ends)
+
+
 def count_on(times: ArrayLike, period: float = WEEK) -> tuple[np.ndarray, np.ndarray | None]:
     """Times of successive epochs that count on where seconds of the week start again.
 
@@ -264,152 +432,3 @@ def listed_times(times: np.ndarray) -> str:
         return f"{values[0] + 0.0:.15g}"  # and not -0
     some = zip(values.tolist(), counts.tolist(), strict=True)
     return " and ".join(f"{value:.15g} ({number})" for value, number in some)
-
-
-def _check_precision(name, times):
-    """Warn of times all of which single precision can hold; refuse them where it is too coarse."""
-    rounded = times.astype(np.float32)
-    step = float(np.spacing(np.abs(rounded).max()))
-    if step <= SETTINGS.single_time_step or (rounded != times).any():
-        return
-    sentence = (
-        f"The times of {name} [{times.min():.3f}, {times.max():.3f}] s were rounded to single "
-        f"precision, in steps of {step:.2g} s, in which a vehicle moves on: export gps_time in "
-        "double precision."
-    )
-    if usual_systems(times) != ("week",):
-        raise ValueError(sentence)
-    warnings.warn(sentence, stacklevel=3)  # drift hardly changes within an eighth of a second
-
-
-def _candidates(times, span):
-    """Constants (s) as a list of (constant, cloud system, trajectory system), simplest first."""
-    middle = np.median(times)
-    goal = np.mean(span)
-    candidates = [(0.0, system, system) for system in SYSTEMS]
-    candidates += [(WEEK * k, "week", "week") for k in (-1, 1)]  # one of the two rolled over
-    to_gps = {"standard": ADJUSTMENT, "gps": 0.0}
-    for cloud, added in to_gps.items():  # to seconds of week, or to the other continuous system
-        week = np.floor((middle + added) / WEEK)
-        candidates += [(added - WEEK * (week + k), cloud, "week") for k in (0, -1, 1)]
-        candidates += [(added - taken, cloud, t) for t, taken in to_gps.items() if t != cloud]
-    for system, taken in to_gps.items():  # from seconds of week
-        week = np.floor((goal + taken) / WEEK)
-        candidates += [(WEEK * (week + k) - taken, "week", system) for k in (0, -1, 1)]
-    return candidates
-
-
-def _inside(times, passes, constant):
-    """Share of the times that fall inside passes (k, 2) of the trajectory, or its span (2,)."""
-    starts, ends = np.reshape(passes, (-1, 2)).T
-    number = np.searchsorted(starts, times + constant, side="right") - 1
-    return np.mean((number >= 0) & (times + constant <= ends[number]))
-
-
-def _best(candidates, times, trajectory, systems):
-    """The TimeMatch with most times in passes, or else in all, the first of equals; or None."""
-    for passes in (trajectory.passes, trajectory.gps_time[[0, -1]]):  # gaps hold any by chance
-        fits = [
-            TimeMatch(float(constant), cloud, system, float(inside))
-            for flagged in systems
-            for constant, cloud, system in candidates
-            if cloud == flagged
-            and (inside := _inside(times, passes, constant)) >= SETTINGS.covered_share
-        ]
-        if fits:
-            return max(fits, key=lambda match: match.inside)
-    return None
-
-
-def _others(flagged, times):
-    """The systems that the header does not name, the likelier by the size of the times first."""
-    usual = usual_systems(times)
-    others = [system for system in SYSTEMS if system != flagged]
-    return sorted(others, key=lambda system: system not in usual)
-
-
-def usual_systems(times: np.ndarray) -> tuple[str, ...]:
-    """Names of the systems whose range times lie in, the likelier first.
-
-    Parameters
-    ----------
-    times : (n,) array
-        Units: s.
-    """
-    if times.min() >= 0 and times.max() <= 2 * WEEK:
-        return ("week",)
-    if times.min() >= ADJUSTMENT:
-        return ("gps",)
-    if times.min() >= SETTINGS.earliest_time:
-        return ("gps", "standard")
-    return ("standard",)
-
-
-def utc_lag(*times: np.ndarray) -> int:
-    """GPS time minus UTC on the day of times, by the first that tell it, or else today's. Units: s.
-
-    Parameters
-    ----------
-    *times : (n,) arrays
-        Of cloud or trajectory, each in its own system. Units: s.
-    """
-    for some in times:
-        if (system := usual_systems(some)[0]) != "week":
-            seconds = float(some[0]) + ADJUSTMENT * (system == "standard")
-            # of garbage too, to the 23rd century
-            return leap_seconds(EPOCH + timedelta(days=np.clip(seconds / DAY, 0, 1e5)))
-    return leap_seconds(date.max)
-
-
-def _settle_equal(match, times):
-    """Name the system of equal times by their size: a constant of zero says nothing of it."""
-    usual = usual_systems(times)
-    if match.constant != 0.0 or match.cloud_system in usual:
-        return match
-    return replace(match, cloud_system=usual[0], trajectory_system=usual[0])
-
-
-def _other_systems(lag, earlier):
-    """Pairs (s, name) of what systems beside GPS time differ from it by, up to whole weeks."""
-    days = range(1, 7) if earlier <= DAY else ()  # else of another day, not seconds of the day
-    unix = (EPOCH - date(1970, 1, 1)).days * DAY - lag
-    differences = {lag: "UTC", unix: "Unix time", unix % WEEK: "Unix time"}
-    differences |= {day * DAY: "seconds of the day" for day in days}
-    return [(sign * s, system) for s, system in differences.items() for sign in (1, -1)]
-
-
-def _nothing_fits(name, times, span, setting):
-    """A sentence with both spans, the likely cause and the way out."""
-    candidates = _candidates(times, span)
-    shares = [(_inside(times, span, constant), cloud) for constant, cloud, _ in candidates]
-    largest = max(inside for inside, cloud in shares if setting in ("auto", cloud))
-    spans = (
-        f"the sampled times of {name}, [{times.min():.3f}, {times.max():.3f}] s, lie inside the "
-        f"trajectory [{span[0]:.3f}, {span[1]:.3f}] s"
-    )
-    share = f"Only {percent(largest)} of" if largest > 0 else "None of"
-    constants = [constant for constant, cloud, _ in candidates if setting in ("auto", cloud)]
-    systems = _other_systems(utc_lag(span, times), min(times.max(), span[1]))
-    for constant, (later, system) in product(constants, systems):
-        if _inside(times, span, constant + later) == 1.0:
-            return (
-                f"{share} {spans}, but all would with {later:+.0f} s: one of both may be in "
-                f"{system}, or the trajectory covers a part of the cloud. Export both in GPS time "
-                f"and whole; if it is {system}, add {-later:.0f} to trajectory.time_constant (s) "
-                "in survey.toml instead."
-            )
-    if largest > 0:
-        return (
-            f"{share} {spans}: the trajectory covers a part of the cloud. Export the whole "
-            "trajectory, or clip the cloud to it."
-        )
-    if setting == "auto" or max(shares)[0] < SETTINGS.covered_share:
-        return (
-            f"None of {spans}, neither as they are nor as seconds of week, adjusted standard GPS "
-            "time or plain GPS seconds: cloud and trajectory may be of different days, or one of "
-            "them may be in UTC, local time or milliseconds. Check that both are of one drive."
-        )
-    return (
-        f'None of {spans}, taken as {NAMES[setting]}, which cloud.gps_time = "{setting}" in '
-        'survey.toml asks for. Try cloud.gps_time = "auto".'
-    )

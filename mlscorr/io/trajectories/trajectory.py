@@ -10,9 +10,9 @@ from mlscorr.io.settings import SETTINGS
 from mlscorr.io.store import as_path, open_file, output_file, warn_of_cut
 from mlscorr.io.trajectories._course import check_units, checked_motion
 from mlscorr.io.trajectories._trj import MARK
+from mlscorr.io.trajectories.conventions import TrajectorySection
 from mlscorr.io.trajectories.pof import POF_SUFFIX
 from mlscorr.io.trajectories.sbet import is_sbet, read_riegl, read_sbet
-from mlscorr.io.trajectories.trajectory_sections import TrajectorySection
 from mlscorr.io.trajectories.trajectory_tables import (
     ATTITUDE_SIGMAS,
     COLUMNS,
@@ -126,7 +126,10 @@ def read_trajectory_file(
             f"{path} is of an unknown kind: no table of text, no SBET (whole records of 136 bytes, "
             f"angles in radians) and no trajectory of TerraScan. Export it as text or SBET."
         )
-    table, layout = (read_table if is_text else read_terrascan)(path, section, crs)
+    if is_text:
+        table, layout = read_table(path, section, crs)
+    else:
+        table, layout = read_terrascan(path, section, crs)
     trajectory = checked_motion(path, _trajectory_of(path, table))
     if is_text and not is_wide:
         warn_of_cut(path)
@@ -201,14 +204,19 @@ def _trajectory_of(path, table):
         return None
 
     attitude_sigma = sigmas(ATTITUDE_SIGMAS)
+    if attitude_sigma is not None:
+        attitude_sigma = np.radians(attitude_sigma)
+    session = None
+    if SESSION[0] in table:
+        session = table[SESSION[0]].astype(int)
     try:
         return Trajectory(
             table["gps_time"],
             position,
             attitude_from_angles(*np.radians(angles).T),
             sigmas(POSITION_SIGMAS),
-            None if attitude_sigma is None else np.radians(attitude_sigma),
-            table[SESSION[0]].astype(int) if SESSION[0] in table else None,
+            attitude_sigma,
+            session,
             weeks=table.get("weeks"),
         )
     except ValueError as error:

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from mlscorr.io.settings import SETTINGS
+from mlscorr.io.trajectories.conventions import TrajectorySection
 from mlscorr.io.trajectories.time_systems import NAMES, usual_systems
 from mlscorr.io.trajectories.trajectory import read_trajectory_file
-from mlscorr.io.trajectories.trajectory_sections import TrajectorySection
 from mlscorr.survey import WEEK, Pos, Trajectory
 
 KINDS = ("position", "attitude")
@@ -163,16 +163,18 @@ def across_week_end(parts: Sequence[Trajectory]) -> list[Trajectory]:
     first = min(lengths, key=lambda start: lengths[start])
     if lengths[first] >= min(WEEK / 2, lengths[starts.min()]):
         return list(parts)
-    return [_week_later(part) if part.gps_time[0] < first else part for part in parts]
+    counted = list(parts)
+    for i in np.flatnonzero(starts < first).tolist():
+        part = parts[i]
+        counted[i] = replace(part, gps_time=part.gps_time + WEEK, weeks=_weeks(part) + 1)
+    return counted
 
 
-def _week_later(part):
-    """A trajectory with a week added to its times, which files have as they came."""
+def _weeks(part):
+    """Number (n,) of weeks that were added to the times of a part."""
     if part.weeks is None:
-        weeks = np.zeros(len(part), int)
-    else:
-        weeks = part.weeks
-    return replace(part, gps_time=part.gps_time + WEEK, weeks=weeks + 1)
+        return np.zeros(len(part), int)
+    return part.weeks
 
 
 def _week_ends(names, parts):
@@ -256,7 +258,8 @@ def join_sessions(
     ValueError
         Where two are at different places at the same time.
     """
-    parts = _with_weeks(parts)
+    if any(part.weeks is not None for part in parts):
+        parts = [replace(part, weeks=_weeks(part)) for part in parts]
     order = sorted(range(len(parts)), key=lambda i: (parts[i].gps_time[0], -len(parts[i])))
     sessions = [_numbers(part) for part in parts]
     kept = []
@@ -264,15 +267,14 @@ def join_sessions(
     largest = 1 + max(session.max() for session in sessions)
     bases = {}
     for number, i in enumerate(order):
-        bases[i], is_new = 1 + number * largest, np.ones(len(parts[i]), bool)
+        bases[i] = 1 + number * largest
+        is_new = np.ones(len(parts[i]), bool)
         for j in order[:number]:
             is_common = parts[j].segment(parts[i].gps_time) >= 0
             if not is_common.any():
                 continue
-            is_same = _compare([names[j], names[i]], parts[j], parts[i], is_common, pos)
-            if is_same:
+            if _are_one([names[j], names[i]], parts[j], parts[i], is_common, pos):
                 bases[i] = bases[j]
-            if is_same:
                 how = "the same, and join"
             else:
                 how = "alike within their sigmas, and part"
@@ -285,17 +287,9 @@ def join_sessions(
             kept.append(replace(parts[i], session=bases[i] + sessions[i]).select(is_new))
     parted = Trajectory.concatenate(kept)
     whole = replace(parted, session=None)
-    return whole if np.array_equal(whole.gaps, parted.gaps) else parted, notes
-
-
-def _with_weeks(parts):
-    """All parts with the weeks that were added to their times, where that was done to one."""
-    if all(part.weeks is None for part in parts):
-        return parts
-    return [
-        replace(part, weeks=np.zeros(len(part), int)) if part.weeks is None else part
-        for part in parts
-    ]
+    if np.array_equal(whole.gaps, parted.gaps):
+        return whole, notes
+    return parted, notes
 
 
 def _numbers(part):
@@ -305,7 +299,7 @@ def _numbers(part):
     return part.session - part.session.min()
 
 
-def _compare(names, first, second, is_common, pos):
+def _are_one(names, first, second, is_common, pos):
     """Whether two trajectories are one; a ValueError where they are at different places."""
     there = Trajectory.at(first, second.gps_time[is_common])
     apart = np.linalg.norm(there.position - second.position[is_common], axis=1)

@@ -1,7 +1,9 @@
 """Trajectories in tables: our own columns, those of Inertial Explorer and others, and TUM's.
 
 TUM's rows are `time x y z qx qy qz qw` without a header, parted by blanks. With a header its names
-say which column is what: other programs write qw first.
+say which column is what: other programs write qw first. Files of positions alone are refused: GNSS
+gives no attitude (RTKLIB manual, appendix B.1, has the columns of its solution files), and
+geocentric coordinates are none of a map.
 """
 
 import re
@@ -18,6 +20,7 @@ from mlscorr.io.tables import (
     TRAJECTORY_NAMES,
     UNITS,
     TableLayout,
+    find_layout,
     find_meanings,
     likely_header,
     plain,
@@ -29,14 +32,26 @@ from mlscorr.io.trajectories.conventions import (
     QUATERNION,
     UNIT_TOLERANCE,
     Conventions,
+    TrajectorySection,
     attitude_of_quaternions,
     in_our_conventions,
 )
-from mlscorr.io.trajectories.positions import check_projected, position_file
 from mlscorr.io.trajectories.time_systems import counting_on
-from mlscorr.io.trajectories.trajectory_sections import TrajectorySection
 from mlscorr.survey import AXES, SurveyFileError
 
+POSITION_SUFFIX = ".pos"
+_RTKLIB = {"q", "ns", "ratio"}  # plain names: quality, number of satellites, ratio of ambiguities
+_RADII = (6.34e6, 6.40e6)  # m, from the Earth's center to its surface (6 357 to 6 378 km) and above
+_LARGEST_HEIGHT = 2e4  # m, of any vehicle; geocentric Z is less only within 0.2 deg of the equator
+_PLACES = (("latitude", "longitude"), ("easting", "northing"), ("x", "y"))
+_EXPORTS = (
+    "Export the GNSS/INS solution: an SBET (POSPac, Qinertia), or text with GPSTime, Easting, "
+    "Northing, H-Ell, Roll, Pitch and Heading (Inertial Explorer, POSPac)."
+)
+_PROJECTED = (
+    "Export easting, northing and height in the projected CRS of cloud and control, or latitude, "
+    "longitude and ellipsoidal height (an SBET of POSPac has these)."
+)
 COLUMNS = ("gps_time", *AXES, *ANGLES)
 POSITION_SIGMAS = ("sigma_easting", "sigma_northing", "sigma_height")
 ATTITUDE_SIGMAS = ("sigma_roll", "sigma_pitch", "sigma_heading")
@@ -96,11 +111,12 @@ def read_table(
 
     def lacking(names: Collection[str]) -> list[str]:
         is_projected = "latitude" not in names or {"easting", "northing"} <= set(names)
-        if is_projected:
-            place = AXES
-        else:
+        place = AXES
+        if not is_projected:
             place = ("latitude", "longitude", "height")
-        angles = ("roll", "pitch", "yaw" if section.heading and "yaw" in names else "heading")
+        angles = ANGLES
+        if section.heading and "yaw" in names:
+            angles = ("roll", "pitch", "yaw")
         if _is_quaternion(names, chosen):
             angles = QUATERNION
             is_named = {"easting", "northing"} & set(names) or not is_projected
@@ -110,14 +126,7 @@ def read_table(
 
     try:
         layout = read_layout(
-            path,
-            COLUMNS,
-            groups,
-            TRAJECTORY_NAMES,
-            lacking,
-            chosen,
-            tum_columns,
-            HINTS,
+            path, COLUMNS, groups, TRAJECTORY_NAMES, lacking, chosen, tum_columns, HINTS
         )
     except ValueError as error:
         if isinstance(error, SurveyFileError) or not (other := position_file(path)):
@@ -131,7 +140,7 @@ def read_table(
         factors = {name: UNITS[section.angles] for name in angles if name in layout.columns}
         layout = replace(layout, factors=layout.factors | factors)
     table = _place_in_degrees(path, layout, read_numbers(layout).T, section.angles)
-    check_projected(path, table)
+    _check_projected(path, table)
     table, unit = _in_seconds(layout, table)
     table = counting_on(table)
     if "qw" in layout.columns:
@@ -142,17 +151,17 @@ def read_table(
     conventions = Conventions.of(section, _usual_heading(layout, section))
     given = section.model_fields_set & {"angles", "heading", "pitch", "roll"}
     if layout.is_own and not given:
-        return table, f"{layout}{unit}." if unit else None
+        if unit:
+            return table, f"{layout}{unit}."
+        return table, None
     table = in_our_conventions(path, table, conventions, crs)
-    if "roll" in layout.factors:
-        degrees = ""
-    else:
-        degrees = ", angles in degrees"
+    sentence = f"{layout}{unit}"
     if "latitude" in layout.columns:
-        where = f"; latitude and longitude in the datum of {crs}"
-    else:
-        where = ""
-    return table, f"{layout}{unit}{where}; {conventions}{degrees}{layout.not_used}."
+        sentence += f"; latitude and longitude in the datum of {crs}"
+    sentence += f"; {conventions}"
+    if "roll" not in layout.factors:
+        sentence += ", angles in degrees"
+    return table, f"{sentence}{layout.not_used}."
 
 
 def read_terrascan(
@@ -242,12 +251,18 @@ def _used(layout: TableLayout, is_quaternion: bool) -> TableLayout:
         columns = {horizontal.get(name, name): place for name, place in columns.items()}
         factors = {horizontal.get(name, name): factor for name, factor in layout.factors.items()}
         layout = replace(layout, factors=factors)
-    needless = {"x", "y", *(ANGLES if is_quaternion else QUATERNION)}
-    needless |= {"yaw"} if is_quaternion else set()
-    needless |= {"latitude", "longitude"} if "easting" in columns else set()
-    needless |= {"yaw"} if "heading" in columns else set()
+    needless = {"x", "y"}
+    if is_quaternion:
+        needless.update(ANGLES, ["yaw"])
+    else:
+        needless.update(QUATERNION)
+    if "easting" in columns:
+        needless.update(("latitude", "longitude"))
+    if "heading" in columns:
+        needless.add("yaw")
     for group in (POSITION_SIGMAS, ATTITUDE_SIGMAS):
-        needless |= set() if set(group) <= set(columns) else set(group)
+        if not set(group) <= set(columns):
+            needless.update(group)
     return replace(layout, columns={name: i for name, i in columns.items() if name not in needless})
 
 
@@ -279,3 +294,76 @@ def _usual_heading(layout, section):
             [OpenPlace(("trajectory", "heading"), (TRUE, GRID), "direction of headings")],
         )
     return GRID
+
+
+def position_file(path: Path) -> str:
+    """The sentences on a file of positions alone, or of geocentric ones; empty for any other.
+
+    Parameters
+    ----------
+    path : Path
+        A table in which columns of a trajectory are missing.
+    """
+    header = likely_header(path, TRAJECTORY_NAMES)
+    if header and all(map(NUMBER.fullmatch, header)):
+        if path.suffix.lower() != POSITION_SUFFIX:
+            return ""
+        return (
+            f"{path} is a position file without names of columns ({len(header)} numbers a row, as "
+            "time, latitude, longitude, height and their sigmas), and without roll, pitch and "
+            f"heading. {_EXPORTS}"
+        )
+    known = find_meanings(header, TRAJECTORY_NAMES)
+    words = set(map(plain, header))
+    is_rtklib = words >= _RTKLIB
+    is_oriented = not {"roll", "pitch", "heading", "yaw", *QUATERNION}.isdisjoint(known)
+    is_geocentric = any("ecef" in word for word in words) or _is_geocentric_table(path, known)
+    if is_geocentric and is_oriented:
+        return f"{path} has geocentric coordinates X, Y, Z (ECEF). {_PROJECTED}"
+    used = {place for places in known.values() for place in places}
+    is_placed = is_geocentric or any(set(names) <= set(known) for names in _PLACES)
+    is_whole = "gps_time" in known and used == set(range(len(header)))
+    if is_oriented or not (is_rtklib or (is_placed and (is_whole or is_geocentric))):
+        return ""
+    kind = "an RTKLIB position file" if is_rtklib else "a file of positions"
+    frame = ", in geocentric coordinates X, Y, Z (ECEF)" if is_geocentric else ""
+    return f"{path} is {kind} without attitude (roll, pitch, heading){frame}. {_EXPORTS}"
+
+
+def _check_projected(path, table):
+    """Refuse geocentric coordinates in columns of easting, northing and height."""
+    if not set(AXES) <= set(table):
+        return
+    places = [table[name] for name in AXES]
+    if _is_geocentric(places):
+        raise ValueError(
+            f"{path} has geocentric coordinates (ECEF): its epochs lie "
+            f"{_radius(places) / 1e3:.0f} km from the Earth's center, with heights of "
+            f"{np.median(table['height']) / 1e3:.0f} km. {_PROJECTED}"
+        )
+
+
+def _is_geocentric_table(path, known):
+    """Return True if X, Y and Z of a table are geocentric by their size."""
+    columns = ("x", "y", "height")
+    if not set(columns) <= set(known):
+        return False
+    try:
+        layout = find_layout(
+            path, TRAJECTORY_NAMES, lambda names: [name for name in columns if name not in names]
+        )
+        places = {name: layout.columns[name] for name in columns}
+        return _is_geocentric(read_numbers(replace(layout, columns=places)).T)
+    except ValueError:  # which its reader says
+        return False
+
+
+def _is_geocentric(places):
+    """Return True if geocentric places (x, y, z; m) lie near the Earth's surface."""
+    is_far = np.abs(np.median(places[2])) > _LARGEST_HEIGHT
+    return bool(is_far and _RADII[0] < _radius(places) < _RADII[1])
+
+
+def _radius(places):
+    """Median distance from the origin. Units: m."""
+    return float(np.median(np.linalg.norm(places, axis=0)))

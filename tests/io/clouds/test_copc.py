@@ -142,10 +142,9 @@ def test_windows_of_a_copc_are_those_of_the_laz(pair):
     assert np.array_equal(laz.xyz, copc.xyz) and len(copc) < POINTS
 
 
-def test_a_glance_leaves_a_long_copc_as_it_is(pair, monkeypatch):
+def test_a_glance_leaves_a_long_copc_as_it_is(pair):
     "Seconds do not do for sorting: windows are refused, chunks come as they stand"
-    monkeypatch.setattr("mlscorr.io.store.preparation.SETTINGS", Settings(glanced_points=1_000))
-    with glance():
+    with glance(1_000):
         with pytest.raises(ValueError, match=r"in\.copc\.laz are not in order of time"):
             list(read_windows(cloud_of(pair[1]), np.array([[START, START + 1.0]]), limit=2_000))
         assert (np.diff(next(read_chunks(cloud_of(pair[1]))).gps_time) < 0).any()
@@ -182,7 +181,6 @@ def test_a_survey_in_copc_is_corrected_as_in_laz(street, tmp_path):
 @pytest.mark.parametrize("shift", [(0.0, 0.0, 0.0), (2.51, -1.8, 0.4), (300.0, 0.0, 0.0)])
 def test_a_corrected_copc_is_a_copc(pair, shift, tmp_path, monkeypatch):
     "Each point, with all its fields, in one node and its cube; more than memory holds, moved far"
-    monkeypatch.setattr("mlscorr.io.clouds._octree.SETTINGS", SMALL)
     monkeypatch.setattr("mlscorr.io.clouds._copc_writer.SETTINGS", SMALL)
     laz = laspy.read(moved(pair[0], tmp_path / "out.laz", shift))
     with CopcReader.open(str(moved(pair[1], tmp_path / "out.copc.laz", shift))) as reader:
@@ -205,7 +203,6 @@ def test_a_corrected_copc_is_a_copc(pair, shift, tmp_path, monkeypatch):
 
 def test_levels_are_samples_of_the_cloud(pair, tmp_path, monkeypatch):
     "A point for each cell of a node's grid above the leaves, but for the few of small children"
-    monkeypatch.setattr("mlscorr.io.clouds._octree.SETTINGS", SMALL)
     monkeypatch.setattr("mlscorr.io.clouds._copc_writer.SETTINGS", SMALL)
     with CopcReader.open(str(moved(pair[1], tmp_path / "out.copc.laz"))) as reader:
         nodes = nodes_of(reader)
@@ -222,7 +219,7 @@ def test_levels_are_samples_of_the_cloud(pair, tmp_path, monkeypatch):
 
 def test_a_box_and_a_level_are_read_by_others(pair, tmp_path, monkeypatch):
     "What laspy finds in a box by the hierarchy is all that lies there"
-    monkeypatch.setattr("mlscorr.io.clouds._octree.SETTINGS", SMALL)
+    monkeypatch.setattr("mlscorr.io.clouds._copc_writer.SETTINGS", SMALL)
     with CopcReader.open(str(moved(pair[1], tmp_path / "out.copc.laz"))) as reader:
         whole = xyz_of(reader.query())
         box = Bounds(*(CORNER[:2] + np.array([[-20.0, 5.0], [10.0, 31.0]])))
@@ -235,7 +232,7 @@ def test_a_box_and_a_level_are_read_by_others(pair, tmp_path, monkeypatch):
 
 def test_points_at_one_place_end_in_one_node(pair, tmp_path, monkeypatch):
     "No halving parts what has the same coordinates: the smallest node takes it all"
-    monkeypatch.setattr("mlscorr.io.clouds._octree.SETTINGS", SMALL)
+    monkeypatch.setattr("mlscorr.io.clouds._copc_writer.SETTINGS", SMALL)
     las = laspy.read(pair[0])
     las.X[: POINTS // 2] = 7
     las.Y[: POINTS // 2] = 8

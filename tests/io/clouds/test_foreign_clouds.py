@@ -206,11 +206,9 @@ def test_intensities_come_into_16_bits_and_their_scale_is_said(intensity, stored
 
 def test_a_large_cloud_is_looked_at_by_its_first_points(tmp_path, monkeypatch):
     "Within a glance; its number of points is that of its header, and it is said"
-    small = Settings(glanced_points=100, chunk_points=60)
-    for module in ("clouds.conversion", "store.preparation"):
-        monkeypatch.setattr(f"mlscorr.io.{module}.SETTINGS", small)
+    monkeypatch.setattr("mlscorr.io.clouds.conversion.SETTINGS", Settings(chunk_points=60))
     path = write_ply(tmp_path / "a.ply", few())
-    with glance():
+    with glance(100):
         cloud, layout = read(path)
         assert len(cloud) == layout.points == 120
         assert recorded_points(CloudFile(path, 120, 0.0, "")) == 500
