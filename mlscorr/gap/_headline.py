@@ -50,7 +50,7 @@ WORDS = {  # of a range of values of a covariate
 AXIS_WORDS = {"E": "in easting", "N": "in northing", "H": "in height"}
 
 
-class GapPlace(NamedTuple):
+class _GapPlace(NamedTuple):
     """A range of a covariate.
 
     Parameters
@@ -110,7 +110,7 @@ def _acts_on(label: str, lead: str) -> Callable[[str], bool] | None:
     return lambda by: by in named
 
 
-def _largest(places: Iterable[GapPlace]) -> GapPlace | None:
+def _largest(places: Iterable[_GapPlace]) -> _GapPlace | None:
     """The place whose share exceeds that of its residuals most; None where none does plainly."""
     plain = [place for place in places if place.share > SETTINGS.plain * place.rows]
     return max(plain, key=lambda place: place.share - place.rows, default=None)
@@ -124,13 +124,13 @@ def _places(splits, acts_on, start):
         if acts_on is not None and split.extent is not None:
             extent = split.extent
             words = _range_words(split.by, extent.low, extent.high, start)
-            yield GapPlace(extent.share, extent.rows, words)
+            yield _GapPlace(extent.share, extent.rows, words)
             continue
         for number, words in enumerate(_bin_words(split, start)):
             is_beyond = split.before[number] > split.band[number, 1]
             if acts_on is not None or is_beyond:
                 rows = split.count[number] / split.count.sum()
-                yield GapPlace(float(split.share[number]), float(rows), words)
+                yield _GapPlace(float(split.share[number]), float(rows), words)
 
 
 def _bin_words(split: Split, start: float) -> list[str]:

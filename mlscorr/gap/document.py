@@ -7,10 +7,10 @@ from dataclasses import asdict
 import numpy as np
 
 from mlscorr.effects import Effect
-from mlscorr.gap._agreement import agreements
 from mlscorr.gap._headline import headline
 from mlscorr.gap.advice import (
     advice_of,
+    agreements,
     distinct_parameters,
     excess_of,
     sentence_of,

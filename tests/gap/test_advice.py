@@ -5,13 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.gap._agreement import Agreement
-from mlscorr.gap.advice import OF_EXCESS, advice_of, excess_of, sentence_of
+from mlscorr.gap.advice import OF_EXCESS, Agreement, advice_of, excess_of, sentence_of
 from mlscorr.gap.closure import Closure
-from mlscorr.gap.closure._over_sigma import OverSigma
-from mlscorr.gap.closure.closure import Gap
+from mlscorr.gap.closure.closure import Gap, OverSigma
 from mlscorr.gap.evidence import Cause, Inference, Where
-from mlscorr.gap.evidence._verdict import GapVerdict
+from mlscorr.gap.evidence.decision import GapVerdict
 from mlscorr.gap.plan import NextData
 from mlscorr.gap.signatures import NO_MOUNTING
 from mlscorr.gap.wording import ADVICE, advice_sentences

@@ -14,7 +14,7 @@ import mlscorr
 from mlscorr.cli import app
 from mlscorr.effects import make_effect
 from mlscorr.gap.evidence import Cause, Costs, ErrorModel
-from mlscorr.gap.evidence.decision import kind_of
+from mlscorr.gap.evidence.labels import kind_of
 from mlscorr.gap.signatures import Signature, as_believed, with_cause
 from mlscorr.io.clouds import read_chunks
 from mlscorr.pipeline import read_effects

@@ -5,8 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mlscorr.gap.closure._sightings import SightedTarget, sightings_of
-from mlscorr.gap.closure.surroundings import Surroundings
+from mlscorr.gap.closure.surroundings import SightedTarget, Surroundings, sightings_of
 from mlscorr.gap.residuals import Patches, Rows, place_key
 from mlscorr.simulate import SceneScenario, scan
 from mlscorr.simulate.scene import read_mesh

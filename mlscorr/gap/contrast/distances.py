@@ -12,10 +12,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist, pdist
 
-from mlscorr.gap.contrast._cells import sampled
 from mlscorr.gap.contrast._settings import SETTINGS
-from mlscorr.gap.contrast.sample import ChannelSample, of_shared_moments
-from mlscorr.gap.residuals import chance
+from mlscorr.gap.contrast.sample import ChannelSample, of_shared_moments, sampled
+from mlscorr.gap.evidence import Inference, Observations
+from mlscorr.gap.residuals import Background, Rows, chance
 
 UNITS = {"points": "m", "intensity": "decades", "density": "decades"}  # of clouds; else sigmas
 
@@ -255,3 +255,25 @@ def _pairwise(simulated) -> dict[str, Callable]:
         "energy_distance": energy_distance,
         "mmd": lambda x, y: maximum_mean_discrepancy(x, y, bandwidth),
     }
+
+
+def replica_innovations(
+    rows: Rows, background: Background, inference: Inference, rng: np.random.Generator
+) -> np.ndarray:
+    """Innovations (n, replicas) of surveys in which nothing acts.
+
+    Their POS errs, and their noise has tails, as this one's do once its cause is taken off.
+
+    Parameters
+    ----------
+    rows : Rows
+    background : Background
+        Of these.
+    inference : Inference
+        Of these; n is the number of its innovations.
+    rng : numpy.random.Generator
+    """
+    observed = Observations.of(rows, background)
+    model = inference.evidence.likely_model(inference.verdict.label)
+    drawn = observed.whitener(model).draw(rng, SETTINGS.halves, inference.where.innovation[:, 1])
+    return observed.whitener().innovations(drawn)[0][observed.second]

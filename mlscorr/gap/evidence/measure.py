@@ -17,9 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mlscorr.effects import effect_class
-from mlscorr.gap.evidence._error_models import STATED, ErrorModel, window_growth
-from mlscorr.gap.evidence.columns import ColumnTable, block_groups
-from mlscorr.gap.evidence.observations import Observations
+from mlscorr.gap.evidence.evidence import ColumnTable, block_groups
+from mlscorr.gap.evidence.observations import STATED, ErrorModel, Observations, window_growth
 from mlscorr.gap.evidence.settings import SETTINGS
 from mlscorr.gap.residuals import Rows
 

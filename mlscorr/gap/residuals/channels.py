@@ -8,10 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from mlscorr.gap.residuals._covariates import scanner_origin
-from mlscorr.gap.residuals.patches import Patches
-from mlscorr.gap.residuals.plane_fit import freedom
-from mlscorr.gap.residuals.rows import Rows
+from mlscorr.gap.residuals.patches import Patches, freedom
+from mlscorr.gap.residuals.rows import Rows, scanner_origin
 from mlscorr.gap.residuals.settings import SETTINGS
 from mlscorr.survey import Survey
 

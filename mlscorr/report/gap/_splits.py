@@ -7,9 +7,8 @@ from matplotlib.patches import Patch
 
 from mlscorr.gap.evidence import SETTINGS as INFERENCE
 from mlscorr.report.gap._innovations import WINDOW
-from mlscorr.report.gap._rows import split_title
+from mlscorr.report.gap._rows import numbers, split_title
 from mlscorr.report.gap._settings import SETTINGS
-from mlscorr.report.gap.numbers import numbers
 from mlscorr.report.style import AFTER, BEFORE, GREY, label, legend_above, new_figure, styled
 from mlscorr.wording import percent
 

@@ -13,8 +13,8 @@ from mlscorr.gap.evidence import (
     scatter_terms,
     signed_root,
 )
-from mlscorr.gap.evidence._error_models import STATED
 from mlscorr.gap.evidence.measure import unit_square
+from mlscorr.gap.evidence.observations import STATED
 
 NOISES = ("range_noise", "position_noise", "dropout")
 
