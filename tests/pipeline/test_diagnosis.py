@@ -28,7 +28,7 @@ OFFSET = 0.02  # s
 KEYS = {
     *("schema", "verdict", "gap", "headline", "advice", "where", "causes", "separability"),
     *("closure", "next_data", "evidence", "innovations", "windows", "map", "channels"),
-    *("simulator", "left_out", "warnings", "notes", "name", "absent"),
+    *("simulator", "left_out", "mendable", "warnings", "notes", "name", "absent"),
     *("rating", "statements", "agreement", "assumed", "costs", "contrasts", "distances"),
     "clouds",
 }

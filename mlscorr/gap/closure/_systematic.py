@@ -218,7 +218,9 @@ class SystematicGap:
         off = 1.0 - wrong / max((signal**2).sum(), 1e-300) - np.array(stated)
         usual = np.percentile(self._explained_by_own(replica - predicted)[0], SETTINGS.band[1])
         explained = self._explained_by_own(rest[:, None])[0][0]
-        left = max(wrong.mean(), explained - self.own.shape[1] if explained > usual else 0.0)
+        left = wrong.mean()
+        if explained > usual:
+            left = max(left, explained - self.own.shape[1])
         return (self.residual**2 - rest**2).sum(), float(left), off
 
     def _explained_by_own(self, rest):

@@ -169,7 +169,10 @@ def _joined(platform, origin, patches, targets):
         cloud = PointCloud.concatenate([patch.cloud for patch in patches])
         normals = np.repeat([patch.normal for patch in patches], count[: len(patches)], axis=0)
         parts.insert(0, scan.recorded_pulses(platform, cloud, origin, normals))
-    return scan.RecordedPulses.concatenate(parts) if parts else None, np.array(count)
+    pulses = None
+    if parts:
+        pulses = scan.RecordedPulses.concatenate(parts)
+    return pulses, np.array(count)
 
 
 def _middle(xyz, view, count):

@@ -128,22 +128,27 @@ def close_gap(
     kind = gap_kind(cause.effect, case.evidence.noisy, rows)
     unit = UNITS[kind]
     whole = predict_whole(case, simulated)  # takes most memory: before there is a table of all rows
-    ruler = _Ruler.of(kind, case, cause.probability if callable(simulated) else 0.0)
+    probability = 0.0
+    if callable(simulated):
+        probability = cause.probability
+    ruler = _Ruler.of(kind, case, probability)
     folds = make_folds(case, whole, ruler.observations, ruler.model, simulated, rng, progress)
     held = ruler.compare(folds, rng)
     fitted = replace(folds, fold=np.where(used, 0, -1), predicted=(whole,))
     gap = _gap(held, unit)
+    if cause.effect == "none":
+        gap = replace(gap, after=gap.before)
+        held = replace(held, gone=0.0, interval=(0.0, 0.0))
     in_sample = _gap(ruler.compare(fitted, rng, used), unit)
-    nothing = cause.effect == "none"
     return Closure(
         cause.effect,
         float(cause.probability),
         kind,
         unit,
         gap.before,
-        gap.before if nothing else gap.after,
-        0.0 if nothing else held.gone,
-        (0.0, 0.0) if nothing else held.interval,
+        gap.after,
+        held.gone,
+        held.interval,
         gap.null_band,
         folds.held_out,
         folds.is_held_out,
@@ -236,7 +241,8 @@ class _Ruler:
             keep = observations.second
             terms = before, after, chance, usual, observations.row
             return tuple(values[keep] for values in terms)
-        of_kind = rows.channel == ("roughness" if self.kind == "scatter" else "return_rate")
+        channel = {"scatter": "roughness", "returns": "return_rate"}[self.kind]
+        of_kind = rows.channel == channel
         drawn = np.sqrt(rows.noise)[:, None] * rng.standard_normal((len(rows), replicas))
         before = np.column_stack([rows.residual, drawn])
         if self.kind == "scatter":

@@ -208,7 +208,10 @@ class Surroundings:
         remaining = []
         for cloud, limits in self._open:
             part = self._narrowed(cloud, last), limits
-            (remaining if limits[1] >= last else self._settled).append(part)
+            if limits[1] >= last:
+                remaining.append(part)
+            else:
+                self._settled.append(part)
         self._open = remaining
 
     def _narrowed(self, cloud, last):

@@ -163,8 +163,10 @@ def _of_ratio(pairs, ratio, weights, splits):
     medians = _medians(ratio, pairs.block, weights)
 
     def figure(sums):
-        is_replica = sums.ndim > 2  # not of bins and columns alone
-        return sums[..., 0] / sums[..., 3] - (medians[1:, None] if is_replica else medians[0])
+        mean = sums[..., 0] / sums[..., 3]
+        if sums.ndim > 2:  # of replicas, not of bins and columns alone
+            return mean - medians[1:, None]
+        return mean - medians[0]
 
     return Measure(
         "intensity",

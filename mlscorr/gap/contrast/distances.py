@@ -202,11 +202,9 @@ def _of_samples(channel, samples, rng, figures=None):
         figures = _pairwise(simulated.values)
     smallest = min(len(sample.values) for sample in samples)
     half = smallest // 2 - smallest // 8  # halves are not quite alike
-    number = {
-        name: min(half, SETTINGS.distance_points if name == "chamfer" else SETTINGS.drawn)
-        for name in figures
-    }
-
+    number = dict.fromkeys(figures, min(half, SETTINGS.drawn))  # all pairs are looked at
+    if "chamfer" in number:
+        number["chamfer"] = min(half, SETTINGS.distance_points)
     sides = {"before": (real, simulated), "floor": (simulated, simulated)}
     if following:
         sides["after"] = real, following[0]

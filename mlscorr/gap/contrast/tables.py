@@ -67,12 +67,16 @@ class ContrastTable:
         is_ratio : bool
             Whether the value is the log of a ratio.
         """
-        value = np.exp(self.value) if is_ratio else self.value
+        value = self.value
+        sigma = self.sigma
+        if is_ratio:
+            value = np.exp(value)
+            sigma = sigma * value
         columns = {
             "real": self.real,
             "simulated": self.simulated,
             "value": value,
-            "sigma": self.sigma * value if is_ratio else self.sigma,
+            "sigma": sigma,
             "blocks": np.round(self.blocks, 1),
             "differs": self.differs,
         }
@@ -269,8 +273,10 @@ def joined_bins(weight: np.ndarray) -> list[slice]:
         if effective(weight[:, start:end].sum(axis=1)) >= SETTINGS.least_blocks:
             bins.append(slice(start, end))
             start = end
-    if start < stop:
-        bins.append(slice(bins.pop().start if bins else start, stop))
+    if start < stop:  # what is left is no bin of its own
+        if bins:
+            start = bins.pop().start
+        bins.append(slice(start, stop))
     return bins
 
 

@@ -216,8 +216,12 @@ class _Search:
         """By the fall of the evidence one step to both sides; the step itself where there is
         none.
         """
-        scale = event.fixed["width"] * (1 if key == "time" else 2)
+        width = event.fixed["width"]
+        if key == "width":
+            width = 2 * width
         sides = [self._changed(event, key, change) for change in (-step, step)]
         falls = [gain - self.score(moved)[0] for moved in sides if moved is not None]
         fall = np.mean(falls) if falls else 0.0
-        return float(step * scale * (1 / np.sqrt(2 * fall) if fall > 0.01 else 1 / step))
+        if fall > 0.01:
+            return float(step * width * (1 / np.sqrt(2 * fall)))
+        return float(step * width * (1 / step))

@@ -303,7 +303,7 @@ def decide(
         is_hidden = bool(absence.runs) and by_rows["none"] > by_rows["unknown"]
     held = np.cumsum(list(probability.values()))
     number = int(np.searchsorted(held, SETTINGS.confidence)) + 1
-    label = cheapest(probability, evidence.noisy, Costs() if costs is None else costs)
+    label = cheapest(probability, evidence.noisy, costs or Costs())
     if is_hidden and label == "none":
         label = "unknown"
     lead = evidence.lead()[0] if label == "unknown" else ""

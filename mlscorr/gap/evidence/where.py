@@ -231,8 +231,10 @@ def _split(rows, row, by, terms, explained, is_moved):
 def _extent(rows, row, by, square):
     """Extent of a cause in a covariate."""
     values = rows.covariates[by][row]
+    if by in DEGREES:
+        values = np.degrees(values)
     turn = 360.0 if by == "scan_angle" else None
-    return extent_of(np.degrees(values) if by in DEGREES else values, square, turn)
+    return extent_of(values, square, turn)
 
 
 def _bins(rows, row, by):

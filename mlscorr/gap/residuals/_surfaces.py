@@ -157,10 +157,8 @@ def spread(columns: list[np.ndarray], limit: int, rng: np.random.Generator) -> n
         return np.arange(n)
     chance = np.zeros(n)
     for values in columns:
-        span = np.ptp(values)
-        number = (
-            (values - values.min()) / (span if span > 0 else 1.0) * SETTINGS.spread_bins
-        ).astype(int)
+        span = np.ptp(values) or 1.0
+        number = ((values - values.min()) / span * SETTINGS.spread_bins).astype(int)
         chance += 1 / np.bincount(number)[number]
     keys = rng.exponential(size=n) / chance  # the least of these are a sample without replacement
     return np.sort(np.argpartition(keys, limit)[:limit])

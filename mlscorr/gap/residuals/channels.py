@@ -126,7 +126,8 @@ def return_rate(patches: Patches) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     fired = np.maximum(patches.fired, 1)
     share = patches.returned / fired
     counted = patches.fired >= SETTINGS.fired
-    counted &= np.median(share[counted]) >= SETTINGS.thinned if counted.any() else False
+    if counted.any():
+        counted &= np.median(share[counted]) >= SETTINGS.thinned
     return share - 1.0, loss_variance(share, fired, counted), counted
 
 

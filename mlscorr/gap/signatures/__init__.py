@@ -2,8 +2,6 @@
 
 from mlscorr.gap.signatures._displacements import displacements
 from mlscorr.gap.signatures._signatures import (
-    NO_MOUNTING,
-    UNSTATED,
     Signature,
     curvature,
     expected,

@@ -13,10 +13,7 @@ from mlscorr.effects import EFFECTS, Effect, known_effects
 from mlscorr.gap.residuals import Rows
 from mlscorr.gap.signatures.changes import Bench, Change
 from mlscorr.gap.signatures.settings import SETTINGS
-from mlscorr.survey import Survey
-
-NO_MOUNTING = "and the survey has no [mounting]"  # why most effects are left out, where any are
-UNSTATED = "does not state how large it is"  # so that none is larger than stated
+from mlscorr.survey import Statement, Survey
 
 
 @dataclass(frozen=True)
@@ -95,7 +92,7 @@ def signatures(
     survey: Survey,
     effects: Iterable[type[Effect]] | None = None,
     rng: np.random.Generator | None = None,
-) -> tuple[tuple[Signature, ...], dict[str, str]]:
+) -> tuple[tuple[Signature, ...], dict[str, Statement]]:
     """Signatures of effects in the rows of a survey, and why others have none.
 
     Deterministic effects are differentiated by steps of a tenth of their usual size to both
@@ -114,8 +111,8 @@ def signatures(
 
     Returns
     -------
-    tuple of Signature, dict of str
-        Sentences by the names of effects without one.
+    tuple of Signature, dict of Statement
+        By the names of effects without one; a warning where survey.toml could mend that.
     """
     bench = Bench(rows, survey)
     signs = []
@@ -123,19 +120,19 @@ def signatures(
     rng = np.random.default_rng(0) if rng is None else rng
     for kind in known_effects() if effects is None else effects:
         if kind.needs_mounting() and survey.mounting is None:
-            left_out[kind.name] = f"It acts on the {kind.stage}, {NO_MOUNTING}."
+            left_out[kind.name] = Statement("no mounting", "warning", {"stage": kind.stage})
             continue
         if kind.name in survey.scanner.assumed:
-            left_out[kind.name] = f"survey.toml {UNSTATED}: [scanner] {kind.name}."
+            left_out[kind.name] = Statement("unstated size", "warning", {"name": kind.name})
             continue
         bank = _tried(bench, kind, _bank(kind, rows, survey), rng)
         if isinstance(bank, str):
-            left_out[kind.name] = bank
+            left_out[kind.name] = Statement("not usable", values={"why": bank})
             continue
         bank = [sign for sign in bank if sign.jacobian.any() or sign.is_noise]
         signs += bank
         if not bank:
-            left_out[kind.name] = "No row of this survey depends on it."
+            left_out[kind.name] = Statement("no row")
     return tuple(signs), left_out
 
 
@@ -229,12 +226,17 @@ def signature(bench: Bench, kind: type[Effect], fixed: dict, rng: np.random.Gene
     tries = _tries(kind, size, fixed)
     jacobian = np.zeros((m, len(tries)))
     step = SETTINGS.derivative_step * typical
-    for column, (_, unit, more) in enumerate(tries if _is_seen(rows, fixed) else ()):
-        ends = [
-            bench.change(kind(magnitude=np.multiply(unit, sign * step).tolist(), **more)).shift
-            for sign in ((-1, 1) if size.least is None else (0, 1))
-        ]
-        jacobian[:, column] = (ends[1] - ends[0]) / (step * (2 if size.least is None else 1))
+    if size.least is None:
+        first = -1
+    else:  # it has no other sign
+        first = 0
+    if _is_seen(rows, fixed):
+        for column, (_, unit, more) in enumerate(tries):
+            ends = [
+                bench.change(kind(magnitude=np.multiply(unit, sign * step).tolist(), **more)).shift
+                for sign in (first, 1)
+            ]
+            jacobian[:, column] = (ends[1] - ends[0]) / (step * (1 - first))
     names = tuple(name for name, _, _ in tries)
     return Signature(
         kind,
@@ -280,11 +282,12 @@ def _bank(kind, rows, survey):
     rest = {name: known[name].typical for name in kind.circumstances() if name not in moment}
     if not moment:
         return [rest]
-    widths = SETTINGS.widths if "width" in moment else (None,)
+    if "width" not in moment:
+        return [rest | {"time": t} for t in _times(rows, survey, SETTINGS.step_spacing)]
     return [
-        {**rest, "time": time, **({} if width is None else {"width": width})}
-        for width in widths
-        for time in _times(rows, survey, SETTINGS.step_spacing if width is None else width)
+        {**rest, "time": time, "width": width}
+        for width in SETTINGS.widths
+        for time in _times(rows, survey, width)
     ]
 
 

@@ -18,11 +18,12 @@ AXES = {"E": "easting", "N": "northing", "H": "height"}
 
 
 class Fact(NamedTuple):
-    """A number beside the verdict: what it is, it, and more in words."""
+    """A number beside the verdict: what it is, it, more in words, and what ends its sentence."""
 
     title: str
     number: str
     more: str = ""
+    stop: str = "."
 
 
 def is_closed(document: dict) -> bool:
@@ -242,9 +243,8 @@ def _unknown(document):
         return VerdictBox(
             "open", "Nothing shows, but not everything was seen", [answer["sentence"]]
         )
-    lead = answer["lead"].rstrip(".")
-    if lead:
-        text = f"It looks like: {lead}."
+    if answer["lead"]:
+        text = f"It looks like: {answer['lead']}."
     else:
         text = "It can't be said what it looks like."
     more = "This is a lead to follow, not a cause: whatever behaves like that may have made it."
@@ -336,14 +336,14 @@ def facts(document: dict) -> list[Fact]:
     gap = document["gap"]
     headline = document["headline"]
     if not is_named(document) and not is_closed(document):
-        whole = Fact("The gap between survey and simulation", headline, NEGATIVE)
+        whole = Fact("The gap between survey and simulation", headline, NEGATIVE, stop="")
         return [_certainty(document), whole]
     is_pattern = is_within(gap["before"], gap["null_band"])
     if is_pattern:
         more = "What gives it away is its pattern, not its size."
     else:
         more = ""
-    where = Fact("Where it shows most", headline, more)
+    where = Fact("Where it shows most", headline, more, stop="")
     return [_certainty(document), where, shrinking(document)]
 
 

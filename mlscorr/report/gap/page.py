@@ -182,8 +182,10 @@ def plan_page(document: dict, name: str) -> Page:
         "smallest_rows": [],
         "open_causes": [lowered(titles(members)) for members in document["classes"]],
         "compared": False,
-        "accuracy_words": accuracy_sentence(known) if (known := document.get("accuracy")) else "",
+        "accuracy_words": "",
     }
+    if document.get("accuracy"):
+        content["accuracy_words"] = accuracy_sentence(document["accuracy"])
     if document["advice"]:
         content["advice_title"] = "What to add"
     sections = {key: text for key, text in PLANNED.items() if not is_empty.get(key)}
