@@ -18,8 +18,8 @@ from gap_mechanisms import ACTUAL, NOISES, STUDIED, Outside, metric, noisy, size
 from gap_training.features import Geometry, geometry
 
 from mlscorr.gap.evidence import Observations, cause_of, compare_signatures, weigh_labels
-from mlscorr.gap.evidence._verdict import decide, joint_score
-from mlscorr.gap.evidence.decision import learned
+from mlscorr.gap.evidence.decision import decide, learned
+from mlscorr.gap.evidence.labels import joint_score
 from mlscorr.gap.signatures import signatures
 
 

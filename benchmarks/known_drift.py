@@ -25,13 +25,13 @@ from mlscorr.gap.evidence import (
     error_models,
     unknown_blocks,
 )
-from mlscorr.gap.evidence._error_models import STATED
 from mlscorr.gap.evidence._events import refine_events
 from mlscorr.gap.evidence.decision import cheapest
 from mlscorr.gap.evidence.evidence import suited_models, weigh_blocks, without_known
 from mlscorr.gap.evidence.labels import block_scores
+from mlscorr.gap.evidence.observations import STATED
 from mlscorr.gap.plan import Ruler
-from mlscorr.gap.plan.sizing import draw_effect
+from mlscorr.gap.plan.draws import draw_effect
 from mlscorr.gap.residuals import background
 from mlscorr.gap.signatures import signatures
 

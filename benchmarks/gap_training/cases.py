@@ -13,7 +13,7 @@ from gap_training.worlds import World
 from mlscorr.effects import effect_class
 from mlscorr.effects.catalogue import RANDOM, SYSTEMATIC
 from mlscorr.gap.plan import Ruler, draw_effects, draw_mechanism, names_to_try
-from mlscorr.gap.plan.sizing import draw_effect
+from mlscorr.gap.plan.draws import draw_effect
 from mlscorr.gap.residuals import Background, Rows, with_loss_variance
 from mlscorr.gap.signatures import Bench, Signature
 from mlscorr.simulate import Described, described, load_mechanisms

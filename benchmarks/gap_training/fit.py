@@ -11,8 +11,8 @@ import numpy as np
 
 from gap_training.records import Record
 from mlscorr.gap.evidence import Costs, calibration_error
-from mlscorr.gap.evidence.calibration import BINS
-from mlscorr.gap.evidence.decision import KINDS, LearnedDecision, cheapest, features, kind_of
+from mlscorr.gap.evidence.decision import BINS, LearnedDecision, cheapest, features
+from mlscorr.gap.evidence.labels import KINDS, kind_of
 
 PENALTIES = (0.01, 0.03, 0.1, 0.3, 1.0)  # inverse ones of squared weights, chosen out of fold
 SHARPNESS = np.linspace(0.2, 1.5, 27)  # factors on scores within a kind that are tried

@@ -13,8 +13,7 @@ import numpy as np
 from gap_training.cases import draw_case
 from gap_training.worlds import World
 from mlscorr.gap.evidence import weigh_labels
-from mlscorr.gap.evidence._verdict import joint_score
-from mlscorr.gap.evidence.decision import JointScore
+from mlscorr.gap.evidence.labels import JointScore, joint_score
 from mlscorr.simulate import Described
 
 

@@ -23,7 +23,7 @@ from mlscorr.estimate import believed_mounting, calibration_with_ties
 from mlscorr.frames import georeference, to_scanner
 from mlscorr.gap.evidence import infer_causes
 from mlscorr.gap.residuals import background, find_patches
-from mlscorr.gap.residuals._shared_planes import shared_rows
+from mlscorr.gap.residuals._surfaces import shared_rows
 from mlscorr.gap.signatures import signatures
 from mlscorr.survey import (
     CloudFile,

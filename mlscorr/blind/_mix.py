@@ -51,7 +51,9 @@ def causes(is_random: bool = False) -> tuple[str, ...]:
         Whether they are noise.
     """
     kinds = known_effects()
-    return tuple(k.name for k in kinds if (k.random if is_random else not k.is_scatter()))
+    if is_random:
+        return tuple(kind.name for kind in kinds if kind.random)
+    return tuple(kind.name for kind in kinds if not kind.is_scatter())
 
 
 def _case(kind, turns, rng):
@@ -65,10 +67,14 @@ def _case(kind, turns, rng):
         sizes, shares = zip(*SETTINGS.single_sizes, strict=True)
         mdb = float(rng.choice(sizes, p=shares))
     elif kind != "clean":
-        is_noise = kind == "noise"
-        mdb = float(rng.uniform(*(SETTINGS.noise_mdb if is_noise else SETTINGS.clear_sizes)))
+        sizes = SETTINGS.clear_sizes
+        if kind == "noise":
+            sizes = SETTINGS.noise_mdb
+        mdb = float(rng.uniform(*sizes))
     without = str(rng.choice([name for name in causes() if name not in names]))
-    return Case(kind, names, mdb, names[0] if kind == "withheld" else without)
+    if kind == "withheld":  # it is drawn all the same: cases after it stay what they were
+        without = names[0]
+    return Case(kind, names, mdb, without)
 
 
 def _turns(names, rng):

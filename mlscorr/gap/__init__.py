@@ -12,8 +12,6 @@ The story, a room each:
   and words
 """
 
-from mlscorr.gap._headline import headline
-from mlscorr.gap.advice import no_cause
 from mlscorr.gap.document import (
     assumed_document,
     cause_document,
@@ -24,3 +22,4 @@ from mlscorr.gap.document import (
 )
 from mlscorr.gap.evidence import Costs
 from mlscorr.gap.open_scale import likely_scale, open_sigmas, with_scale
+from mlscorr.gap.wording import headline, left_out_sentences, no_cause

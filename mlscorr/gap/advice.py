@@ -1,18 +1,61 @@
-"""What is said of a verdict in a sentence, and what to do about it."""
+"""What to do about a verdict; and how far observed things lie from where they belong, beside what
+the accuracies state.
+"""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
-from mlscorr.effects import title
-from mlscorr.gap._agreement import Agreement
+import numpy as np
+
 from mlscorr.gap.closure import Closure
 from mlscorr.gap.evidence import SETTINGS, Cause, CauseParameter, Inference
 from mlscorr.gap.plan import NextData
-from mlscorr.gap.signatures import NO_MOUNTING
+from mlscorr.gap.residuals import Background, Rows
 from mlscorr.survey import Statement
-from mlscorr.wording import size
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """Of the things of one channel, as recorded, less the effects that the simulator has.
+
+    Parameters
+    ----------
+    channel : str
+        target, surface or shared.
+    things : int
+    rms_mm : float
+        Of the residuals, along each axis or normal. Units: mm.
+    stated_mm : float
+        The same by the stated accuracies of POS, survey and extraction. Units: mm.
+    """
+
+    channel: str
+    things: int
+    rms_mm: float
+    stated_mm: float
+
+
+def agreements(rows: Rows, background: Background) -> list[Agreement]:
+    """An Agreement of each channel that has a residual in m.
+
+    Parameters
+    ----------
+    rows : Rows
+    background : Background
+        Of these rows.
+    """
+    variance = rows.noise + rows.survey
+    legs = background.position**2 + background.attitude**2
+    np.add.at(variance, background.row, legs.sum(axis=1))
+    parts = []
+    for channel in dict.fromkeys(rows.channel[rows.metric].tolist()):
+        of = rows.metric & (rows.channel == channel)
+        sizes = (1e3 * np.sqrt(np.mean(values[of])) for values in (rows.residual**2, variance))
+        parts.append(Agreement(channel, len(np.unique(rows.item[of])), *map(float, sizes)))
+    return parts
+
 
 OF_EXCESS = {  # key of the advice where no cause is named, by what is left is more than
     "": "nothing to do",
@@ -46,23 +89,6 @@ def excess_of(
     return ""
 
 
-def no_cause(labels: Sequence[str], excess: str) -> str:
-    """What is said where no cause is named, without a full stop.
-
-    Parameters
-    ----------
-    labels : sequence of str
-        That hold 95 %.
-    excess : str
-        As ``excess_of`` gives it.
-    """
-    if excess:
-        return f"No cause is shown, but the two differ by more than {excess}"
-    if list(labels) != ["none"]:
-        return "Nothing is shown to be wrong, but not all is ruled out"
-    return "Nothing is wrong that this survey could show"
-
-
 def distinct_parameters(cause: Cause) -> tuple[CauseParameter, ...]:
     """Parameters of a cause; those of one name have the name of their effect before it.
 
@@ -84,40 +110,13 @@ def distinct_parameters(cause: Cause) -> tuple[CauseParameter, ...]:
     )
 
 
-def sentence_of(inference: Inference, excess: str) -> str:
-    """The verdict in a sentence.
-
-    Parameters
-    ----------
-    inference : Inference
-    excess : str
-        As ``excess_of`` gives it.
-    """
-    verdict = inference.verdict
-    cause = inference.cause
-    chance = f"probability {verdict.probability:.2f}"
-    if verdict.label == "none":
-        return f"{no_cause(verdict.set, excess)} ({chance} that nothing is wrong)."
-    if verdict.is_hidden:
-        return (
-            f"What was compared shows nothing wrong, but it can't be said that nothing is: there "
-            f"is a {verdict.lead} (probability of something unknown {verdict.probability:.2f})."
-        )
-    if verdict.label == "unknown":
-        return f"No effect that was judged explains it ({chance}): it looks like a {verdict.lead}."
-    parameters = distinct_parameters(cause)
-    sizes = [f"{p.name} {size(p.estimate, p.sigma, p.unit)}" for p in parameters]
-    do = "explain" if "+" in verdict.label else "explains"
-    return f"{title(verdict.label)} {do} it ({chance}): {', '.join(sizes)} (± one sigma)."
-
-
 def advice_of(
     inference: Inference,
     closure: Closure,
     next_data: Sequence[NextData],
     excess: str,
     is_stated: bool = True,
-    left_out: Mapping[str, str] = MappingProxyType({}),
+    left_out: Mapping[str, Statement] = MappingProxyType({}),
 ) -> list[Statement]:
     """Return the advice on a verdict.
 
@@ -131,7 +130,7 @@ def advice_of(
         As ``excess_of`` gives it.
     is_stated : bool
         Whether somebody stated the sigmas of the POS.
-    left_out : mapping of str to str
+    left_out : mapping of str to Statement
         Why effects were not judged.
     """
     verdict = inference.verdict
@@ -144,7 +143,7 @@ def advice_of(
     elif verdict.is_hidden:
         advice.append(Statement("unmatched targets"))
     elif verdict.label == "unknown":
-        unjudged = sum(NO_MOUNTING in why for why in left_out.values())
+        unjudged = sum(why.key == "no mounting" for why in left_out.values())
         if unjudged:
             advice.append(Statement("unstated mounting", values={"effects": unjudged}))
         advice.append(Statement("unknown error", values={"lead": verdict.lead}))

@@ -7,13 +7,11 @@ from dataclasses import asdict
 import numpy as np
 
 from mlscorr.effects import Effect
-from mlscorr.gap._agreement import agreements
-from mlscorr.gap._headline import headline
 from mlscorr.gap.advice import (
     advice_of,
+    agreements,
     distinct_parameters,
     excess_of,
-    sentence_of,
     without_nothing_to_do,
 )
 from mlscorr.gap.closure import Closure
@@ -21,7 +19,7 @@ from mlscorr.gap.evidence import NAMES, Cause, Inference, Separability
 from mlscorr.gap.open_scale import open_sigmas
 from mlscorr.gap.plan import NextData
 from mlscorr.gap.residuals import Absence, Rows, background
-from mlscorr.gap.wording import advice_sentences
+from mlscorr.gap.wording import advice_sentences, headline, left_out_sentences, sentence_of
 from mlscorr.survey import Statement, Survey
 from mlscorr.wording import with_articles
 
@@ -36,7 +34,7 @@ def gap_document(
     closure: Closure,
     next_data: Sequence[NextData],
     effects: Iterable[Effect],
-    left_out: Mapping[str, str],
+    left_out: Mapping[str, Statement],
     warnings: Iterable[str],
     absence: Absence,
     further_advice: Sequence[Statement] = (),
@@ -53,7 +51,7 @@ def gap_document(
     next_data : sequence of NextData
     effects : iterable of Effect
         That the simulator had already.
-    left_out : mapping of str to str
+    left_out : mapping of str to Statement
         Why effects were not considered.
     warnings : iterable of str
     absence : Absence
@@ -97,7 +95,8 @@ def gap_document(
         "map": map_document(survey) | {"rows": _on_map(rows, where)},
         "channels": {str(k): int((rows.channel == k).sum()) for k in np.unique(rows.channel)},
         "simulator": {"effects": [effect.document() for effect in effects]},
-        "left_out": dict(left_out),
+        "left_out": left_out_sentences(left_out),
+        "mendable": [name for name, why in left_out.items() if why.severity == "warning"],
         "absent": [run.document() for run in absence.runs],
         "warnings": [*absence.warnings, *warnings],
         "notes": list(survey.notes),
@@ -151,13 +150,16 @@ def cause_document(rows: Rows, cause: Cause) -> dict:
         Found in these.
     """
     moved = cause.shift[rows.metric]
-    target = [part.fixed["target"] for part, _ in cause.parts if "target" in part.fixed]
-    return {
+    content = {
         "effect": cause.effect,
         "probability": float(cause.probability),
         "rms_mm": float(1e3 * np.sqrt(np.mean(moved**2))),
         "parameters": [asdict(parameter) for parameter in distinct_parameters(cause)],
-    } | ({"target": target[0]} if target else {})
+    }
+    for part, _ in cause.parts:
+        if "target" in part.fixed:
+            content.setdefault("target", part.fixed["target"])
+    return content
 
 
 def separability_document(compared: Separability) -> dict:

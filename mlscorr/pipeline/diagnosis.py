@@ -206,7 +206,7 @@ class DiagnosedSurvey(KnownResult):
     inference: Inference
     closure: Closure
     next_data: tuple[NextData, ...]
-    left_out: dict[str, str]
+    left_out: dict[str, Statement]
     warnings: tuple[str, ...]
     absence: Absence = field(default_factory=Absence)
     signatures: tuple[Signature, ...] = ()

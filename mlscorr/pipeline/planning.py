@@ -10,13 +10,13 @@ import numpy as np
 
 from mlscorr.effects import Effect, known_effects, lowered, parameter_title, titles
 from mlscorr.estimate import COMPONENTS, PlannedAccuracy, predict_accuracy
-from mlscorr.gap import map_document, separability_document
+from mlscorr.gap import left_out_sentences, map_document, separability_document
 from mlscorr.gap.evidence import Observations, Separability, compare_signatures
 from mlscorr.gap.plan import NextData, event_sizes, next_data, planned_rows
 from mlscorr.gap.residuals import Rows, background
 from mlscorr.gap.signatures import signatures
 from mlscorr.pipeline._result import KnownResult, ResultFiles
-from mlscorr.survey import Matched, Survey, TargetObservations, check_survey, rows_frame
+from mlscorr.survey import Matched, Statement, Survey, TargetObservations, check_survey, rows_frame
 
 if TYPE_CHECKING:
     import pandas
@@ -51,7 +51,7 @@ def plan(survey: Survey, library: Iterable[type[Effect]] | None = None) -> Plann
     data = []
     for members in compared.classes:
         data += next_data(rows, survey, library, members, compared)
-    noise = {sign.name: _NOISE for sign in signs if sign.is_noise}
+    noise = {sign.name: Statement("noise") for sign in signs if sign.is_noise}
     best = {addition.survey: addition for addition in sorted(data, key=lambda a: -(a.after or 0.0))}
     return PlannedSurvey(
         survey,
@@ -92,9 +92,6 @@ def _looks_at_control(survey, rows):
     return first[rows.survey_item[first] < len(survey.control)]  # control comes before check
 
 
-_NOISE = "Noise shows in the roughness of surfaces and the spread of residuals, not in a shift."
-
-
 @dataclass(frozen=True, repr=False)
 class PlannedSurvey(KnownResult):
     """A survey before it is driven: the document of plan.json, and ``write``."""
@@ -106,7 +103,7 @@ class PlannedSurvey(KnownResult):
     separability: Separability
     events: dict
     next_data: tuple[NextData, ...]
-    left_out: dict[str, str]
+    left_out: dict[str, Statement]
     accuracy: PlannedAccuracy | None = None
 
     def _content(self):
@@ -136,7 +133,7 @@ class PlannedSurvey(KnownResult):
             "accuracy": self._accuracy_document(),
             "next_control": places,
             "advice": self._advice(content["detectable"]),
-            "left_out": self.left_out,
+            "left_out": left_out_sentences(self.left_out),
             "notes": list(self.survey.notes),
             "warnings": [],
         }

@@ -144,6 +144,7 @@ def gap_document(label="time_offset", probability=0.9817, rows=300, rng=None, **
             for channel, figure in (("points", "chamfer"), ("surface", "energy_distance"))
         ],
         "left_out": {"beam_divergence": "No row of this survey depends on it."},
+        "mendable": [],
         "warnings": ["No plane was seen twice."],
     }
     return document | changes

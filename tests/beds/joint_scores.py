@@ -3,7 +3,7 @@
 import numpy as np
 from gap_training.records import Record
 
-from mlscorr.gap.evidence.decision import JointScore
+from mlscorr.gap.evidence.labels import JointScore
 
 FACTS = dict.fromkeys(("rough", "raised", "event", "event in raised", "scale", "size", "odd"), 0.0)
 FACTS |= {"rough": 1.0, "size": 6.0}

@@ -138,4 +138,4 @@ def test_an_effect_that_cannot_be_applied_is_left_out(tmp_path, name, body, said
     with np.errstate(invalid="ignore"):
         signs, left_out = signatures(g.rows, g.survey, kinds)
     assert signs == ()
-    assert said in left_out[name]
+    assert said in left_out[name].values["why"]

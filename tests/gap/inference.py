@@ -7,8 +7,8 @@ import numpy as np
 
 from mlscorr.collocation import Covariance
 from mlscorr.gap.evidence import SETTINGS, weigh_labels
-from mlscorr.gap.evidence._verdict import decide, joint_score
-from mlscorr.gap.evidence.decision import learned
+from mlscorr.gap.evidence.decision import decide, learned
+from mlscorr.gap.evidence.labels import joint_score
 from mlscorr.gap.signatures import Bench
 
 

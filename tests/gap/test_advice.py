@@ -5,16 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.gap._agreement import Agreement
-from mlscorr.gap.advice import OF_EXCESS, advice_of, excess_of, sentence_of
+from mlscorr.gap.advice import OF_EXCESS, Agreement, advice_of, excess_of
 from mlscorr.gap.closure import Closure
-from mlscorr.gap.closure._over_sigma import OverSigma
-from mlscorr.gap.closure.closure import Gap
+from mlscorr.gap.closure.closure import Gap, OverSigma
 from mlscorr.gap.evidence import Cause, Inference, Where
-from mlscorr.gap.evidence._verdict import GapVerdict
+from mlscorr.gap.evidence.decision import GapVerdict
 from mlscorr.gap.plan import NextData
-from mlscorr.gap.signatures import NO_MOUNTING
-from mlscorr.gap.wording import ADVICE, advice_sentences
+from mlscorr.gap.wording import (
+    ADVICE,
+    LEFT_OUT,
+    advice_sentences,
+    left_out_sentences,
+    sentence_of,
+)
 from mlscorr.survey import Statement
 
 BAND = (-0.4, 0.7)  # mm
@@ -107,8 +110,8 @@ def test_the_nearest_effect_is_advised_against_by_its_share():
 def test_what_no_judged_effect_explains_may_be_one_that_needs_a_mounting():
     "Two of three effects lack [mounting]: to state it comes first, and no effect is ruled out"
     found = inference("unknown", labels=("unknown",), lead="error to the right")
-    mounting = f"It acts on the mounting, {NO_MOUNTING}."
-    left_out = {"lever_arm": mounting, "boresight": mounting, "beam_divergence": "No row."}
+    mounting = Statement("no mounting", "warning", {"stage": "mounting"})
+    left_out = {"lever_arm": mounting, "boresight": mounting, "range": Statement("no row")}
     first, second = advice_of(found, closure(), [], "", left_out=left_out)
     assert first == Statement("unstated mounting", values={"effects": 2})
     assert second.key == "unknown error"
@@ -168,3 +171,18 @@ def test_a_nearest_effect_without_a_share_is_advised_against():
     statement = Statement("nearest effect", values={"effect": "range_scale", "share": None})
     (sentence,) = advice_sentences([statement])
     assert "%" not in sentence and "does not explain it: don't use it" in sentence
+
+
+def test_every_reason_not_to_judge_has_its_sentence():
+    "With the stage or the key that lacks a value"
+    values = {
+        "stage": "range",
+        "name": "range_noise",
+        "why": "It makes values that are no numbers.",
+    }
+    left_out = {key: Statement(key, values=values) for key in LEFT_OUT}
+    sentences = left_out_sentences(left_out)
+    assert sentences["no mounting"] == "It acts on the range, and the survey has no [mounting]."
+    assert sentences["unstated size"].endswith("how large it is: [scanner] range_noise.")
+    assert sentences["not usable"] == values["why"]
+    assert all(sentence.endswith(".") for sentence in sentences.values())

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from gap_training import features
 
-from mlscorr.gap._agreement import agreements
+from mlscorr.gap.advice import agreements
 
 
 @pytest.mark.long

@@ -11,7 +11,7 @@ from mlscorr.effects import effect_class, make_effect
 from mlscorr.gap import map_document, separability_document, windows_document
 from mlscorr.gap.advice import distinct_parameters
 from mlscorr.gap.evidence import Cause, CauseParameter, Separability
-from mlscorr.gap.evidence._error_models import STATED
+from mlscorr.gap.evidence.observations import STATED
 from mlscorr.gap.signatures import signatures
 
 

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from mlscorr.effects import EFFECTS
-from mlscorr.gap._headline import ACTS_ON, headline
 from mlscorr.gap.evidence import Split, Where
-from mlscorr.gap.evidence._extent import Extent
-from mlscorr.gap.evidence.where import SPLITS
+from mlscorr.gap.evidence.where import SPLITS, Extent
+from mlscorr.gap.wording import ACTS_ON, headline
 
 START = 413200.0  # s
 

@@ -14,7 +14,7 @@ import mlscorr
 from mlscorr.cli import app
 from mlscorr.effects import make_effect
 from mlscorr.gap.evidence import Cause, Costs, ErrorModel
-from mlscorr.gap.evidence.decision import kind_of
+from mlscorr.gap.evidence.labels import kind_of
 from mlscorr.gap.signatures import Signature, as_believed, with_cause
 from mlscorr.io.clouds import read_chunks
 from mlscorr.pipeline import read_effects
@@ -28,7 +28,7 @@ OFFSET = 0.02  # s
 KEYS = {
     *("schema", "verdict", "gap", "headline", "advice", "where", "causes", "separability"),
     *("closure", "next_data", "evidence", "innovations", "windows", "map", "channels"),
-    *("simulator", "left_out", "warnings", "notes", "name", "absent"),
+    *("simulator", "left_out", "mendable", "warnings", "notes", "name", "absent"),
     *("rating", "statements", "agreement", "assumed", "costs", "contrasts", "distances"),
     "clouds",
 }

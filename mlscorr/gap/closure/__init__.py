@@ -1,9 +1,8 @@
 """The simulator once more with the effect in it: how far the gap shrinks."""
 
-from mlscorr.gap.closure.ablation import LoneEffect, lone_effects
+from mlscorr.gap.closure._systematic import LoneEffect, lone_effects
 from mlscorr.gap.closure.beams import Beams, collect_beams
 from mlscorr.gap.closure.closure import Closure, close_gap
-from mlscorr.gap.closure.folds import cause_for_simulator
-from mlscorr.gap.closure.found_cause import FoundCause
+from mlscorr.gap.closure.folds import FoundCause, cause_for_simulator
 from mlscorr.gap.closure.rerun import BeamSimulator
 from mlscorr.gap.closure.surroundings import Surroundings

@@ -4,18 +4,31 @@ What stays is what the error of the size leaves, or, where chance rarely leaves 
 cause's own columns still explain of the rest. What any other block explains of it, known or
 unknown, counts by the probability that the cause isn't all: the evidence has weighed it already,
 and drift of another shape than V's looks like something, too. The gap before is what is taken away
-and what stays: no share of it is more than all.
+and what stays: no share of it is more than all. The gap that each effect leaves by itself is
+measured alike, in the rows in which it was found.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
-from mlscorr.gap.closure._cross_fit import CrossFit
-from mlscorr.gap.closure.folds import Folds
-from mlscorr.gap.evidence import SETTINGS, ColumnTable, ErrorModel, Explanations, Observations
+from mlscorr.gap.closure.folds import CrossFit, Folds
+from mlscorr.gap.evidence import (
+    SETTINGS,
+    ColumnTable,
+    ErrorModel,
+    Explanations,
+    Inference,
+    Observations,
+    cause_of,
+    signed_root,
+)
+from mlscorr.gap.residuals import Rows
+from mlscorr.gap.signatures import Signature
 
 
 def share_gone(before: float, after: float, chance: float = -np.inf) -> float:
@@ -205,7 +218,9 @@ class SystematicGap:
         off = 1.0 - wrong / max((signal**2).sum(), 1e-300) - np.array(stated)
         usual = np.percentile(self._explained_by_own(replica - predicted)[0], SETTINGS.band[1])
         explained = self._explained_by_own(rest[:, None])[0][0]
-        left = max(wrong.mean(), explained - self.own.shape[1] if explained > usual else 0.0)
+        left = wrong.mean()
+        if explained > usual:
+            left = max(left, explained - self.own.shape[1])
         return (self.residual**2 - rest**2).sum(), float(left), off
 
     def _explained_by_own(self, rest):
@@ -222,3 +237,60 @@ class SystematicGap:
         share = stays**2 / max((stays**2).sum(), 1e-300) * left
         both = [np.bincount(self.fold, v, number) for v in (gone + share, share)]
         return self.unit * number * np.array(both).T
+
+
+@dataclass(frozen=True)
+class LoneEffect:
+    """The systematic gap with one effect in the simulator, in the rows in which it was found.
+
+    Parameters
+    ----------
+    effect : str
+    probability : float
+        That it is the cause.
+    before, after : float
+        Signed. Units: mm.
+    """
+
+    effect: str
+    probability: float
+    before: float
+    after: float
+
+
+@threadpool_limits.wrap(limits=1, user_api="blas")
+def lone_effects(
+    rows: Rows, signatures: Sequence[Signature], inference: Inference, rng: np.random.Generator
+) -> tuple[LoneEffect, ...]:
+    """The gap with each effect that shifts rows, the one that leaves least first.
+
+    Parameters
+    ----------
+    rows : Rows
+    signatures : sequence of Signature
+    inference : Inference
+        Of these.
+    rng : numpy.random.Generator
+        Draws replicas.
+    """
+    evidence = inference.evidence
+    o = evidence.observations
+    table = evidence.table
+    names = [name for name in table.effects if name not in evidence.noisy]
+    chance = inference.probability
+    causes = [cause_of(rows, signatures, evidence, name, chance.get(name, 0.0)) for name in names]
+    model = evidence.likely_model(inference.verdict.label)
+    shifts = np.array([np.zeros(len(rows)), *(cause.shift for cause in causes)]).T
+    both = np.hstack([rows.residual[:, None] - shifts, table.columns])
+    white = o.whitener(model).innovations(o.columns(both))[0]
+    rest = white[:, : len(names) + 1]
+    columns = white[:, len(names) + 1 :]
+    explanations = Explanations.of(table, columns)
+    usual = explanations.largest(rng.standard_normal((len(o), SETTINGS.replicas)))[0].mean()
+    square = unit_square(o, model) * (explanations.largest(rest)[0] - usual)
+    before, *after = signed_root(square).tolist()
+    effects = [
+        LoneEffect(name, float(cause.probability), before, left)
+        for name, cause, left in zip(names, causes, after, strict=True)
+    ]
+    return tuple(sorted(effects, key=lambda each: each.after))

@@ -5,8 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mlscorr.gap.closure._sightings import SightedTarget, sightings_of
-from mlscorr.gap.closure.surroundings import Surroundings
+from mlscorr.gap.closure.surroundings import SightedTarget, Surroundings, sightings_of
 from mlscorr.gap.residuals import Patches, Rows, place_key
 from mlscorr.simulate import SceneScenario, scan
 from mlscorr.simulate.scene import read_mesh
@@ -170,7 +169,10 @@ def _joined(platform, origin, patches, targets):
         cloud = PointCloud.concatenate([patch.cloud for patch in patches])
         normals = np.repeat([patch.normal for patch in patches], count[: len(patches)], axis=0)
         parts.insert(0, scan.recorded_pulses(platform, cloud, origin, normals))
-    return scan.RecordedPulses.concatenate(parts) if parts else None, np.array(count)
+    pulses = None
+    if parts:
+        pulses = scan.RecordedPulses.concatenate(parts)
+    return pulses, np.array(count)
 
 
 def _middle(xyz, view, count):

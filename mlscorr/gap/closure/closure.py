@@ -1,9 +1,12 @@
 """How far the gap shrinks, on data not used to find the cause, once the simulator has it.
 
 Which effect it is, all blocks of time say; its size is found without each fifth of them. The
-simulator runs again with it, and the gap is measured where its size was not looked for. Check
-points are never looked at but here.
+simulator runs again with it, and the gap is measured where its size was not looked for, also as
+errors over the sigma that the simulator gives them: one when it is right. Check points are never
+looked at but here.
 """
+
+from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -11,13 +14,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from mlscorr.gap.closure._over_sigma import OverSigma, errors_over_sigma
 from mlscorr.gap.closure._settings import SETTINGS
 from mlscorr.gap.closure._systematic import Squares, SystematicGap, share_gone
-from mlscorr.gap.closure.folds import Simulated, make_folds, predict_whole
-from mlscorr.gap.closure.found_cause import FoundCause
-from mlscorr.gap.evidence import SETTINGS as INFERENCE
+from mlscorr.gap.closure.folds import Folds, FoundCause, Simulated, make_folds, predict_whole
 from mlscorr.gap.evidence import (
+    AXES,
     UNITS,
     ColumnTable,
     ErrorModel,
@@ -28,10 +29,13 @@ from mlscorr.gap.evidence import (
     position_terms,
     scatter_terms,
     signed_root,
+    simulated_variance,
     steady_columns,
     unknown_blocks,
+    window_growth,
     without_tails,
 )
+from mlscorr.gap.evidence import SETTINGS as INFERENCE
 from mlscorr.gap.residuals import Rows, background
 
 
@@ -124,22 +128,27 @@ def close_gap(
     kind = gap_kind(cause.effect, case.evidence.noisy, rows)
     unit = UNITS[kind]
     whole = predict_whole(case, simulated)  # takes most memory: before there is a table of all rows
-    ruler = _Ruler.of(kind, case, cause.probability if callable(simulated) else 0.0)
+    probability = 0.0
+    if callable(simulated):
+        probability = cause.probability
+    ruler = _Ruler.of(kind, case, probability)
     folds = make_folds(case, whole, ruler.observations, ruler.model, simulated, rng, progress)
     held = ruler.compare(folds, rng)
     fitted = replace(folds, fold=np.where(used, 0, -1), predicted=(whole,))
     gap = _gap(held, unit)
+    if cause.effect == "none":
+        gap = replace(gap, after=gap.before)
+        held = replace(held, gone=0.0, interval=(0.0, 0.0))
     in_sample = _gap(ruler.compare(fitted, rng, used), unit)
-    nothing = cause.effect == "none"
     return Closure(
         cause.effect,
         float(cause.probability),
         kind,
         unit,
         gap.before,
-        gap.before if nothing else gap.after,
-        0.0 if nothing else held.gone,
-        (0.0, 0.0) if nothing else held.interval,
+        gap.after,
+        held.gone,
+        held.interval,
         gap.null_band,
         folds.held_out,
         folds.is_held_out,
@@ -232,7 +241,8 @@ class _Ruler:
             keep = observations.second
             terms = before, after, chance, usual, observations.row
             return tuple(values[keep] for values in terms)
-        of_kind = rows.channel == ("roughness" if self.kind == "scatter" else "return_rate")
+        channel = {"scatter": "roughness", "returns": "return_rate"}[self.kind]
+        of_kind = rows.channel == channel
         drawn = np.sqrt(rows.noise)[:, None] * rng.standard_normal((len(rows), replicas))
         before = np.column_stack([rows.residual, drawn])
         if self.kind == "scatter":
@@ -283,3 +293,74 @@ def _jackknife(left, share, usual):
     each = np.array([share_gone(*pair, usual) for pair in left])
     spread = INFERENCE.quantile * np.sqrt((g - 1) / g * ((each - each.mean()) ** 2).sum())
     return max(-1.0, share - spread), min(1.0, share + spread)
+
+
+@dataclass(frozen=True)
+class OverSigma:
+    """RMS of errors over their simulated sigma, by axis, before and after a cause is added.
+
+    Parameters
+    ----------
+    axes : tuple of str
+        E, N, H; those that rows have. Where the cause is a POS that is worse in windows, in these.
+    before, after : tuple of float
+    largest : tuple of float
+        What 97.5 % of surveys stay below in which nothing else is wrong.
+    """
+
+    axes: tuple[str, ...]
+    before: tuple[float, ...]
+    after: tuple[float, ...]
+    largest: tuple[float, ...]
+
+    @property
+    def beyond(self) -> tuple[str, ...]:
+        """Axes whose errors after it are larger than chance makes them, and than 1.96 sigma."""
+        pairs = zip(self.axes, self.after, self.largest, strict=True)
+        usual = INFERENCE.quantile
+        return tuple(axis for axis, after, chance in pairs if after > max(chance, usual))
+
+
+def errors_over_sigma(
+    rows: Rows, observations: Observations, folds: Folds, rng: np.random.Generator
+) -> OverSigma:
+    """OverSigma of the rows along an axis of the map, by sizes found without them.
+
+    Not of planes of two passes: where they are is free, which outweighs all that passes differ by.
+
+    Parameters
+    ----------
+    rows : Rows
+    observations : Observations
+        Of these.
+    folds : Folds
+    rng : numpy.random.Generator
+        Draws replicas.
+    """
+    o = observations
+    after = folds.whole
+    residual = rows.residual[:, None]
+    shift = folds.held("shift")[:, None]
+    nothing = Predicted.nothing(rows)
+    scaled = [
+        o.columns(values) / _sigma(o, predicted)[:, None]
+        for values, predicted in ((residual, nothing), (residual - shift, after))
+    ]
+    scaled.append(o.whitener(after.model).draw(rng, INFERENCE.replicas) / _sigma(o, after)[:, None])
+    axis = rows.covariates["axis"][o.row]
+    inside = window_growth(after.model.windows, o.errors.gps_time)[:, 0] > 0
+    here = ~rows.two_times[o.row] & (inside | (not after.model.windows))
+    parts = [(name, here & (axis == number)) for number, name in enumerate(AXES)]
+    parts = [(name, part) for name, part in parts if part.any()]
+    values = [[np.sqrt((v[part] ** 2).mean(axis=0)) for v in scaled] for _, part in parts]
+    return OverSigma(
+        tuple(name for name, _ in parts),
+        tuple(float(before[0]) for before, _, _ in values),
+        tuple(float(after[0]) for _, after, _ in values),
+        tuple(float(np.percentile(v, INFERENCE.band[1])) for *_, v in values),
+    )
+
+
+def _sigma(observations, predicted):
+    """Simulated sigma (n,) of observations. Units: m."""
+    return np.sqrt(simulated_variance(observations, predicted.model, predicted.extra))

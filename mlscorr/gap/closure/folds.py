@@ -2,7 +2,7 @@
 
 Which effect it is, all blocks say together, and with what probability: a choice made anew in each
 part of the data is often another one. When an event acts they say too. Sizes are found anew
-without each fifth of the blocks.
+without each fifth of the blocks, by innovations: these are independent under V, drift and all.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,21 +12,79 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from mlscorr.effects import Effect
-from mlscorr.gap.closure._cross_fit import cross_fitted
 from mlscorr.gap.closure._settings import SETTINGS
-from mlscorr.gap.closure.found_cause import FoundCause
 from mlscorr.gap.evidence import SETTINGS as INFERENCE
 from mlscorr.gap.evidence import (
     Cause,
     ErrorModel,
     Inference,
+    LabelEvidence,
     Observations,
     Predicted,
     cause_of,
     weigh_labels,
 )
 from mlscorr.gap.residuals import Rows, background
-from mlscorr.gap.signatures import Signature, expected, select
+from mlscorr.gap.signatures import Bench, Signature, expected, select, signature
+from mlscorr.survey import Survey
+
+
+@dataclass(frozen=True)
+class FoundCause:
+    """A cause, and what it was found in.
+
+    Parameters
+    ----------
+    rows : Rows
+        All of them, check points too.
+    used : (m,) bool array
+        False for those of check points.
+    survey : Survey
+        With what the simulator believes.
+    signatures : sequence of Signature
+        Of all rows.
+    evidence : LabelEvidence
+        Of the used rows.
+    cause : Cause
+        From them.
+    """
+
+    rows: Rows
+    used: np.ndarray
+    survey: Survey
+    signatures: Sequence[Signature]
+    evidence: LabelEvidence
+    cause: Cause
+
+    @property
+    def shifting(self) -> list[tuple[Signature, np.ndarray]]:
+        """The parts of the cause that are no noise, with their estimates."""
+        return [pair for pair in self.cause.parts if pair[0].name not in self.evidence.noisy]
+
+    @property
+    def undecided(self) -> np.ndarray:
+        """Rows (m,) bool of check points seen at the moment of a jump, between the used rows
+        next to it: nothing says on which side of it they are.
+        """
+        rows = self.rows
+        undecided = np.zeros(len(self.rows), bool)
+        known = rows.gps_time[self.used & rows.metric], rows.gps_time_2[self.used & rows.two_times]
+        known = np.sort(np.concatenate([[-np.inf], *known, [np.inf]]))
+        for part, _ in self.shifting:
+            if part.kind.moment() and "width" not in part.fixed:
+                after = np.searchsorted(known, rows.reference.start + part.fixed["time"])
+                between = (rows.gps_time > known[after - 1]) & (rows.gps_time < known[after])
+                undecided |= between & ~self.used
+        return undecided
+
+    def columns(self) -> np.ndarray:
+        """What these parts make of all rows (m, p), by their parameters."""
+        # nothing is drawn
+        bench = Bench(self.rows, self.survey)
+        rng = np.random.default_rng(0)
+        parts = [signature(bench, p.kind, p.fixed, rng).jacobian for p, _ in self.shifting]
+        return np.hstack([np.zeros((len(self.rows), 0)), *parts])
+
 
 Simulated = Callable[[tuple[Effect, ...]], np.ndarray] | np.ndarray
 
@@ -278,3 +336,67 @@ def _predict(rows, survey, cause, simulated):
     extra = np.zeros(len(rows)) if rough else change.variance
     shift = simulated(tuple(own)) if own else np.zeros(len(rows))
     return Predicted(shift, change.growth, extra, cause.model)
+
+
+@dataclass(frozen=True)
+class CrossFit:
+    """Columns of a cause, whitened, and the folds of their observations.
+
+    Parameters
+    ----------
+    columns : (n, p) array
+        Innovations of the columns in the observations that may be learned from.
+    fold : (n,) int array
+    number : int
+        Of folds.
+    """
+
+    columns: np.ndarray
+    fold: np.ndarray
+    number: int
+
+    def sizes(self, innovations: np.ndarray) -> np.ndarray:
+        """Sizes (f + 1, p, k) by all folds but each, and last by all, of k columns.
+
+        Parameters
+        ----------
+        innovations : (n, k) array
+        """
+        sizes = []
+        for number in range(self.number + 1):
+            keep = (self.fold != number) | (self.number == 1)  # nothing is held out then
+            columns = self.columns[keep]
+            free = INFERENCE.free_sigma
+            normal = columns.T @ columns + np.eye(columns.shape[1]) / free**2
+            sizes.append(np.linalg.solve(normal, columns.T @ innovations[keep]))
+        return np.array(sizes)
+
+
+def cross_fitted(
+    observations: Observations,
+    model: ErrorModel,
+    fold: np.ndarray,
+    number: int,
+    columns: np.ndarray,
+    residual: np.ndarray,
+) -> np.ndarray:
+    """Sizes (f + 1, p) of columns by all folds but each, and last by all.
+
+    Parameters
+    ----------
+    observations : Observations
+        That may be learned from.
+    model : ErrorModel
+        Of their covariance.
+    fold : (n,) int array
+        Of each observation.
+    number : int
+        Of folds.
+    columns : (n, p) array
+    residual : (n,) array
+    """
+    scale = np.abs(columns).max(axis=0, initial=0.0)
+    scale[scale == 0] = 1.0
+    both = np.column_stack([columns / scale, residual])
+    white = observations.whitener(model).innovations(both)[0]
+    return CrossFit(white[:, :-1], fold, number).sizes(white[:, -1:])[:, :, 0] / scale

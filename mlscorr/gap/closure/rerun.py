@@ -12,10 +12,10 @@ from functools import cached_property, reduce
 import numpy as np
 
 from mlscorr.effects import Effect
-from mlscorr.gap.closure._refit import refit_targets
+from mlscorr.gap.closure._settings import SETTINGS
 from mlscorr.gap.closure.beams import Beams
+from mlscorr.gap.residuals import SETTINGS as OBSERVE
 from mlscorr.gap.residuals import (
-    SETTINGS,
     Rows,
     freedom,
     gate,
@@ -25,7 +25,9 @@ from mlscorr.gap.residuals import (
 )
 from mlscorr.gap.signatures import check_mounting, expected, joined
 from mlscorr.simulate.scan import Draws, Met, Planes, Replay, TargetWorld, true_targets
-from mlscorr.survey import Survey
+from mlscorr.survey import PointCloud, Survey
+from mlscorr.targets import BY_EDGES, BrightRegion, ScannerPath, diameter, fit_targets
+from mlscorr.targets import SETTINGS as TARGETS
 
 ON_PATCHES = ("shared", "roughness", "return_rate")
 
@@ -71,7 +73,7 @@ def rerun(
     patches = _as_seen(residual, rows, beams, views, run, dither, speckle, fit_rng)
     on = np.flatnonzero((rows.channel == "surface") & (views[:, 0] >= 0))
     if len(on) and beams.reference is not None:
-        spread = SETTINGS.trims[-1] * np.sqrt(patches.variance)
+        spread = OBSERVE.trims[-1] * np.sqrt(patches.variance)
         residual[on] = _surface(rows, survey, beams, on, views[on, 0], run, dither, spread)
     return residual
 
@@ -213,7 +215,7 @@ class _Patches:
         local[weight == 0] = 0.0
         mean, values, axis = moments(local, weight, np.searchsorted(view, np.arange(count)))
         points, fired = (np.bincount(view, v, len(beams)) for v in (weight, met[flat]))
-        full = points[:count] >= SETTINGS.plane_points
+        full = points[:count] >= OBSERVE.plane_points
         centre, normal = np.full((2, len(beams), 3), np.nan)
         centre[:count] = np.where(full[:, None], mean + beams.point[:count], np.nan)
         turned = np.sign(np.einsum("li,li->l", axis, beams.normal[:count]))
@@ -267,14 +269,14 @@ def _surface(rows, survey, beams, on, view, run, dither, spread):
     direction[view] = rows.direction[on]
     largest[view] = np.abs(rows.residual[on]) + gate(survey, rows.gps_time[on])
     cosine = np.einsum("ni,ni->n", normal[triangle], direction[of])
-    used = kept & (triangle >= 0) & (np.abs(cosine) >= np.cos(SETTINGS.parallel))
+    used = kept & (triangle >= 0) & (np.abs(cosine) >= np.cos(OBSERVE.parallel))
     cosine = np.einsum("ni,ni->n", normal[facet], direction[of])
-    used &= (facet >= 0) & (np.abs(cosine) >= np.cos(SETTINGS.parallel))
+    used &= (facet >= 0) & (np.abs(cosine) >= np.cos(OBSERVE.parallel))
     away = np.einsum("ni,ni->n", normal[facet], xyz + dither[fired] - beams.origin)
     away = (away - offset[facet]) * np.sign(cosine)
     used &= np.abs(away) <= largest[of]
     middle = _median(np.where(used, away, np.nan), of, len(beams))
-    limit = np.fmax(spread, SETTINGS.roughest)
+    limit = np.fmax(spread, OBSERVE.roughest)
     with np.errstate(invalid="ignore"):
         used &= np.abs(away - middle[of]) <= limit[of]
 
@@ -283,7 +285,7 @@ def _surface(rows, survey, beams, on, view, run, dither, spread):
 
     number = count(used)
     lost = count(np.isfinite(part.range) & ~kept)
-    known = number >= np.maximum(1, SETTINGS.facet_share * (count(of >= 0) - lost))
+    known = number >= np.maximum(1, OBSERVE.facet_share * (count(of >= 0) - lost))
     return np.where(known, count(np.where(used, away, 0.0)) / np.maximum(number, 1), np.nan)
 
 
@@ -293,3 +295,85 @@ def _median(values, view, count):
     first = np.searchsorted(view, np.arange(count))
     number = np.bincount(view, np.isfinite(values), count).astype(int)
     return values[order[np.minimum(first + number // 2, len(view) - 1)]]
+
+
+def refit_targets(
+    residual: np.ndarray,
+    rows: Rows,
+    survey: Survey,
+    beams: Beams,
+    views: np.ndarray,
+    simulated: tuple,
+    rng: np.random.Generator,
+) -> None:
+    """Fill the residuals of target rows: where the extraction finds the simulated targets.
+
+    Parameters
+    ----------
+    residual : (m,) array
+        Left as it is where a target can't be compared. Units: m.
+    rows : Rows
+    survey : Survey
+    beams : Beams
+    views : (m, 2) int array
+        Numbers of the views of each row.
+    simulated : tuple
+        Points (n, 3) on the map and whether they are kept (n,), Met, the true beams, and Boards
+        where the targets truly are.
+    rng : numpy.random.Generator
+        Of the extraction.
+    """
+    xyz, kept, met, (start, direction), boards = simulated
+    seed = rng.integers(2**63)
+    fitted = {}
+    for row in np.flatnonzero((rows.channel == "target") & (views[:, 0] >= 0)):
+        view = views[row, 0]
+        if view not in fitted:
+            first, last = np.searchsorted(beams.view, [view, view + 1])
+            points = first + np.flatnonzero(kept[first:last])
+            true = start[points] + met.range[points, None] * direction[points]
+            if len(points):
+                moved = (xyz[points] - beams.origin - true).mean(axis=0)
+            else:
+                moved = 0.0
+            place = boards.centre[beams.target[view]] + moved + beams.origin
+            cloud = PointCloud(xyz[points], beams.pulses.gps_time[points], met.intensity[points])
+            number = rows.survey_item[row]
+            shape = rows.targets.kind[number], float(rows.targets.size[number])
+            bright = boards.bright[beams.target[view]]
+            same_rng = np.random.default_rng(seed)  # of each target alike
+            fitted[view] = _fitted(cloud, shape, survey, place, bright, same_rng)
+        target = fitted[view]
+        along = rows.direction[row]
+        # a plate whose edges lie along the scan lines is known well at one place, not beside it
+        worst = max(SETTINGS.worst**2 * rows.noise[row], SETTINGS.least_worst**2)
+        if target is None or along @ target.covariance @ along > worst:
+            continue
+        residual[row] = along @ (target.position - rows.targets.position[rows.survey_item[row]])
+
+
+def _fitted(cloud, shape, survey, place, bright, rng):
+    """The FittedTarget near its expected place, or None.
+
+    What is brighter than half way from what lies beside it to its paint is looked at first, which
+    spares looking at all else.
+    """
+    kind, size = shape
+    apart = np.linalg.norm(cloud.xyz - place, axis=1)
+    if (apart <= SETTINGS.largest_offset * size).sum() < TARGETS.smallest_count:
+        return None
+    path = ScannerPath.of(survey, cloud.gps_time)
+    beside = cloud.intensity[apart > SETTINGS.background * size]
+    dark = np.percentile(beside, 90) if len(beside) else 0.0
+    spot = BrightRegion(place, SETTINGS.extent * diameter(kind, size), (bright + dark) / 2)
+    lit = (cloud.intensity >= spot.threshold) & (apart <= spot.radius)
+    if kind in BY_EDGES or lit.sum() < TARGETS.smallest_count:
+        spots = [None]
+    else:
+        spots = [spot, None]
+    for spot in spots:
+        targets = fit_targets(cloud, path, [shape], survey.scanner, rng, spot)
+        away = [np.linalg.norm(target.position - place) for target in targets]
+        if away and min(away) <= SETTINGS.largest_offset * size:
+            return targets[int(np.argmin(away))]
+    return None

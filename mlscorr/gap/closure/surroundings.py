@@ -1,17 +1,160 @@
-"""The pulses about observed targets, those too that nothing returned, and what lies behind."""
+"""Observed targets and the pulses about them, also those that met nothing, and what lies behind.
+
+No file has a pulse that met nothing; the regular steps of those beside it tell of it.
+"""
 
 from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numba import njit
+from scipy.spatial import cKDTree
 
 from mlscorr.gap.closure._settings import SETTINGS
-from mlscorr.gap.closure._sightings import Sighting, board_of
-from mlscorr.gap.closure._unreturned import unreturned
 from mlscorr.gap.residuals import SETTINGS as OBSERVE
-from mlscorr.simulate.scan import Platform, RecordedPulses, aim, recorded_platform, recorded_pulses
+from mlscorr.gap.residuals import Rows
+from mlscorr.simulate import SETTINGS as SIMULATION
+from mlscorr.simulate.scan import (
+    FORMS,
+    HOLE,
+    Boards,
+    Platform,
+    RecordedPulses,
+    aim,
+    paints,
+    recorded_platform,
+    recorded_pulses,
+)
 from mlscorr.survey import PointCloud, Survey
 from mlscorr.targets import NO_POINTS, FittedTarget, search_radius
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """An observed target that rows are of: their item, and where it was surveyed (3,) in m."""
+
+    item: int
+    fitted: FittedTarget
+    surveyed: np.ndarray
+
+
+@dataclass(frozen=True)
+class SightedTarget:
+    """Pulses about a target as observed, its Boards of one; see Beams."""
+
+    pulses: RecordedPulses
+    board: Boards
+    beyond: np.ndarray
+    behind: np.ndarray
+
+    @classmethod
+    def join(cls, sighting: Sighting, parts: list) -> "SightedTarget":
+        """The view of a Sighting from the pulses about it, as Surroundings gives them.
+
+        Parameters
+        ----------
+        sighting : Sighting
+        parts : list of (RecordedPulses, (n,) array, (n,) array, (n, 2) array)
+        """
+        recorded, *arrays = zip(*parts, strict=True)
+        pulses = RecordedPulses.concatenate(recorded)
+        distance, slant, place = map(np.concatenate, arrays)
+        away = np.abs(pulses.gps_time - sighting.fitted.gps_time)
+        near = np.argsort(away, kind="stable")[: SETTINGS.target_pulses]
+        near = near[np.argsort(pulses.gps_time[near], kind="stable")]
+        pulses = pulses[near]
+        place = place[near]
+        beyond = pulses.range - distance[near]
+        off = beyond * slant[near]
+        form = FORMS.index(sighting.fitted.kind)
+        shape = np.zeros(len(near), int), place / (1.0 if form == HOLE else SETTINGS.edge)
+        board = board_of(sighting.fitted, np.zeros(3))
+        own = (np.abs(off) <= SIMULATION.hiding_depth) & np.isfinite(board.paint(*shape))
+        lit = (np.abs(off) <= SIMULATION.hiding_depth) & (board.paint(shape[0], place) == 1.0)
+        if sighting.fitted.kind == "checkerboard":
+            lit = own
+        bright, dark, speckle = paints(sighting.fitted.kind, pulses.intensity[lit])
+        board = board_of(sighting.fitted, np.zeros(3), bright, dark, speckle)
+        others = np.flatnonzero(~own & ~(off < -SIMULATION.hiding_depth))
+        beyond = beyond.copy()
+        behind = pulses.intensity.copy()
+        beyond[own] = np.nan
+        behind[own] = 0.0
+        if own.any() and len(others):
+            nearest = others[cKDTree(place[others]).query(place[own])[1]]
+            beyond[own] = beyond[nearest]
+            behind[own] = behind[nearest]
+        return cls(pulses, board, beyond, behind)
+
+
+def sightings_of(rows: Rows, finding: Any) -> list[Sighting]:
+    """Sightings of the target rows.
+
+    Parameters
+    ----------
+    rows : Rows
+    finding : Finding
+        Of the same survey.
+    """
+    on = rows.channel == "target"
+    sightings = []
+    matched = finding.matches.matched
+    sights = zip(matched.name, matched.gps_time, strict=True)
+    passes = dict(zip(sights, matched.pass_number, strict=True))
+    items, first = np.unique(rows.item[on], return_index=True)
+    for item, row in zip(items, np.flatnonzero(on)[first], strict=True):
+        name = rows.targets.name[rows.survey_item[row]]
+        time = rows.gps_time[row]
+        target = finding.fitted.get((passes.get((name, time)), time))
+        if target is not None:
+            surveyed = rows.targets.position[rows.survey_item[row]]
+            sightings.append(Sighting(int(item), target, surveyed))
+    return sightings
+
+
+def board_of(
+    target: FittedTarget,
+    origin: np.ndarray,
+    bright: float = 1.0,
+    dark: float = 0.0,
+    speckle: float = 0.0,
+) -> Boards:
+    """Boards of one FittedTarget.
+
+    Parameters
+    ----------
+    target : FittedTarget
+    origin : (3,) array
+        About which it is built. Units: m.
+    bright, dark, speckle : float
+        Intensity of its paints, and their relative noise.
+    """
+    outline, (u, v) = target.view.outline, target.view.axes
+    cos = np.cos(outline.turn)
+    sin = np.sin(outline.turn)
+    if target.kind == "circle":  # nobody knows how its board is turned: upright
+        normal = np.cross(u, v)
+        if abs(normal[2]) < 0.99:
+            side = np.array([0.0, 0.0, 1.0])
+        else:
+            side = np.array([1.0, 0.0, 0.0])
+        u = np.cross(side, normal)
+        u /= np.linalg.norm(u)
+        v = np.cross(normal, u)
+        cos = 1.0
+        sin = 0.0
+    edges = np.array([cos * u + sin * v, cos * v - sin * u])
+    return Boards(
+        centre=(target.position - origin)[None],
+        axes=np.vstack([edges, np.cross(*edges)])[None],
+        form=np.array([FORMS.index(target.kind)]),
+        size=np.array([target.size]),
+        inner=np.array([outline.inner]),
+        bright=np.array([bright]),
+        dark=np.array([dark]),
+        speckle=np.array([speckle]),
+    )
 
 
 class Surroundings:
@@ -65,7 +208,10 @@ class Surroundings:
         remaining = []
         for cloud, limits in self._open:
             part = self._narrowed(cloud, last), limits
-            (remaining if limits[1] >= last else self._settled).append(part)
+            if limits[1] >= last:
+                remaining.append(part)
+            else:
+                self._settled.append(part)
         self._open = remaining
 
     def _narrowed(self, cloud, last):
@@ -173,3 +319,76 @@ def _first_returns(pulses):
     group = np.append(0, np.cumsum(~same))
     order = np.lexsort((pulses.range, group))
     return pulses[order[np.unique(group[order], return_index=True)[1]]]
+
+
+def unreturned(pulses: RecordedPulses, span: tuple[float, float], opening: float) -> RecordedPulses:
+    """Pulses that were fired between recorded ones, and beside them, and met nothing.
+
+    Parameters
+    ----------
+    pulses : RecordedPulses
+        About one place, in order of time.
+    span : (float, float)
+        Times between which they are wanted. Units: s.
+    opening : float
+        Angle about the recorded ones. Units: rad.
+
+    Times and angles go on in the steps of those recorded. None where these are not regular (rings
+    of beams, jitter, a thinned cloud): then a target before the sky has only the beams that met
+    it.
+    """
+    none = pulses[:0]
+    start = pulses.gps_time[0]
+    pause = np.diff(pulses.gps_time)
+    if len(pause) < SETTINGS.line_pulses or np.ptp(pulses.elevation) > SETTINGS.level:
+        return none
+    step = np.percentile(pause, 25)
+    single = np.abs(pause - step) < 0.1 * step
+    regular = max(OBSERVE.rule * (pause < 1.5 * step).sum(), SETTINGS.delivered * len(pause))
+    if single.sum() < regular:
+        return none
+    number = np.append(0, np.cumsum(np.round(pause / pause[single].mean()).astype(int)))
+    first, step = _line(number, pulses.gps_time - start)
+    if np.abs(pulses.gps_time - start - first - step * number).max() > 0.3 * step:
+        return none
+    turned = np.mod(np.diff(pulses.angle) + np.pi, 2 * np.pi) - np.pi
+    rate = turned[single].mean()
+    left = np.unwrap(np.mod(pulses.angle - rate * number, 2 * np.pi))
+    zero, more = _line(number, left)
+    uneven = np.std(left - zero - more * number) > max(0.5 * abs(rate), 1e-3)
+    if uneven or rate + more == 0:
+        return none
+    middle = np.angle(np.exp(1j * pulses.angle).mean())
+    width = np.abs(np.mod(pulses.angle - middle + np.pi, 2 * np.pi) - np.pi).max() + opening
+    ends = np.ceil((np.array(span) - start - first) / step).astype(int)
+    every = _each_turn(zero - middle, rate + more, width, ends)
+    angle = np.mod(zero + (rate + more) * every + np.pi, 2 * np.pi) - np.pi
+    beside = np.abs(np.mod(angle - middle + np.pi, 2 * np.pi) - np.pi) <= width
+    lost = np.flatnonzero(beside & ~np.isin(every, number))
+    n = len(lost)
+    return RecordedPulses(
+        gps_time=start + first + step * every[lost],
+        angle=angle[lost],
+        elevation=np.full(n, np.median(pulses.elevation)),
+        range=np.full(n, np.nan),
+        intensity=np.zeros(n),
+        incidence=np.ones(n),
+    )
+
+
+def _each_turn(zero, rate, width, ends):
+    """Numbers between ends whose angle, zero and so much more by each, is within a width of a whole
+    turn, or next to it: a scanner is turned away most of the time.
+    """
+    first, last = np.sort(zero + rate * ends) / (2 * np.pi)
+    turns = 2 * np.pi * np.arange(np.floor(first), np.ceil(last) + 1)
+    starts, stops = np.sort(np.sort((turns - zero + [[-width], [width]]) / rate, axis=0))
+    starts, stops = (np.clip(n, *ends).astype(int) for n in (np.floor(starts), stops + 2))
+    starts[1:] = np.maximum(starts[1:], stops[:-1])
+    return np.concatenate(list(map(np.arange, starts, stops)))
+
+
+def _line(x, y):
+    """Value at 0 and slope of the straight line through points (n,), by least squares."""
+    slope = np.cov(x, y)[0, 1] / np.var(x, ddof=1)
+    return y.mean() - slope * x.mean(), slope

@@ -5,7 +5,7 @@ from mlscorr.gap.contrast.distances import (
     DistributionDistance,
     cloud_distances,
     innovation_distances,
+    replica_innovations,
 )
-from mlscorr.gap.contrast.replicas import replica_innovations
 from mlscorr.gap.contrast.sample import SampleCollector
 from mlscorr.gap.contrast.tables import Contrast

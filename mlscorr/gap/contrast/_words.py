@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from mlscorr.gap.contrast._blocks import with_sigma
-from mlscorr.gap.contrast.tables import ContrastTable, Measure
+from mlscorr.gap.contrast.tables import ContrastTable, Measure, with_sigma
 from mlscorr.wording import percent, value_and_sigma
 
 SILENT = {  # why a channel is not compared

@@ -12,10 +12,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist, pdist
 
-from mlscorr.gap.contrast._cells import sampled
 from mlscorr.gap.contrast._settings import SETTINGS
-from mlscorr.gap.contrast.sample import ChannelSample, of_shared_moments
-from mlscorr.gap.residuals import chance
+from mlscorr.gap.contrast.sample import ChannelSample, of_shared_moments, sampled
+from mlscorr.gap.evidence import Inference, Observations
+from mlscorr.gap.residuals import Background, Rows, chance
 
 UNITS = {"points": "m", "intensity": "decades", "density": "decades"}  # of clouds; else sigmas
 
@@ -202,11 +202,9 @@ def _of_samples(channel, samples, rng, figures=None):
         figures = _pairwise(simulated.values)
     smallest = min(len(sample.values) for sample in samples)
     half = smallest // 2 - smallest // 8  # halves are not quite alike
-    number = {
-        name: min(half, SETTINGS.distance_points if name == "chamfer" else SETTINGS.drawn)
-        for name in figures
-    }
-
+    number = dict.fromkeys(figures, min(half, SETTINGS.drawn))  # all pairs are looked at
+    if "chamfer" in number:
+        number["chamfer"] = min(half, SETTINGS.distance_points)
     sides = {"before": (real, simulated), "floor": (simulated, simulated)}
     if following:
         sides["after"] = real, following[0]
@@ -255,3 +253,25 @@ def _pairwise(simulated) -> dict[str, Callable]:
         "energy_distance": energy_distance,
         "mmd": lambda x, y: maximum_mean_discrepancy(x, y, bandwidth),
     }
+
+
+def replica_innovations(
+    rows: Rows, background: Background, inference: Inference, rng: np.random.Generator
+) -> np.ndarray:
+    """Innovations (n, replicas) of surveys in which nothing acts.
+
+    Their POS errs, and their noise has tails, as this one's do once its cause is taken off.
+
+    Parameters
+    ----------
+    rows : Rows
+    background : Background
+        Of these.
+    inference : Inference
+        Of these; n is the number of its innovations.
+    rng : numpy.random.Generator
+    """
+    observed = Observations.of(rows, background)
+    model = inference.evidence.likely_model(inference.verdict.label)
+    drawn = observed.whitener(model).draw(rng, SETTINGS.halves, inference.where.innovation[:, 1])
+    return observed.whitener().innovations(drawn)[0][observed.second]

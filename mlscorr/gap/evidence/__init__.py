@@ -1,12 +1,9 @@
 """Which effect explains the rows, with what probability and parameters, and where it shows."""
 
-from mlscorr.gap.evidence._error_models import ErrorModel, error_models, window_growth
-from mlscorr.gap.evidence.calibration import calibration_error
-from mlscorr.gap.evidence.causes import Cause, Inference, cause_of, infer_causes
-from mlscorr.gap.evidence.columns import ColumnTable, column_table
-from mlscorr.gap.evidence.decision import OPERATING_POINTS, Costs
-from mlscorr.gap.evidence.detectable import detectable_size
-from mlscorr.gap.evidence.evidence import steady_columns
+from mlscorr.gap.evidence._noise import detectable_size
+from mlscorr.gap.evidence.causes import Cause, CauseParameter, Inference, cause_of, infer_causes
+from mlscorr.gap.evidence.decision import OPERATING_POINTS, Costs, calibration_error
+from mlscorr.gap.evidence.evidence import ColumnTable, column_table, steady_columns
 from mlscorr.gap.evidence.labels import LabelEvidence, weigh_labels
 from mlscorr.gap.evidence.measure import (
     UNITS,
@@ -18,8 +15,13 @@ from mlscorr.gap.evidence.measure import (
     signed_root,
     simulated_variance,
 )
-from mlscorr.gap.evidence.observations import Observations, model_likelihood
-from mlscorr.gap.evidence.parameters import CauseParameter
+from mlscorr.gap.evidence.observations import (
+    ErrorModel,
+    Observations,
+    error_models,
+    model_likelihood,
+    window_growth,
+)
 from mlscorr.gap.evidence.separability import Separability, compare_signatures, explained_square
 from mlscorr.gap.evidence.settings import SETTINGS
 from mlscorr.gap.evidence.tails import without_tails

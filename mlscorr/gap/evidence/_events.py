@@ -6,10 +6,14 @@ from itertools import product
 
 import numpy as np
 
-from mlscorr.gap.evidence._error_models import ErrorModel, shares
-from mlscorr.gap.evidence.columns import ColumnTable, column_table, is_of_one_target
-from mlscorr.gap.evidence.evidence import BlockEvidence, weigh_blocks
-from mlscorr.gap.evidence.observations import Observations
+from mlscorr.gap.evidence.evidence import (
+    BlockEvidence,
+    ColumnTable,
+    column_table,
+    is_of_one_target,
+    weigh_blocks,
+)
+from mlscorr.gap.evidence.observations import ErrorModel, Observations, shares
 from mlscorr.gap.evidence.settings import SETTINGS
 from mlscorr.gap.residuals import Rows
 from mlscorr.gap.signatures import SETTINGS as SIGNATURES
@@ -74,11 +78,11 @@ def refine_events(
         search = _Search(rows, survey, observations, models, none)
         event = signatures[member]
         times = [s.fixed["time"] for s in signatures if s.name == label]
-        refined[label] = search.best(event, share, spacing_of(times))
+        refined[label] = search.best(event, share, _spacing_of(times))
     return refined
 
 
-def spacing_of(times: Sequence[float]) -> float:
+def _spacing_of(times: Sequence[float]) -> float:
     """Time between those at which events of one kind were tried. Units: s.
 
     Parameters
@@ -86,7 +90,7 @@ def spacing_of(times: Sequence[float]) -> float:
     times : sequence of float
         In any order, once for each width.
 
-    >>> spacing_of([3.0, 1.0, 5.0])
+    >>> _spacing_of([3.0, 1.0, 5.0])
     2.0
     """
     apart = np.diff(np.unique(times))
@@ -212,8 +216,12 @@ class _Search:
         """By the fall of the evidence one step to both sides; the step itself where there is
         none.
         """
-        scale = event.fixed["width"] * (1 if key == "time" else 2)
+        width = event.fixed["width"]
+        if key == "width":
+            width = 2 * width
         sides = [self._changed(event, key, change) for change in (-step, step)]
         falls = [gain - self.score(moved)[0] for moved in sides if moved is not None]
         fall = np.mean(falls) if falls else 0.0
-        return float(step * scale * (1 / np.sqrt(2 * fall) if fall > 0.01 else 1 / step))
+        if fall > 0.01:
+            return float(step * width * (1 / np.sqrt(2 * fall)))
+        return float(step * width * (1 / step))

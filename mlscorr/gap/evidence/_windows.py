@@ -15,10 +15,15 @@ from typing import NamedTuple
 import numpy as np
 
 from mlscorr.effects import PositionNoise
-from mlscorr.gap.evidence._error_models import ErrorModel, error_models, window_growth
 from mlscorr.gap.evidence._noise import NoiseEvidence
 from mlscorr.gap.evidence.evidence import BlockEvidence
-from mlscorr.gap.evidence.observations import Observations, model_likelihood
+from mlscorr.gap.evidence.observations import (
+    ErrorModel,
+    Observations,
+    error_models,
+    model_likelihood,
+    window_growth,
+)
 from mlscorr.gap.evidence.settings import SETTINGS
 from mlscorr.gap.signatures import Signature
 

@@ -17,39 +17,14 @@ from importlib.resources import files
 import numpy as np
 from scipy.special import betainc
 
-KINDS = ("none", "noise", "effect", "pair", "unknown")
+from mlscorr.gap.evidence.labels import KINDS, JointScore, LabelEvidence, kind_of
+from mlscorr.gap.evidence.settings import SETTINGS
+from mlscorr.gap.residuals import Absence
+
+BINS = 5  # of the stated probability: 300 cases of a blind check fill no more
 ABSENT = -20.0  # log evidence of what there is none of: less than any that matters
 BEND = 2.0  # log evidence beyond which more of it says less: odds of seven to one
 FARTHEST = 3.0  # standard deviations of a feature: beyond them nothing was learned
-
-
-@dataclass(frozen=True)
-class JointScore:
-    """Logs of prior times evidence over none, of all labels and given the best effect.
-
-    Parameters
-    ----------
-    score : dict
-        By label, none and pairs among them.
-    single : dict
-        By label, before two of them were tried together.
-    beside : dict
-        By label: what each adds to the effect that is best alone; empty where there is no effect.
-    facts : dict
-        Of the survey: what tells how evidence is to be taken, by name.
-    noisy : set of str
-        Labels of noise classes.
-    """
-
-    score: dict[str, float]
-    single: dict[str, float]
-    beside: dict[str, float]
-    facts: dict[str, float]
-    noisy: Collection[str]
-
-    def of_kind(self, kind: str) -> dict[str, float]:
-        """Scores of the labels of one of KINDS."""
-        return {n: v for n, v in self.score.items() if kind_of(n, self.noisy) == kind}
 
 
 @dataclass(frozen=True)
@@ -76,21 +51,6 @@ OPERATING_POINTS = {
     "default": Costs(),
     "careful": Costs(false_alarm=10.0),
 }
-
-
-def kind_of(label: str, noisy: Collection[str]) -> str:
-    """The one of KINDS that a label is of: how many effects it names, whatever noise is beside.
-
-    Parameters
-    ----------
-    label : str
-    noisy : collection of str
-        Labels of noise classes.
-    """
-    if label in ("none", "unknown"):
-        return label
-    effects = [part for part in label.split("+") if part not in noisy]
-    return ("noise", "effect", "pair")[len(effects)]
 
 
 def features(joint: JointScore) -> dict[str, float]:
@@ -265,3 +225,106 @@ def cheapest(probability: dict[str, float], noisy: Collection[str], costs: Costs
         return costs.false_alarm * none + no_cause - none + wrong * (1 - no_cause - right)
 
     return min(probability, key=cost)
+
+
+@dataclass(frozen=True)
+class GapVerdict:
+    """The answer.
+
+    Parameters
+    ----------
+    label : str
+        none, unknown, an effect, or two joined by +.
+    probability : float
+    set : tuple of str
+        The smallest set of labels that holds 95 %.
+    p_value : float
+        Of none, from replicas of this very survey, and by how these lie where nothing acts.
+    lead : str
+        Where unknown points: "height error that grows with speed squared"; else empty.
+    is_hidden : bool
+        Whether unknown is what targets without a residual tell of, and no row does.
+    """
+
+    label: str
+    probability: float
+    set: tuple[str, ...]
+    p_value: float
+    lead: str
+    is_hidden: bool = False
+
+
+def with_absence(probability: dict[str, float], absence: Absence) -> dict[str, float]:
+    """Probabilities that know of targets without a residual, most probable first.
+
+    Whatever acts in the rows, a run of them is chance, or something unknown that no row shows has
+    made it. An effect stays what it is with that beside it; none doesn't. However likely the
+    chance, none stays behind unknown: of what was not seen nobody knows that it is right.
+
+    Parameters
+    ----------
+    probability : dict
+        Of all labels, by the rows.
+    absence : Absence
+    """
+    if not absence.runs:
+        return probability
+    prior = dict(SETTINGS.prior)
+    none = probability["none"]
+    hidden = prior["unknown"] / prior["none"]
+    moved = none * hidden / (hidden + min(absence.chance, hidden))
+    weight = probability | {"none": none - moved, "unknown": probability["unknown"] + moved}
+    order = sorted(weight, key=lambda label: (-weight[label], label == "none"))
+    return {label: weight[label] for label in order}
+
+
+def decide(
+    evidence: LabelEvidence,
+    probability: dict[str, float],
+    absence: Absence | None = None,
+    costs: Costs | None = None,
+) -> GapVerdict:
+    """Verdict from probabilities.
+
+    Parameters
+    ----------
+    evidence : LabelEvidence
+    probability : dict
+        Of all labels by the rows, most probable first.
+    absence : Absence, optional
+        Of targets that have none.
+    costs : Costs, optional
+        Of wrong answers.
+    """
+    by_rows = probability
+    is_hidden = False
+    if absence is not None:
+        probability = with_absence(by_rows, absence)
+        is_hidden = bool(absence.runs) and by_rows["none"] > by_rows["unknown"]
+    held = np.cumsum(list(probability.values()))
+    number = int(np.searchsorted(held, SETTINGS.confidence)) + 1
+    label = cheapest(probability, evidence.noisy, costs or Costs())
+    if is_hidden and label == "none":
+        label = "unknown"
+    lead = evidence.lead()[0] if label == "unknown" else ""
+    is_hidden &= label == "unknown"
+    if is_hidden:
+        lead = absence.runs[0].lead
+    labels = tuple(dict.fromkeys((*tuple(probability)[:number], label)))
+    p_value = learned().calibrated(evidence.p_value)
+    return GapVerdict(label, probability[label], labels, p_value, lead, is_hidden)
+
+
+def calibration_error(stated: np.ndarray, hit: np.ndarray) -> float:
+    """Mean distance of stated probabilities from how often they were right, over bins of them.
+
+    Parameters
+    ----------
+    stated : (n,) array
+    hit : (n,) array
+        One where it was right, else zero.
+    """
+    bins = np.clip((stated * BINS).astype(int), 0, BINS - 1)
+    return float(
+        sum(abs(np.sum(stated[bins == b] - hit[bins == b])) for b in range(BINS)) / len(stated)
+    )

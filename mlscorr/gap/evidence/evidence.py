@@ -12,16 +12,193 @@ members, as events do with their times and widths, is the mean over them: the pr
 looked often.
 """
 
-from collections.abc import Iterable, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import compress
 
 import numpy as np
 
-from mlscorr.gap.evidence._error_models import ErrorModel
-from mlscorr.gap.evidence.columns import ColumnTable, block_groups
-from mlscorr.gap.evidence.observations import Observations, relevant_models
+from mlscorr.gap.evidence.observations import ErrorModel, Observations, relevant_models
 from mlscorr.gap.evidence.settings import SETTINGS
+from mlscorr.gap.evidence.unknown import UnknownBlock
+from mlscorr.gap.residuals import Rows
+from mlscorr.gap.signatures import Signature
+
+
+@dataclass(frozen=True)
+class ColumnBlock:
+    """Columns that act together.
+
+    Parameters
+    ----------
+    label : str
+        The effect's name, or unknown.
+    member : int
+        Which of the signatures, or of the unknown blocks.
+    columns : (p,) int array
+        In the ColumnTable.
+    weight : float
+        Prior weight within the label.
+    least : float
+        Least amplitude (m). An error of the position in time that is no larger than the POS's own
+        sigma is drift, not an event.
+    """
+
+    label: str
+    member: int
+    columns: np.ndarray
+    weight: float
+    least: float = 0.0
+
+    @property
+    def amplitudes(self) -> tuple[float, ...]:
+        """Those of its prior."""
+        allowed = tuple(s for s in SETTINGS.amplitudes if s >= self.least)
+        return allowed or SETTINGS.amplitudes[-1:]
+
+
+@dataclass(frozen=True)
+class ColumnTable:
+    """All columns (m, c) of signatures and unknown blocks, scaled to one metre of rms."""
+
+    columns: np.ndarray
+    blocks: tuple[ColumnBlock, ...]
+
+    @cached_property
+    def labels(self) -> tuple[str, ...]:
+        """Labels of the blocks, each once."""
+        return tuple(dict.fromkeys(block.label for block in self.blocks))
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Labels but unknown."""
+        return tuple(label for label in self.labels if label != "unknown")
+
+    @cached_property
+    def steady(self) -> set[str]:
+        """Effects that are no events: those with a single member."""
+        members = {(block.label, block.member) for block in self.blocks}
+        count = Counter(label for label, _ in members)
+        return {label for label in self.effects if count[label] == 1}
+
+    def of(self, label: str) -> np.ndarray:
+        """Which blocks (h,) have a label."""
+        return np.array([block.label == label for block in self.blocks], dtype=bool)
+
+    def weighed(self, gain: np.ndarray) -> np.ndarray:
+        """Log of weight times evidence (h, k)."""
+        return np.log([block.weight for block in self.blocks])[:, None] + gain
+
+    def best(self, label: str, gain: np.ndarray) -> int:
+        """Number of the block of a label that explains a column best, by gains (h,)."""
+        numbers = np.flatnonzero(self.of(label))
+        return int(numbers[np.argmax(self.weighed(gain[:, None])[numbers, 0])])
+
+
+def column_table(
+    rows: Rows, signatures: Sequence[Signature], unknown: Sequence[UnknownBlock], sigma: np.ndarray
+) -> ColumnTable:
+    """Columns of the signatures that shift the metric rows, and of unknown blocks.
+
+    Parameters
+    ----------
+    rows : Rows
+    signatures : sequence of Signature
+    unknown : sequence of UnknownBlock
+    sigma : (m,) array
+        Stated one of each row by the POS's position. Units: m.
+    """
+    metric = rows.metric
+    parts = [np.zeros((len(rows), 0))]
+    blocks = []
+    members = Counter(signature.name for signature in signatures)
+
+    def add(columns, block):
+        """Columns with one block of all, whose numbers are block.columns."""
+        blocks.append(replace(block, columns=block.columns + sum(p.shape[1] for p in parts)))
+        parts.append(columns)
+
+    for number, signature in enumerate(signatures):
+        if signature.is_noise or not signature.jacobian[metric].any():
+            continue
+        if signature.kind.moment() and is_of_one_target(rows, signature.jacobian):
+            continue
+        scale = np.array([_rms(column[metric]) for column in signature.jacobian.T])
+        used = np.flatnonzero(scale > 0)
+        least = 0.0
+        if signature.kind.moment():
+            least = _rms_of(sigma, signature.jacobian)
+        elif signature.kind.is_on_target():
+            survey = _rms_of(np.sqrt(rows.survey + rows.noise), signature.jacobian)
+            least = SETTINGS.outlier * survey
+        p = len(used)
+        share = 1 / members[signature.name]
+        every = ColumnBlock(signature.name, number, np.arange(p), share, least)
+        is_vector = p > 1 and not signature.kind.is_wave()
+        add(
+            signature.jacobian[:, used] / scale[used],
+            replace(every, weight=share / 2 if is_vector else share),
+        )
+        single = replace(every, weight=share / 2 / p)  # each component of a vector, evenly
+        blocks += [replace(single, columns=np.array([c])) for c in blocks[-1].columns if is_vector]
+    events = any(signature.kind.moment() for signature in signatures)
+    for number, (block, share) in enumerate(_with_shares(unknown, events)):
+        least = _rms_of(sigma, block.columns) if block.is_drift else 0.0
+        index = np.arange(block.columns.shape[1])
+        columns = block.columns / _rms(np.sqrt((block.columns[metric] ** 2).sum(axis=1)))
+        add(columns, ColumnBlock("unknown", number, index, share, least))
+    return ColumnTable(np.hstack(parts), tuple(blocks))
+
+
+def _with_shares(unknown, events):
+    """Pairs of unknown blocks and their shares; of drift less where events explain it too."""
+    shares = [SETTINGS.unknown_drift if block.is_drift and events else 1.0 for block in unknown]
+    total = max(sum(shares), 1.0)
+    return [(block, share / total) for block, share in zip(unknown, shares, strict=True)]
+
+
+def is_of_one_target(rows: Rows, jacobian: np.ndarray) -> bool:
+    """Whether all that changes is all that was seen of one surveyed target: its outlier's to tell.
+
+    Parameters
+    ----------
+    rows : Rows
+    jacobian : (m, p) array
+    """
+    size = np.abs(np.where(rows.metric[:, None], jacobian, 0.0)).max(axis=1)
+    changed = size > SETTINGS.changed * size.max()
+    targets = np.unique(rows.survey_item[changed])
+    if len(targets) != 1 or targets[0] < 0:
+        return False
+    items = rows.item[changed]
+    return bool(np.isin(rows.item[rows.survey_item == targets[0]], items).all())
+
+
+def _rms_of(sigma, columns):
+    """Root mean square of sigma (m,) over the rows that any of the columns changes."""
+    size = np.abs(columns).sum(axis=1)
+    return float(np.sqrt(np.mean(sigma[size > SETTINGS.changed * size.max()] ** 2)))
+
+
+def _rms(column):
+    """Root mean square over the rows that a column changes; zero where it changes none."""
+    size = np.abs(column)
+    changed = size > SETTINGS.changed * size.max(initial=0.0)
+    if changed.any():
+        return float(np.sqrt(np.mean(column[changed] ** 2)))
+    return 0.0
+
+
+def block_groups(table: ColumnTable) -> Iterator[tuple[np.ndarray, np.ndarray, tuple[float, ...]]]:
+    """Blocks alike in size and amplitudes: column numbers (h, p), block numbers, amplitudes."""
+    kinds: dict = {}
+    for number, block in enumerate(table.blocks):
+        kinds.setdefault((len(block.columns), block.amplitudes), []).append(number)
+    for (_, amplitudes), numbers in kinds.items():
+        index = np.array([table.blocks[i].columns for i in numbers])
+        yield index, np.array(numbers), amplitudes
 
 
 @dataclass(frozen=True)

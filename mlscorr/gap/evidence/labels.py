@@ -1,30 +1,43 @@
-"""All labels weighed: none, each effect, noise and unknown, in a survey and in replicas of it."""
+"""All labels weighed: none, each effect, noise and unknown, in a survey and in replicas of it; then
+two causes together, given the best ones.
+"""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from mlscorr.gap.evidence._error_models import ErrorModel, error_models, shares
+from mlscorr.effects import PositionNoise, effect_class
 from mlscorr.gap.evidence._events import RefinedEvent, refine_events
-from mlscorr.gap.evidence._noise import NoiseEvidence, draw_channels, weigh_noise
-from mlscorr.gap.evidence._windows import weigh_windows
-from mlscorr.gap.evidence.columns import ColumnTable, column_table
+from mlscorr.gap.evidence._noise import NoiseEvidence, draw_channels, noisy_pos_models, weigh_noise
+from mlscorr.gap.evidence._windows import models_with_windows, weigh_windows
 from mlscorr.gap.evidence.evidence import (
     BlockEvidence,
+    ColumnTable,
+    column_table,
     steady_columns,
     suited_models,
     weigh_blocks,
     without_known,
 )
-from mlscorr.gap.evidence.observations import Observations, model_likelihood
+from mlscorr.gap.evidence.observations import (
+    ErrorModel,
+    Observations,
+    error_models,
+    model_likelihood,
+    shares,
+)
 from mlscorr.gap.evidence.settings import SETTINGS
 from mlscorr.gap.evidence.tails import without_tails
 from mlscorr.gap.evidence.unknown import unknown_blocks
 from mlscorr.gap.residuals import Background, Rows
 from mlscorr.gap.signatures import Signature
 from mlscorr.survey import Survey
+
+KINDS = ("none", "noise", "effect", "pair", "unknown")
 
 
 @dataclass(frozen=True)
@@ -158,7 +171,7 @@ def _scores(table, blocks, noise):
     prior = dict(SETTINGS.prior)
     scores = {"none": np.full(blocks.none.shape[1], np.log(prior["none"]))}
     scores |= block_scores(table, blocks, prior["effect"] / max(1, len(table.effects)), prior)
-    return scores | noise_scores(noise, prior)
+    return scores | _noise_scores(noise, prior)
 
 
 def block_scores(
@@ -183,7 +196,7 @@ def block_scores(
     }
 
 
-def noise_scores(noise: Sequence[NoiseEvidence], prior: dict[str, float]) -> dict[str, np.ndarray]:
+def _noise_scores(noise: Sequence[NoiseEvidence], prior: dict[str, float]) -> dict[str, np.ndarray]:
     """Scores of noise classes, which share their prior evenly; several of one are averaged.
 
     Parameters
@@ -222,3 +235,214 @@ def p_value(score: dict[str, np.ndarray]) -> float:
         return float((1 + (replicas >= observed).sum()) / (1 + len(replicas)))
     scale = max(upper.mean() - upper[0], 0.5)
     return float(len(upper) / len(replicas) * np.exp(-(observed - upper[0]) / scale))
+
+
+def kind_of(label: str, noisy: Collection[str]) -> str:
+    """The one of KINDS that a label is of: how many effects it names, whatever noise is beside.
+
+    Parameters
+    ----------
+    label : str
+    noisy : collection of str
+        Labels of noise classes.
+    """
+    if label in ("none", "unknown"):
+        return label
+    effects = [part for part in label.split("+") if part not in noisy]
+    return ("noise", "effect", "pair")[len(effects)]
+
+
+@dataclass(frozen=True)
+class JointScore:
+    """Logs of prior times evidence over none, of all labels and given the best effect.
+
+    Parameters
+    ----------
+    score : dict
+        By label, none and pairs among them.
+    single : dict
+        By label, before two of them were tried together.
+    beside : dict
+        By label: what each adds to the effect that is best alone; empty where there is no effect.
+    facts : dict
+        Of the survey: what tells how evidence is to be taken, by name.
+    noisy : set of str
+        Labels of noise classes.
+    """
+
+    score: dict[str, float]
+    single: dict[str, float]
+    beside: dict[str, float]
+    facts: dict[str, float]
+    noisy: Collection[str]
+
+    def of_kind(self, kind: str) -> dict[str, float]:
+        """Scores of the labels of one of KINDS."""
+        return {n: v for n, v in self.score.items() if kind_of(n, self.noisy) == kind}
+
+
+@threadpool_limits.wrap(limits=1, user_api="blas")
+def joint_score(
+    rows: Rows, survey: Survey, signatures: Sequence[Signature], evidence: LabelEvidence
+) -> tuple[JointScore, LabelEvidence]:
+    """Scores of all labels, two of them together included; and the evidence with the events that
+    were refined beside another cause.
+
+    Each of the best causes is taken as accepted, its size as free; then noise classes, effects and
+    unknown are compared again on what it leaves. What only unknown explains there is unknown: a
+    cause that leaves it impersonates another.
+
+    Parameters
+    ----------
+    rows : Rows
+    survey : Survey
+    signatures : sequence of Signature
+    evidence : LabelEvidence
+        Of these.
+    """
+    score = {name: float(values[0]) for name, values in evidence.score.items()}
+    single = dict(score)
+    best = _best_effect(evidence)
+    given = {}
+    refined = {}
+    for first in _accepted(evidence, score, best):
+        regained, beside, events = _given(rows, survey, signatures, evidence, first)
+        base = score[first] = score[first] + regained
+        given[first] = {name: gain for name, gain in beside.items() if name != first}
+        for name, gain in given[first].items():
+            if name == "unknown":
+                label = "unknown"
+            else:
+                label = _joined(evidence, first, name)
+            score[label] = np.logaddexp(score.get(label, -np.inf), base + gain)
+            if name in events:
+                refined[label] = events[name]
+    facts = _facts(rows, evidence, best)
+    joint = JointScore(score, single, given.get(best, {}), facts, evidence.noisy)
+    return joint, replace(evidence, refined=refined | evidence.refined)
+
+
+def _best_effect(evidence):
+    """The effect with the largest score, or None without any."""
+    return max(evidence.table.effects, key=lambda name: evidence.score[name][0], default=None)
+
+
+def _accepted(evidence, score, best):
+    """The best effect, and the one or two best causes, if probable enough to be tried with
+    another.
+    """
+    # unknown is left out of the sum: its blocks can hold two effects that are a pair
+    total = np.logaddexp.reduce([value for name, value in score.items() if name != "unknown"])
+    order = [n for n in sorted(score, key=score.get, reverse=True) if n not in ("none", "unknown")]
+    causes = [name for name in order if score[name] - total > np.log(1 - SETTINGS.confidence)][:2]
+    noisy = evidence.noisy
+    causes = [name for name in causes if name not in noisy or effect_class(name).is_of_pose()]
+    if best is None or best in causes:
+        return causes
+    return [best, *causes]
+
+
+def _facts(rows, evidence, best):
+    """What tells how evidence is to be taken."""
+    observations = evidence.observations
+    raised = observations.errors.raised >= 0
+    is_event = best is not None and bool(effect_class(best).moment())
+    moved = np.zeros(len(raised))
+    if is_event:
+        moved = (_best_columns(evidence, best)[observations.row] ** 2).sum(axis=1)
+    return {
+        "rough": float((rows.channel == "roughness").any()),
+        "raised": float(raised.mean()),
+        "event": float(is_event),
+        "event in raised": float(moved[raised].sum() / max(moved.sum(), 1e-300)),
+        "scale": float(np.log(evidence.likely_model("none").scale)),
+        "size": float(np.log(len(observations))),
+        "odd": len(evidence.tail) / len(observations),
+    }
+
+
+def _joined(evidence, *names):
+    order = [*evidence.table.labels, *(each.label for each in evidence.noise)]
+    return "+".join(sorted(names, key=order.index))
+
+
+def best_member(
+    signatures: Sequence[Signature], evidence: LabelEvidence, name: str, label: str
+) -> Signature:
+    """The signature of an effect that explains the residuals best; an event's is refined.
+
+    Parameters
+    ----------
+    signatures : sequence of Signature
+    evidence : LabelEvidence
+    name : str
+        Of the effect.
+    label : str
+        That it is part of.
+    """
+    event = evidence.event(name, label)
+    best = evidence.table.blocks[evidence.best(name)]
+    if event is None:
+        return signatures[best.member]
+    return event.signature
+
+
+def _best_columns(evidence, name):
+    """Columns (m, p), scaled, of one label's best member; an event's is refined."""
+    if name in evidence.refined:
+        return evidence.refined[name].table.columns
+    table = evidence.table
+    member = evidence.table.blocks[evidence.best(name)].member
+    blocks = [b for b in table.blocks if b.label == name and b.member == member]
+    return table.columns[:, max(blocks, key=lambda block: len(block.columns)).columns]
+
+
+def _given(rows, survey, signatures, evidence, first):
+    """What one label gains by models that suit it, the scores of others given it, and the events
+    that stand out beside it.
+
+    Scores are logs of prior times evidence over that of the one alone.
+    """
+    observations = evidence.observations
+    table = evidence.table
+    residual = observations.columns(rows.residual[:, None])
+    regained = 0.0
+    prior = dict(SETTINGS.prior_beside)
+    is_noise = first == PositionNoise.name
+    if is_noise:
+        models = noisy_pos_models() + models_with_windows(evidence.noise)
+        models = suited_models(observations, table, models, residual)
+    else:
+        columns = observations.columns(_best_columns(evidence, first))
+        observations = observations.with_shared(columns)
+        models = suited_models(observations, table, error_models(), residual)
+        regained = _regained(evidence, first, models, residual)
+    blocks = weigh_blocks(observations, models, residual, table)
+    of_effect = prior["effect"] / max(1, len(table.labels) - 1)
+    scores = block_scores(table, blocks, of_effect, prior)
+    events = refine_events(rows, survey, observations, table, blocks, signatures)
+    for name, event in events.items():
+        scores[name] = np.logaddexp(scores[name], np.log(of_effect) + event.gain)
+    if not is_noise:
+        channels = draw_channels(rows, None, 0)
+        noise = weigh_noise(observations, rows, signatures, blocks, residual, channels)
+        accepted = SETTINGS.free_sigma * columns
+        noise += weigh_windows(observations, signatures, blocks, residual, accepted)
+        scores |= _noise_scores(noise, prior)
+    return regained, {name: float(values[0]) for name, values in scores.items()}, events
+
+
+def _regained(evidence, name, models, residual):
+    """By how much the log evidence of a label over none grows with models that suit it."""
+    columns = _best_columns(evidence, name)
+    block = evidence.table.blocks[evidence.best(name)]
+    table = ColumnTable(columns, (replace(block, columns=np.arange(columns.shape[1])),))
+    known = evidence.blocks.models
+    blocks = weigh_blocks(
+        evidence.observations, tuple(dict.fromkeys(known + models)), residual, table
+    )
+    after, before = (
+        np.logaddexp.reduce(blocks.by_model[part, 0]) - np.logaddexp.reduce(blocks.none[part, 0])
+        for part in (slice(None), slice(len(known)))
+    )
+    return float(after - before)

@@ -17,9 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mlscorr.effects import effect_class
-from mlscorr.gap.evidence._error_models import STATED, ErrorModel, window_growth
-from mlscorr.gap.evidence.columns import ColumnTable, block_groups
-from mlscorr.gap.evidence.observations import Observations
+from mlscorr.gap.evidence.evidence import ColumnTable, block_groups
+from mlscorr.gap.evidence.observations import STATED, ErrorModel, Observations, window_growth
 from mlscorr.gap.evidence.settings import SETTINGS
 from mlscorr.gap.residuals import Rows
 
@@ -78,7 +77,8 @@ def gap_kind(label: str, noisy: Iterable[str], rows: Rows) -> str:
 
 def signed_root(square: np.ndarray, unit: str = "mm") -> np.ndarray:
     """sign(g) |g|^(1/2) of a square in m^2 (in mm) or of shares (in percent)."""
-    return (1e3 if unit == "mm" else 1e2) * np.sign(square) * np.sqrt(np.abs(square))
+    scale = {"mm": 1e3, "%": 1e2}[unit]
+    return scale * np.sign(square) * np.sqrt(np.abs(square))
 
 
 @dataclass(frozen=True)
@@ -143,21 +143,6 @@ class Explanations:
         columns = self.columns[:, self.table.blocks[number].columns]
         normal = columns.T @ columns + np.eye(columns.shape[1]) / SETTINGS.free_sigma**2
         return columns @ np.linalg.solve(normal, columns.T @ innovations)
-
-
-def unit_square(observations: Observations, model: ErrorModel) -> float:
-    """Square of the length that a sum of squares of one has, spread over all rows. Units: m^2.
-
-    The sigma is that of the median innovation.
-
-    Parameters
-    ----------
-    observations : Observations
-    model : ErrorModel
-        Of V.
-    """
-    _, sigma = observations.whitener(model).innovations(np.zeros((len(observations), 1)))
-    return float(np.median(sigma) ** 2 / len(observations))
 
 
 def position_terms(

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlscorr.gap.evidence._error_models import STATED, ErrorModel
-from mlscorr.gap.evidence.observations import Observations
+from mlscorr.gap.evidence.observations import STATED, ErrorModel, Observations
 from mlscorr.gap.evidence.settings import SETTINGS
 from mlscorr.gap.signatures import Signature
 

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from mlscorr.gap.evidence._error_models import ErrorModel
-from mlscorr.gap.evidence.observations import Observations
+from mlscorr.gap.evidence.observations import ErrorModel, Observations
 from mlscorr.gap.evidence.settings import SETTINGS
 from mlscorr.gap.residuals import Rows
 

@@ -2,5 +2,4 @@
 
 from mlscorr.gap.plan._planned_rows import event_sizes, planned_rows
 from mlscorr.gap.plan.additions import NextData, next_data
-from mlscorr.gap.plan.draws import ATTEMPTS, draw_effects, draw_mechanism, names_to_try
-from mlscorr.gap.plan.sizing import Ruler
+from mlscorr.gap.plan.draws import ATTEMPTS, Ruler, draw_effects, draw_mechanism, names_to_try

@@ -96,9 +96,12 @@ def next_data(
         observed = Observations.of(added[0], background(*added))
         after = _largest(compare_signatures(observed, signs), names)
         if before - after >= SETTINGS.smallest_fall:
+            end = "."
+            if after > INFERENCE.same:
+                end = ", which is still one class."
             why = (
                 f"{lowered(titles(names))}: squared correlation falls from {before:.2f} to "
-                f"{after:.2f}" + ("." if after <= INFERENCE.same else ", which is still one class.")
+                f"{after:.2f}{end}"
             )
             data.append(NextData(name, why, before, after))
     return tuple(sorted(data, key=lambda planned: planned.after or 0.0))

@@ -1,4 +1,9 @@
-"""What acts in a made-up survey: effects that are unlike each other, or a mechanism unlike all."""
+"""What acts in a made-up survey: effects that are unlike each other, or a mechanism unlike all.
+
+Their sizes are so many minimal detectable biases in the geometry of that survey.
+"""
+
+from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -6,14 +11,220 @@ from itertools import chain
 
 import numpy as np
 
-from mlscorr.effects import effect_class
-from mlscorr.gap.evidence import SETTINGS
-from mlscorr.gap.plan.sizing import Ruler, SizedEffect, draw_effect, likeness, shift_by
-from mlscorr.gap.signatures import Signature
+from mlscorr.collocation import Whitener
+from mlscorr.effects import Effect, effect_class
+from mlscorr.gap.evidence import (
+    SETTINGS,
+    Observations,
+    detectable_size,
+    error_models,
+    explained_square,
+    model_likelihood,
+)
+from mlscorr.gap.residuals import Rows, background
+from mlscorr.gap.signatures import Bench, Signature, signature
 from mlscorr.simulate import Described, RecordedPoints
+from mlscorr.survey import Survey
 
+EVENT_WIDTHS = (2.0, 30.0)  # s, drawn evenly by their logs: a lost fix to a tunnel
+LEAST_SIZE = 0.5  # MDB: an effect that stays below at its largest credible value doesn't show
 ATTEMPTS = 12  # names or surveys, estimated: where half show nothing, one case in 4000 fails
 LIKENESS = 0.8  # squared correlation with an effect, estimated: more is that effect by another name
+
+
+@dataclass(frozen=True)
+class Ruler:
+    """A survey without effects, and how large an effect is beside its errors.
+
+    Parameters
+    ----------
+    rows : Rows
+    survey : Survey
+    observations : Observations
+    whitener : Whitener
+        Of the covariance that its residuals without effects make most likely.
+    """
+
+    rows: Rows
+    survey: Survey
+    observations: Observations
+    whitener: Whitener
+
+    @classmethod
+    def of(cls, rows: Rows, survey: Survey) -> Ruler:
+        """Ruler of the rows of a survey in which nothing acts."""
+        observed = Observations.of(rows, background(rows, survey))
+        residual = observed.columns(rows.residual[:, None])
+        best = max(error_models(), key=lambda model: model_likelihood(observed, model, residual)[0])
+        return cls(rows, survey, observed, observed.whitener(best))
+
+    def normal(self, columns: np.ndarray) -> np.ndarray:
+        """A^T V^-1 A (p, p) of columns (m, p)."""
+        white = self.whitener.whiten(self.observations.columns(columns))
+        return white.product(white)
+
+    def size(self, shift: np.ndarray) -> float:
+        """Size of a shift (m,) of the rows, in minimal detectable biases."""
+        return float(np.sqrt(max(self.normal(shift[:, None])[0, 0], 0.0)) / SETTINGS.detectable)
+
+
+@dataclass(frozen=True)
+class SizedEffect:
+    """An effect of a known size.
+
+    Parameters
+    ----------
+    effect : Effect
+    parameters : dict
+        As a diagnosis would name and estimate them.
+    mdb : float
+        Size in minimal detectable biases.
+    shift : (m,) array
+        What it makes of the residuals, to the first order.
+    normal : (p, p) array
+        Of its magnitudes: A^T V^-1 A.
+    """
+
+    effect: Effect
+    parameters: dict[str, float]
+    mdb: float
+    shift: np.ndarray
+    normal: np.ndarray
+
+
+def draw_effect(
+    ruler: Ruler, kind: type[Effect], mdb: float, rng: np.random.Generator
+) -> SizedEffect | None:
+    """Effect of a class in a random direction, of a chosen size; None where it doesn't show.
+
+    It is capped at the largest credible value. Events get a time within the survey and a width,
+    outliers a target. A random effect's MDB is the size whose square is so many sigmas.
+
+    Parameters
+    ----------
+    ruler : Ruler
+    kind : class of an Effect
+    mdb : float
+        Size in minimal detectable biases.
+    rng : numpy.random.Generator
+    """
+    if kind.needs_mounting() and ruler.survey.mounting is None:
+        return None
+    fixed = _fixed(kind, ruler, rng)
+    if fixed is None:
+        return None
+    sign = signature(Bench(ruler.rows, ruler.survey), kind, fixed, rng)
+    if kind.random:
+        way = _random(ruler, sign, mdb)
+    else:
+        way = _systematic(ruler, sign, mdb, rng)
+    if way is None:
+        return None
+    way, size = _credible(sign, way, mdb)
+    if size < min(LEAST_SIZE, mdb):
+        return None
+    parameters = dict(zip(sign.parameters, map(float, way), strict=True))
+    parameters |= {key: sign.fixed[key] for key in kind.moment()}
+    shift = sign.jacobian @ way
+    return SizedEffect(sign.effect(way), parameters, size, shift, ruler.normal(sign.jacobian))
+
+
+def _systematic(ruler, sign, mdb, rng):
+    """Parameters (p,) in a random direction."""
+    way = rng.standard_normal(len(sign.typical)) * sign.typical
+    unit = ruler.size(sign.jacobian @ way)
+    if unit == 0.0:
+        return None
+    return way * mdb / unit
+
+
+def _random(ruler, sign, mdb):
+    """Magnitude (1,) of an effect that shows as noise or lost returns."""
+    size = detectable_size(ruler.rows, ruler.observations, sign, mdb)
+    if np.isfinite(size):
+        return np.array([size])
+    return None
+
+
+def _credible(sign, way, mdb):
+    """Parameters within the largest credible value, and the size that is left."""
+    quantities = sign.kind.quantities()
+    largest = quantities["magnitude"].largest * (1 - 1e-3)  # rounding can't take it beyond
+    if sign.kind.is_wave():
+        size = np.hypot(*way)
+    else:
+        size = np.abs(way).max()
+    share = min(1.0, largest / size)
+    return way * share, mdb * share
+
+
+def _fixed(kind, ruler, rng):
+    """What an effect has besides its magnitude, at random; None where nothing was seen."""
+    rows = ruler.rows
+    fixed = {}
+    if kind.is_on_target():
+        used = np.unique(rows.survey_item[rows.survey_item >= 0])
+        if len(used):
+            return {"target": rows.targets.name[rng.choice(used)]}
+        return None
+    if "time" in kind.moment():
+        times = np.sort(rows.gps_time[rows.metric])
+        if len(times) == 0:
+            return None
+        time = np.quantile(times, rng.random())  # as dense in time as what was seen
+        fixed["time"] = float(round(time - rows.reference.start, 3))
+    if "width" in kind.moment():
+        fixed["width"] = float(np.exp(rng.uniform(*np.log(EVENT_WIDTHS))))
+    return fixed
+
+
+def shift_by(ruler: Ruler, move: Callable[[RecordedPoints], np.ndarray]) -> np.ndarray:
+    """Shift (m,) of the residuals when points are recorded elsewhere.
+
+    Parameters
+    ----------
+    ruler : Ruler
+    move : function
+        From points to displacements (k, 3) on the map, as DisplacedSurvey has it. Units: m.
+    """
+    rows = ruler.rows
+    pulses = ruler.rows.pulses
+    survey = ruler.survey
+    points = RecordedPoints(
+        pulses.gps_time, pulses.xyz, pulses.scanner_xyz, survey.trajectory, survey.mounting
+    )
+    moved = pulses.weight[:, None] * move(points)
+    items, number = np.unique(pulses.item, return_inverse=True)
+    total = np.column_stack([np.bincount(number, v, len(items)) for v in moved.T])
+    return np.einsum("mi,mi->m", rows.direction, total[np.searchsorted(items, rows.item)])
+
+
+def likeness(ruler: Ruler, shift: np.ndarray, known: Sequence[Signature]) -> dict[str, float]:
+    """Share of a shift's squared signal that each effect of the library explains.
+
+    Parameters
+    ----------
+    ruler : Ruler
+    shift : (m,) array
+        Of the residuals.
+    known : sequence of Signature
+        All that the library has in this survey; of an event the best of its times counts.
+    """
+    known = [sign for sign in known if sign.jacobian[ruler.rows.metric].any()]
+    if not shift[ruler.rows.metric].any():
+        return {}
+    columns = np.hstack([shift[:, None], *(sign.jacobian for sign in known)])
+    white = ruler.whitener.whiten(ruler.observations.columns(columns))
+    across = white.product(white[np.array([0])])[:, 0]
+    shares = {}
+    start = 1
+    for sign in known:
+        index = np.arange(start, start + len(sign.parameters))
+        start += len(index)
+        part = white[index]
+        share = explained_square(part.product(part), across[index]) / float(across[0])
+        shares[sign.name] = max(shares.get(sign.name, 0.0), share)
+    return shares
 
 
 def names_to_try(

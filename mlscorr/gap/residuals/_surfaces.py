@@ -1,17 +1,285 @@
-"""Patches of the cloud against a reference surface: where the believed beams meet it."""
+"""Patches of the cloud against what they should lie on: each other, where two looks see one plane,
+and a reference surface, where the believed beams meet it.
 
-from dataclasses import dataclass
+Looks pair within a gate of the stated sigma; those that disagree with all others about their time
+are of something else.
+"""
+
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from mlscorr.correction import Correction
-from mlscorr.gap.residuals._covariates import scanner_origin
 from mlscorr.gap.residuals.patches import Patches
-from mlscorr.gap.residuals.selection import consistent, gate, places, support
+from mlscorr.gap.residuals.rows import (
+    Rows,
+    SamplePulses,
+    assemble,
+    sample_pulses,
+    scanner_origin,
+)
 from mlscorr.gap.residuals.settings import SETTINGS
+from mlscorr.pos import stated_sigma
 from mlscorr.simulate import SceneScenario
 from mlscorr.simulate.scene import read_mesh
-from mlscorr.survey import Columns, Survey
+from mlscorr.survey import SEARCH_RADIUS, Columns, Survey
+
+
+def moved_by(correction: Correction | None, xyz: np.ndarray, gps_time: np.ndarray) -> np.ndarray:
+    """What a correction adds to points (n, 3); nothing without one. Units: m.
+
+    Parameters
+    ----------
+    correction : Correction or None
+    xyz, gps_time : (n, 3), (n,) array
+        Units: m, s.
+    """
+    if correction is None:
+        return np.zeros(xyz.shape)
+    return correction.increments(xyz, gps_time)[0]
+
+
+def places(
+    survey: Survey, patches: Patches, correction: Correction | None
+) -> list[tuple[Survey, Patches]]:
+    """The survey and its patches as recorded, and where a correction puts them.
+
+    Parameters
+    ----------
+    survey : Survey
+    patches : Patches
+    correction : Correction or None
+    """
+    if correction is None:
+        return [(survey, patches)]
+    samples = patches.xyz.reshape(-1, 3)
+    moved = moved_by(correction, samples, patches.time.ravel()).reshape(patches.xyz.shape)
+    centre = patches.centre + moved_by(correction, patches.centre, patches.gps_time)
+    near = replace(patches, centre=centre, xyz=patches.xyz + moved)
+    return [(survey, patches), (replace(survey, trajectory=correction.corrected), near)]
+
+
+def support(residual: np.ndarray) -> float:
+    """How much speaks for the places that leave residuals (n,) in m: the nearer, the more.
+
+    Parameters
+    ----------
+    residual : (n,) array
+        Units: m.
+    """
+    return float(np.maximum(1.0 - (residual / SETTINGS.least_surface_gate) ** 2, 0.0).sum())
+
+
+def gate(survey: Survey, gps_time: np.ndarray) -> np.ndarray:
+    """Largest credible distance of a surface from where it should be.
+
+    Parameters
+    ----------
+    survey : Survey
+    gps_time : (n,) array
+        Units: s.
+
+    Returns
+    -------
+    (n,) array
+        Units: m.
+    """
+    sigma = stated_sigma(survey.trajectory, survey.pos, gps_time)
+    size = SETTINGS.surface_gate_sigmas * np.linalg.norm(sigma.drift + sigma.held, axis=1)
+    return np.clip(size, SETTINGS.least_surface_gate, SEARCH_RADIUS)
+
+
+def consistent(gps_time: np.ndarray, direction: np.ndarray, residual: np.ndarray) -> np.ndarray:
+    """Which differences agree with one shift of their window of time.
+
+    What doesn't is another surface: a car, a curb that the reference lacks. The shift is the one
+    of least absolute differences, by reweighting; in windows with little in them, all agree.
+
+    Parameters
+    ----------
+    gps_time : (n,) array
+        Units: s.
+    direction : (n, 3) array
+        Along which the differences are measured.
+    residual : (n,) array
+        Units: m.
+
+    Returns
+    -------
+    (n,) bool array
+    """
+    order = np.argsort(gps_time, kind="stable")
+    size = SETTINGS.plane_points  # in a street they come within a second
+    group = np.arange(len(order)) // size
+    moment = np.floor(gps_time[order] / SETTINGS.outlier_interval)
+    begins = np.flatnonzero((np.diff(group) != 0) | (np.diff(moment) != 0)) + 1
+    agree = np.ones(len(gps_time), dtype=bool)
+    for rows in np.split(order, begins):
+        if len(rows) >= size // 3:  # three unknowns: fewer don't tell which of them is off
+            left = residual[rows] - _shift(direction[rows], residual[rows])
+            scatter = 1.4826 * np.median(np.abs(left))  # a normal distribution's sigma
+            agree[rows] = np.abs(left) <= max(SETTINGS.odd_distance, SETTINGS.odd_sigmas * scatter)
+    return agree
+
+
+def _shift(direction, residual):
+    """What a shift of least absolute differences makes of each of the directions (n,). m."""
+    weight = np.ones(len(residual))
+    for _ in range(15):
+        normal = (direction * weight[:, None]).T @ direction + 1e-3 * np.eye(3) * weight.sum()
+        fitted = direction @ np.linalg.solve(normal, direction.T @ (weight * residual))
+        weight = 1 / np.maximum(np.abs(residual - fitted), 1e-3)
+    return fitted
+
+
+def spread(columns: list[np.ndarray], limit: int, rng: np.random.Generator) -> np.ndarray:
+    """Choose at most `limit` of n things, evenly spread over the values of each column.
+
+    Each column is cut into equal bins; a thing's chance grows with the emptiness of its bins.
+
+    Parameters
+    ----------
+    columns : list of (n,) arrays
+    limit : int
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    (k,) int array
+        Sorted rows.
+
+    >>> spread([np.arange(5.0)], 10, np.random.default_rng(0))
+    array([0, 1, 2, 3, 4])
+    """
+    n = len(columns[0])
+    if n <= limit:
+        return np.arange(n)
+    chance = np.zeros(n)
+    for values in columns:
+        span = np.ptp(values) or 1.0
+        number = ((values - values.min()) / span * SETTINGS.spread_bins).astype(int)
+        chance += 1 / np.bincount(number)[number]
+    keys = rng.exponential(size=n) / chance  # the least of these are a sample without replacement
+    return np.sort(np.argpartition(keys, limit)[:limit])
+
+
+def shared_rows(
+    survey: Survey,
+    patches: Patches,
+    rng: np.random.Generator,
+    limit: int = SETTINGS.patches // 2,
+    correction: Correction | None = None,
+) -> Rows | None:
+    """Rows of the planes that were seen twice, or None where there are none.
+
+    The residual is how far the earlier look lies from the later one, along their mean normal.
+
+    Parameters
+    ----------
+    survey : Survey
+    patches : Patches
+    rng : numpy.random.Generator
+        Chooses where there are more pairs than the limit.
+    limit : int
+    correction : Correction, optional
+        By which two looks at one plane find each other, where more do than as recorded.
+    """
+    tried = [(there, *_pairs(near)) for there, near in places(survey, patches, correction)]
+    there, early, late, normal, between, residual = max(tried, key=lambda pair: support(pair[-1]))
+    first = patches[early]
+    second = patches[late]
+    apart = np.linalg.norm(between, axis=1)
+    kept = np.flatnonzero(np.abs(residual) <= gate(there, first.gps_time))
+    kept = kept[consistent(first.gps_time[kept], normal[kept], residual[kept])]
+    residual = np.einsum("ni,ni->n", normal, first.centre - second.centre)
+    if len(kept) == 0:
+        return None
+    columns = [first.gps_time[kept], second.gps_time[kept], *np.abs(normal[kept].T)]
+    kept = kept[spread(columns, limit, rng)]
+    first = first[kept]
+    second = second[kept]
+    normal = normal[kept]
+    apart = apart[kept]
+    residual = residual[kept]
+    item = np.arange(len(kept))
+    pulses = [patch_pulses(survey, first, item), patch_pulses(survey, second, item, -1.0)]
+    return assemble(
+        survey,
+        "shared",
+        item,
+        first.gps_time,
+        (first.centre + second.centre) / 2,
+        normal,
+        residual,
+        plane_noise(first, second, apart**2),
+        np.minimum(first.points, second.points),
+        SamplePulses.concatenate(pulses),
+        first.pass_number,
+        gps_time_2=second.gps_time,
+    )
+
+
+def compare_planes(first: Patches, second: Patches) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Mean normal (n, 3), way between the middles (n, 3), and its part along the normal (n,).
+
+    Parameters
+    ----------
+    first, second : Patches
+        Of n planes each, looked at twice.
+
+    Returns
+    -------
+    three arrays
+        Units of the way and its part: m.
+    """
+    normal = first.normal + second.normal
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    between = first.centre - second.centre
+    return normal, between, np.einsum("ni,ni->n", normal, between)
+
+
+def _pairs(patches):
+    """Rows (n,), (n,) of two looks at one plane, the earlier one first, and compare_planes of
+    them; each is in one pair at most with any other pass.
+    """
+    radius = SETTINGS.pair_distance * SETTINGS.cell
+    pairs = cKDTree(patches.centre).query_pairs(radius, output_type="ndarray")
+    time = patches.gps_time[pairs]
+    pairs = np.where((time[:, 0] <= time[:, 1])[:, None], pairs, pairs[:, ::-1])
+    early, late = pairs.T
+    cosine = np.einsum("ni,ni->n", patches.normal[early], patches.normal[late])
+    other = patches.pass_number[early] != patches.pass_number[late]
+    other |= np.abs(patches.gps_time[early] - patches.gps_time[late]) > SETTINGS.pause
+    pair = (cosine >= np.cos(SETTINGS.parallel / 2)) & other
+    early = early[pair]
+    late = late[pair]
+    order = np.argsort(np.linalg.norm(patches.centre[early] - patches.centre[late], axis=1))
+    early = early[order]
+    late = late[order]
+    for forward in (True, False):  # the nearest partner in each pass, of both
+        a, b = (early, late) if forward else (late, early)
+        key = a * (patches.pass_number.max(initial=0) + 1) + patches.pass_number[b]
+        nearest = np.sort(np.unique(key, return_index=True)[1])
+        early = early[nearest]
+        late = late[nearest]
+    return early, late, *compare_planes(patches[early], patches[late])
+
+
+def plane_noise(first: Patches, second: Patches, square: np.ndarray) -> np.ndarray:
+    """Variance (n,) of the difference: of both means, of the normal over the way between them,
+    and of the surface, which is no plane.
+
+    Parameters
+    ----------
+    first, second : Patches
+        Of n planes each.
+    square : (n,) array
+        Of the distance between their middles. Units: m^2.
+    """
+    mean = [patches.variance / patches.points for patches in (first, second)]
+    tilt = [m / patches.spread**2 for m, patches in zip(mean, (first, second), strict=True)]
+    return mean[0] + mean[1] + square * (tilt[0] + tilt[1]) / 4 + SETTINGS.surface_sigma**2
 
 
 @dataclass(frozen=True, repr=False)
@@ -116,4 +384,30 @@ def _elsewhere(survey, patches, mesh, origin):
         f"Of {len(patches)} flat patches of the cloud hardly any lies within {limit:.2f} m of the "
         f"reference surface {survey.reference}: it is {distance:.1f} m away in the median "
         f"({up:+.1f} m in height), so it seems to be {what}. Give it in the cloud's coordinates."
+    )
+
+
+def patch_pulses(
+    survey: Survey, patches: Patches, item: np.ndarray, sign: float = 1.0
+) -> SamplePulses:
+    """Pulses of patches.
+
+    Parameters
+    ----------
+    survey : Survey
+    patches : Patches
+    item : (p,) int array
+        Of each patch.
+    sign : float
+        -1 for the second patches of pairs.
+    """
+    p, samples = patches.time.shape
+    return sample_pulses(
+        survey,
+        np.repeat(item, samples),
+        np.full(p * samples, sign / samples),
+        patches.xyz.reshape(-1, 3),
+        patches.time.ravel(),
+        patches.intensity.ravel(),
+        np.repeat(patches.normal, samples, axis=0),
     )

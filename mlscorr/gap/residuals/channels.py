@@ -8,10 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from mlscorr.gap.residuals._covariates import scanner_origin
-from mlscorr.gap.residuals.patches import Patches
-from mlscorr.gap.residuals.plane_fit import freedom
-from mlscorr.gap.residuals.rows import Rows
+from mlscorr.gap.residuals.patches import Patches, freedom
+from mlscorr.gap.residuals.rows import Rows, scanner_origin
 from mlscorr.gap.residuals.settings import SETTINGS
 from mlscorr.survey import Survey
 
@@ -128,7 +126,8 @@ def return_rate(patches: Patches) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     fired = np.maximum(patches.fired, 1)
     share = patches.returned / fired
     counted = patches.fired >= SETTINGS.fired
-    counted &= np.median(share[counted]) >= SETTINGS.thinned if counted.any() else False
+    if counted.any():
+        counted &= np.median(share[counted]) >= SETTINGS.thinned
     return share - 1.0, loss_variance(share, fired, counted), counted
 
 

@@ -7,14 +7,22 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 
 from mlscorr.correction import Correction
-from mlscorr.gap.residuals._assemble import assemble, patch_pulses, sample_pulses
-from mlscorr.gap.residuals._covariates import scanner_origin
-from mlscorr.gap.residuals._shared_planes import shared_rows
-from mlscorr.gap.residuals._surfaces import OnReference, on_reference
+from mlscorr.gap.residuals._surfaces import (
+    OnReference,
+    on_reference,
+    patch_pulses,
+    shared_rows,
+    spread,
+)
 from mlscorr.gap.residuals.channels import return_rate, roughness
 from mlscorr.gap.residuals.patches import Patches
-from mlscorr.gap.residuals.rows import Rows, SamplePulses
-from mlscorr.gap.residuals.selection import spread
+from mlscorr.gap.residuals.rows import (
+    Rows,
+    SamplePulses,
+    assemble,
+    sample_pulses,
+    scanner_origin,
+)
 from mlscorr.gap.residuals.settings import SETTINGS
 from mlscorr.matching import SETTINGS as MATCHING
 from mlscorr.survey import Matched, Survey, TargetObservations
@@ -79,7 +87,7 @@ def build_rows(
         For a reference surface that can't be used, or when there is nothing to compare.
 
     >>> import numpy as np, tempfile
-    >>> from mlscorr.gap.residuals.patch_search import find_patches
+    >>> from mlscorr.gap.residuals.patches import find_patches
     >>> from mlscorr.io.surveys.survey_file import read_survey
     >>> from mlscorr.pipeline.finding import find_targets
     >>> from mlscorr.simulate import Scenario, simulate

@@ -12,13 +12,20 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mlscorr.correction import Correction
-from mlscorr.gap.residuals._shared_planes import compare_planes, plane_noise
-from mlscorr.gap.residuals._surfaces import OnReference
+from mlscorr.gap.residuals._surfaces import (
+    OnReference,
+    compare_planes,
+    consistent,
+    gate,
+    moved_by,
+    places,
+    plane_noise,
+    spread,
+)
 from mlscorr.gap.residuals.channels import return_rate, roughness
 from mlscorr.gap.residuals.pairing import patch_rows, target_rows
 from mlscorr.gap.residuals.patches import Patches
 from mlscorr.gap.residuals.rows import Rows
-from mlscorr.gap.residuals.selection import consistent, gate, moved_by, places, spread
 from mlscorr.gap.residuals.settings import SETTINGS
 from mlscorr.survey import Matched, PointCloud, Survey, TargetObservations
 from mlscorr.targets import Candidates

@@ -2,14 +2,14 @@
 
 from mlscorr.gap.signatures._displacements import displacements
 from mlscorr.gap.signatures._signatures import (
-    NO_MOUNTING,
-    UNSTATED,
     Signature,
+    curvature,
+    expected,
     select,
     signature,
     signatures,
+    without_effects,
 )
 from mlscorr.gap.signatures.changes import Bench, check_mounting
-from mlscorr.gap.signatures.expectation import curvature, expected, without_effects
 from mlscorr.gap.signatures.settings import SETTINGS
 from mlscorr.gap.signatures.simulators import as_believed, joined, with_cause

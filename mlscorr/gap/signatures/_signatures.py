@@ -1,17 +1,19 @@
-"""How each effect shows in the rows: derivatives by its parameters, through its own function."""
+"""How each effect shows in the rows: derivatives by its parameters, through its own function.
 
-from collections.abc import Iterable
+What a simulator's effects make of the rows is told by the same functions, beyond the first order.
+"""
+
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from mlscorr.effects import EFFECTS, Effect, known_effects
 from mlscorr.gap.residuals import Rows
-from mlscorr.gap.signatures.changes import Bench
+from mlscorr.gap.signatures.changes import Bench, Change
 from mlscorr.gap.signatures.settings import SETTINGS
-from mlscorr.survey import Survey
-
-NO_MOUNTING = "and the survey has no [mounting]"  # why most effects are left out, where any are
+from mlscorr.survey import Statement, Survey
 
 
 @dataclass(frozen=True)
@@ -85,15 +87,12 @@ class Signature:
         return self.kind(magnitude=magnitude, **self.fixed)
 
 
-UNSTATED = "does not state how large it is"  # so that none is larger than stated
-
-
 def signatures(
     rows: Rows,
     survey: Survey,
     effects: Iterable[type[Effect]] | None = None,
     rng: np.random.Generator | None = None,
-) -> tuple[tuple[Signature, ...], dict[str, str]]:
+) -> tuple[tuple[Signature, ...], dict[str, Statement]]:
     """Signatures of effects in the rows of a survey, and why others have none.
 
     Deterministic effects are differentiated by steps of a tenth of their usual size to both
@@ -112,8 +111,8 @@ def signatures(
 
     Returns
     -------
-    tuple of Signature, dict of str
-        Sentences by the names of effects without one.
+    tuple of Signature, dict of Statement
+        By the names of effects without one; a warning where survey.toml could mend that.
     """
     bench = Bench(rows, survey)
     signs = []
@@ -121,19 +120,19 @@ def signatures(
     rng = np.random.default_rng(0) if rng is None else rng
     for kind in known_effects() if effects is None else effects:
         if kind.needs_mounting() and survey.mounting is None:
-            left_out[kind.name] = f"It acts on the {kind.stage}, {NO_MOUNTING}."
+            left_out[kind.name] = Statement("no mounting", "warning", {"stage": kind.stage})
             continue
         if kind.name in survey.scanner.assumed:
-            left_out[kind.name] = f"survey.toml {UNSTATED}: [scanner] {kind.name}."
+            left_out[kind.name] = Statement("unstated size", "warning", {"name": kind.name})
             continue
         bank = _tried(bench, kind, _bank(kind, rows, survey), rng)
         if isinstance(bank, str):
-            left_out[kind.name] = bank
+            left_out[kind.name] = Statement("not usable", values={"why": bank})
             continue
         bank = [sign for sign in bank if sign.jacobian.any() or sign.is_noise]
         signs += bank
         if not bank:
-            left_out[kind.name] = "No row of this survey depends on it."
+            left_out[kind.name] = Statement("no row")
     return tuple(signs), left_out
 
 
@@ -151,12 +150,12 @@ def _tried(bench, kind, bank, rng):
         if not all(np.isfinite(v).all() for v in (moved[metric], sign.variance, sign.growth)):
             return "It makes values that are no numbers."
         size = f"At its usual size, {sign.typical[0]:g} {sign.units[0]}, it"
-        if why := too_far(bench.rows, moved, size):
+        if why := _too_far(bench.rows, moved, size):
             return why
     return signs
 
 
-def too_far(rows: Rows, moved: np.ndarray, what: str) -> str:
+def _too_far(rows: Rows, moved: np.ndarray, what: str) -> str:
     """Why nobody can mean an effect: it moves the things of rows farther than any survey is off.
 
     Parameters
@@ -227,12 +226,17 @@ def signature(bench: Bench, kind: type[Effect], fixed: dict, rng: np.random.Gene
     tries = _tries(kind, size, fixed)
     jacobian = np.zeros((m, len(tries)))
     step = SETTINGS.derivative_step * typical
-    for column, (_, unit, more) in enumerate(tries if _is_seen(rows, fixed) else ()):
-        ends = [
-            bench.change(kind(magnitude=np.multiply(unit, sign * step).tolist(), **more)).shift
-            for sign in ((-1, 1) if size.least is None else (0, 1))
-        ]
-        jacobian[:, column] = (ends[1] - ends[0]) / (step * (2 if size.least is None else 1))
+    if size.least is None:
+        first = -1
+    else:  # it has no other sign
+        first = 0
+    if _is_seen(rows, fixed):
+        for column, (_, unit, more) in enumerate(tries):
+            ends = [
+                bench.change(kind(magnitude=np.multiply(unit, sign * step).tolist(), **more)).shift
+                for sign in (first, 1)
+            ]
+            jacobian[:, column] = (ends[1] - ends[0]) / (step * (1 - first))
     names = tuple(name for name, _, _ in tries)
     return Signature(
         kind,
@@ -278,11 +282,12 @@ def _bank(kind, rows, survey):
     rest = {name: known[name].typical for name in kind.circumstances() if name not in moment}
     if not moment:
         return [rest]
-    widths = SETTINGS.widths if "width" in moment else (None,)
+    if "width" not in moment:
+        return [rest | {"time": t} for t in _times(rows, survey, SETTINGS.step_spacing)]
     return [
-        {**rest, "time": time, **({} if width is None else {"width": width})}
-        for width in widths
-        for time in _times(rows, survey, SETTINGS.step_spacing if width is None else width)
+        {**rest, "time": time, "width": width}
+        for width in SETTINGS.widths
+        for time in _times(rows, survey, width)
     ]
 
 
@@ -322,3 +327,79 @@ def select(signs: Iterable[Signature], rows: Rows, used: np.ndarray) -> tuple[Si
         for sign in signs
         if _is_seen(part, sign.fixed)
     )
+
+
+def expected(rows: Rows, survey: Survey, effects: Iterable[Effect]) -> Change:
+    """What effects that a simulator has already make of the rows: one Change of all.
+
+    Take ``shift + log(1 + growth)`` from the residuals, add ``variance`` to their noise.
+
+    Parameters
+    ----------
+    rows : Rows
+    survey : Survey
+    effects : iterable of Effect
+
+    Raises
+    ------
+    ValueError
+        For a user's own that moves everything by more than any survey is off.
+    """
+    bench = Bench(rows, survey)
+    total = np.zeros((3, len(rows)))
+    for effect in effects:
+        change = bench.change(effect)
+        what = f"The simulator's {effect.name} of {effect.magnitude}"
+        if type(effect) not in EFFECTS and (why := _too_far(rows, change.shift, what)):
+            raise ValueError(why)
+        total += _shift(bench, effect, change), change.variance, change.growth
+    return Change(*total)
+
+
+def _shift(bench, effect, change):
+    """Shift (m,) that takes what was recorded to what is true: a change, or an opposite effect's.
+
+    They differ by twice the second order.
+    """
+    with suppress(ValueError):  # of an effect that has no other sign
+        opposite = replace(effect, magnitude=(-np.asarray(effect.magnitude)).tolist())
+        return np.where(bench.rows.metric, -bench.change(opposite).shift, change.shift)
+    return change.shift
+
+
+def without_effects(rows: Rows, survey: Survey, effects: Sequence[Effect]) -> Rows:
+    """Rows as observed minus what a simulator with effects expects.
+
+    Parameters
+    ----------
+    rows : Rows
+    survey : Survey
+    effects : sequence of Effect
+    """
+    change = expected(rows, survey, effects)
+    common = [effect for effect in effects if effect.random and effect.stage == "pos"]
+    # the noise of each row's own comes from its points, in which theirs is already
+    noise = rows.noise + expected(rows, survey, common).variance
+    residual = rows.residual - change.shift - np.log1p(change.growth)
+    return replace(rows, residual=residual, noise=noise)
+
+
+def curvature(
+    rows: Rows, survey: Survey, parts: Iterable[tuple[Signature, np.ndarray]]
+) -> np.ndarray:
+    """What effects make of the rows beyond the first order (m,), in the unit of each.
+
+    Parameters
+    ----------
+    rows : Rows
+    survey : Survey
+    parts : iterable of (Signature, (p,) array)
+        With their sizes. Random ones are left out.
+    """
+    bench = Bench(rows, survey)
+    curved = np.zeros(len(rows))
+    for part, size in (pair for pair in parts if not pair[0].kind.random):
+        with suppress(ValueError):  # of an effect that has no other sign
+            # truth is what was recorded, less the effect
+            curved -= bench.change(part.effect(-size)).shift + part.jacobian @ size
+    return curved

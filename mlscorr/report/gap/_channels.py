@@ -9,8 +9,7 @@ from matplotlib.lines import Line2D
 
 from mlscorr.effects import lowered
 from mlscorr.report.gap._innovations import channel_style
-from mlscorr.report.gap._rows import bin_names
-from mlscorr.report.gap.numbers import numbers
+from mlscorr.report.gap._rows import bin_names, numbers
 from mlscorr.report.headline import StatementRow
 from mlscorr.report.style import BLUE, GREY, VERMILLION, legend_above, new_figure, styled
 from mlscorr.wording import joined, known, plain

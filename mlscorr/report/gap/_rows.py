@@ -1,12 +1,26 @@
-"""Rows of the tables of a diagnosis and of a plan, read from their documents."""
+"""What tables and figures read of the documents of a diagnosis and of a plan: rows and numbers."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 
+import numpy as np
+
 from mlscorr.effects import meaning, title
 from mlscorr.report.gap._labels import place_of, sentences_of
 from mlscorr.wording import DASH, column, known, percent, plain, signed
+
+
+def numbers(values: Iterable[float | None]) -> np.ndarray:
+    """Numbers of a document as an array, NaN where it has none.
+
+    Parameters
+    ----------
+    values : iterable of float or None
+    """
+    return np.array([v if known(v) else np.nan for v in values], dtype=float)
+
 
 COVARIATES = {
     "time": "Time since the start",

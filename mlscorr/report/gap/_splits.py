@@ -7,9 +7,8 @@ from matplotlib.patches import Patch
 
 from mlscorr.gap.evidence import SETTINGS as INFERENCE
 from mlscorr.report.gap._innovations import WINDOW
-from mlscorr.report.gap._rows import split_title
+from mlscorr.report.gap._rows import numbers, split_title
 from mlscorr.report.gap._settings import SETTINGS
-from mlscorr.report.gap.numbers import numbers
 from mlscorr.report.style import AFTER, BEFORE, GREY, label, legend_above, new_figure, styled
 from mlscorr.wording import percent
 
@@ -117,6 +116,11 @@ def _write_share(panel, split, edges, high, is_explained):
     i = int(np.argmax(np.where(plain, share - of_rows, -np.inf)))
     middle = edges[i : i + 2].mean()
     place = (middle - edges[0]) / (edges[-1] - edges[0])
+    alignment = "center"
+    if place < 0.1:
+        alignment = "left"
+    elif place > 0.9:
+        alignment = "right"
     panel.annotate(
         percent(min(share[i], 1.0)),
         (middle, np.nanmax([before[i], high[i], 0.0])),
@@ -124,7 +128,7 @@ def _write_share(panel, split, edges, high, is_explained):
         textcoords="offset points",
         fontsize=7.5,
         zorder=5,
-        horizontalalignment="left" if place < 0.1 else "right" if place > 0.9 else "center",
+        horizontalalignment=alignment,
     )
 
 

@@ -6,8 +6,147 @@ from mlscorr.effects import family, lowered, meaning, title
 from mlscorr.gap import no_cause
 from mlscorr.report.assumed import has_assumed_sigma
 from mlscorr.report.gap._labels import place_of, sentences_of
-from mlscorr.report.gap._shrinking import Fact, is_closed, is_within, shrinking
-from mlscorr.wording import DASH, joined, known, size, thousands
+from mlscorr.wording import DASH, joined, known, percent, signed, size, thousands
+
+GAPS = {  # by the kind of gap that a closure measures
+    "systematic": "Systematic part of the gap (a mean over all rows)",
+    "scatter": "Scatter beyond the stated one",
+    "returns": "Returns beyond the expected ones",
+}
+NOTHING_TO_CLOSE = "Before, it was no larger than chance makes it: there is nothing to close."
+AXES = {"E": "easting", "N": "northing", "H": "height"}
+
+
+class Fact(NamedTuple):
+    """A number beside the verdict: what it is, it, more in words, and what ends its sentence."""
+
+    title: str
+    number: str
+    more: str = ""
+    stop: str = "."
+
+
+def is_closed(document: dict) -> bool:
+    """Whether anything was put into the simulator.
+
+    Parameters
+    ----------
+    document : dict
+        The content of gap.json.
+    """
+    closure = document["closure"]
+    return closure["effect"] not in (None, "", "none") and known(closure["before"])
+
+
+def is_within(
+    value: float | None, band: list[float | None], kind: str | None = None, is_left: bool = False
+) -> bool:
+    """Whether a gap is what it may be when nothing is wrong; not, when one is not known.
+
+    Parameters
+    ----------
+    value : float or None
+    band : list of 2 floats or None
+    kind : str, optional
+        Of the gap: below the band more returns are lost than by chance, of others it is smaller.
+    is_left : bool
+        Whether it is what a cause in the simulator leaves: below the band, too much was put in.
+    """
+    is_known = all(map(known, [value, *band]))
+    is_low = is_known and value < band[0]
+    return is_known and value <= band[1] and not (is_low and (is_left or kind == "returns"))
+
+
+def shrinking(document: dict) -> Fact:
+    """How far the gap shrinks once the simulator has the cause.
+
+    Parameters
+    ----------
+    document : dict
+        The content of gap.json.
+    """
+    closure = document["closure"]
+    gap = document["gap"]
+    if not is_closed(document):
+        before = signed(gap["before"], gap["unit"])
+        more = f"When nothing is wrong: {span(gap)}."
+        return Fact("The gap between survey and simulation", before, more)
+    pair = " → ".join(signed(closure[when], closure["unit"]) for when in ("before", "after"))
+    if document["verdict"]["label"] == "unknown":
+        nearest = f"With the nearest known effect, {lowered(title(closure['effect']))},"
+        return Fact(f"{nearest} in the simulator", pair, shrunk(closure))
+    more = ""
+    left = (closure["after"], closure["null_band"], closure.get("kind"))
+    if not known(closure["shrink"]):
+        more = ""
+    elif is_within(*left, is_left=True):
+        chance = " What is left is what chance leaves when nothing is wrong."
+        more = "" if _not_closed(closure) else chance
+    elif is_within(*left):
+        more = " Less is left than chance leaves: too much was put in."
+    if closure["is_held_out"]:
+        data = "held-out data"
+    else:
+        data = "the data in which it was found"
+    part = f"{GAPS.get(closure.get('kind'), 'Gap')} on {data}"
+    return Fact(f"{part}, before → after the simulator has it", pair, shrunk(closure) + more)
+
+
+def shrunk(closure: dict) -> str:
+    """By how much the squared gap shrinks, with its interval, in words.
+
+    Errors that the simulator with the cause makes far smaller than they are stand first: their
+    square may be a small part of the gap's.
+
+    Parameters
+    ----------
+    closure : dict
+        Of gap.json.
+    """
+    (low, high), share, between = closure["interval"], closure["shrink"], ""
+    if not known(share):
+        return _not_closed(closure) + NOTHING_TO_CLOSE
+    if known(low) and known(high):
+        between = f" (95 %: {percent(low)} to {percent(high)})"
+    text = f"{percent(share)} of the squared gap is gone{between}."
+    if share >= 1:
+        text = f"All of the squared gap is gone{between}."
+    elif share < 0:
+        text = f"The squared gap did not shrink, it grew{between}."
+    return _not_closed(closure) + text
+
+
+def _not_closed(closure: dict) -> str:
+    """Along which axes errors are far beyond their simulated sigma with the cause; else nothing.
+
+    Parameters
+    ----------
+    closure : dict
+        Of gap.json.
+    """
+    errors = closure.get("over_sigma") or {"beyond": []}
+    if not errors["beyond"]:
+        return ""
+    ratio = dict(zip(errors["axes"], errors["after"], strict=True))
+    sizes = [f"{ratio[axis]:.1f} times in {AXES[axis]}" for axis in errors["beyond"]]
+    return (
+        f"Not closed: errors are still {joined(sizes)} the sigma that the simulator gives them. "
+        "Of squares in mm: "
+    )
+
+
+def span(gap: dict) -> str:
+    """What a gap is when nothing is wrong, in words.
+
+    Parameters
+    ----------
+    gap : dict
+        Of gap.json.
+    """
+    if not all(map(known, gap["null_band"])):
+        return DASH
+    return " to ".join(signed(end, gap["unit"]) for end in gap["null_band"])
+
 
 CERTAINTY = (  # probability from which on one says so
     (0.99, "practically certain"),
@@ -62,7 +201,7 @@ def verdict(document: dict) -> VerdictBox:
         short = "Too little of this survey could be compared with the simulator."
         return VerdictBox("open", "It can't be told yet", [answer["sentence"] or short])
     box = {"none": _nothing, "unknown": _unknown}.get(kind, _cause)(document)
-    others = not_ruled_out(document)
+    others = _not_ruled_out(document)
     more = [f"Not ruled out: {others}."] if others else []
     return box._replace(sentences=[*box.sentences, *more])
 
@@ -104,9 +243,8 @@ def _unknown(document):
         return VerdictBox(
             "open", "Nothing shows, but not everything was seen", [answer["sentence"]]
         )
-    lead = answer["lead"].rstrip(".")
-    if lead:
-        text = f"It looks like: {lead}."
+    if answer["lead"]:
+        text = f"It looks like: {answer['lead']}."
     else:
         text = "It can't be said what it looks like."
     more = "This is a lead to follow, not a cause: whatever behaves like that may have made it."
@@ -165,7 +303,7 @@ def _sentences(document, label):
     return sentences_of(label, cause["parameters"], lambda kind: place_of(kind, target, windows))
 
 
-def not_ruled_out(document: dict) -> str:
+def _not_ruled_out(document: dict) -> str:
     """Labels of the 95 % set besides the verdict's own, with their probabilities, in words.
 
     Parameters
@@ -176,7 +314,7 @@ def not_ruled_out(document: dict) -> str:
     answer = document["verdict"]
     share = _probabilities(document)
     names = [name for name in answer["set"] if name not in {answer["label"], *answer["same"]}]
-    return joined([f"{lowered(title(n))} ({in_hundred(share.get(n))})" for n in names], "or")
+    return joined([f"{lowered(title(n))} ({_in_hundred(share.get(n))})" for n in names], "or")
 
 
 def _probabilities(document):
@@ -198,14 +336,14 @@ def facts(document: dict) -> list[Fact]:
     gap = document["gap"]
     headline = document["headline"]
     if not is_named(document) and not is_closed(document):
-        whole = Fact("The gap between survey and simulation", headline, NEGATIVE)
+        whole = Fact("The gap between survey and simulation", headline, NEGATIVE, stop="")
         return [_certainty(document), whole]
     is_pattern = is_within(gap["before"], gap["null_band"])
     if is_pattern:
         more = "What gives it away is its pattern, not its size."
     else:
         more = ""
-    where = Fact("Where it shows most", headline, more)
+    where = Fact("Where it shows most", headline, more, stop="")
     return [_certainty(document), where, shrinking(document)]
 
 
@@ -224,17 +362,17 @@ def _certainty(document):
     ):
         words = "another is likelier, but would cost more if it were wrong"
     more = [chance(answer["p_value"]), "± is one sigma." if is_named(document) else ""]
-    return Fact("How sure", f"{in_hundred(share)}: {words}", " ".join(filter(None, more)))
+    return Fact("How sure", f"{_in_hundred(share)}: {words}", " ".join(filter(None, more)))
 
 
-def in_hundred(share: float | None) -> str:
+def _in_hundred(share: float | None) -> str:
     """A probability in words.
 
     Parameters
     ----------
     share : float or None
 
-    >>> in_hundred(0.9817), in_hundred(0.999), in_hundred(0.002), in_hundred(None)
+    >>> _in_hundred(0.9817), _in_hundred(0.999), _in_hundred(0.002), _in_hundred(None)
     ('98 in 100', 'more than 99 in 100', 'less than 1 in 100', '–')
     """
     if not known(share):

@@ -5,7 +5,6 @@ from itertools import groupby
 
 from mlscorr.effects import lowered, title
 from mlscorr.gap.evidence import SETTINGS
-from mlscorr.gap.signatures import NO_MOUNTING, UNSTATED
 from mlscorr.report.assumed import assumed_statement, has_assumed_sigma
 from mlscorr.report.gap._channels import channel_statements
 from mlscorr.report.gap._verdict import facts, is_named, verdict
@@ -39,7 +38,7 @@ def gap_screen(document: dict) -> dict[str, object]:
     first, *more = box.sentences
     items = [("", sentence) for sentence in more]
     items += [
-        (fact.title, f"{fact.number.rstrip('.')}. {fact.more}".strip()) for fact in facts(document)
+        (fact.title, f"{fact.number}{fact.stop} {fact.more}".strip()) for fact in facts(document)
     ]
     answer = StatementRow("Unmodelled", RATINGS[box.tone], f"{box.kicker}. {first}", tuple(items))
     warnings = warning_statements(document["warnings"])
@@ -122,5 +121,5 @@ def unjudged(document: dict) -> Iterator[StatementRow]:
         judged = [rung["label"] for rung in document["evidence"] if "+" not in rung["label"]]
         total = len(left) + len({*judged} - {"none", "unknown"})
         sentence = f"{len(left)} of {total} kinds of error can be neither named nor ruled out here."
-        is_mendable = any(NO_MOUNTING in why or UNSTATED in why for _, why in left)
-        yield StatementRow("Not judged", "amber" if is_mendable else "green", sentence, items)
+        rating = "amber" if document["mendable"] else "green"
+        yield StatementRow("Not judged", rating, sentence, items)

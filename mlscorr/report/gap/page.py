@@ -1,25 +1,85 @@
-"""The pages of a diagnosis, and of what a survey could diagnose before it is driven."""
+"""The pages and figures of a diagnosis, and of what a survey could diagnose before it is driven."""
+
+from functools import partial
 
 from mlscorr.effects import family, lowered, title, titles
 from mlscorr.report.gap import _rows as rows
-from mlscorr.report.gap._channels import WORDS, channel_rows, channel_statements, distance_rows
-from mlscorr.report.gap._innovations import channel_style
+from mlscorr.report.gap._channels import (
+    WORDS,
+    channel_rows,
+    channel_statements,
+    channels_figure,
+    distance_rows,
+)
+from mlscorr.report.gap._evidence import heat_figure, ladder, ladder_figure
+from mlscorr.report.gap._innovations import channel_style, innovations_figure, site_map
+from mlscorr.report.gap._plan import accuracy_figure, accuracy_sentence, detectable_figure
+from mlscorr.report.gap._rows import detectable_rows, worst_rows
 from mlscorr.report.gap._settings import SETTINGS
-from mlscorr.report.gap._shrinking import is_closed, shrunk, span
+from mlscorr.report.gap._splits import closure_figure, where_figure
 from mlscorr.report.gap._verdict import (
     VerdictBox,
     advice,
     facts,
+    is_closed,
     is_judged,
     is_named,
+    shrunk,
     smallest,
+    span,
     verdict,
 )
-from mlscorr.report.gap.accuracy import accuracy_sentence
-from mlscorr.report.gap.figures import diagnosis_figures, plan_figures
 from mlscorr.report.gap.first_screen import accuracy, unjudged
 from mlscorr.report.pages import Page, drawn
-from mlscorr.wording import DASH, joined, percent, signed
+from mlscorr.report.style import Figures
+from mlscorr.wording import DASH, joined, known, percent, signed
+
+
+def diagnosis_figures(document: dict) -> Figures:
+    """Functions that draw the figures of a diagnosis, by name.
+
+    Parameters
+    ----------
+    document : dict
+        The content of gap.json; what was not determined is None.
+    """
+    figures = {
+        "where": (where_figure, document["where"]),
+        "innovations": (innovations_figure, document["innovations"]["gps_time"]),
+        "evidence": (ladder_figure, ladder(document)),
+        "closure": (closure_figure, is_closed(document)),
+        "map": (site_map, document["map"]["trajectory"]),
+        "channels": (channels_figure, any(c["tables"] for c in document.get("contrasts", ()))),
+    }
+    drawn = {name: partial(draw, document) for name, (draw, content) in figures.items() if content}
+    return drawn | _separability(document["separability"])
+
+
+def plan_figures(document: dict) -> Figures:
+    """Functions that draw the figures of a plan, by name.
+
+    Parameters
+    ----------
+    document : dict
+        The content of plan.json.
+    """
+    figures = {}
+    worst = worst_rows(detectable_rows(document["detectable"]))
+    if any(known(row.ratio) for row in worst):
+        figures["detectable"] = partial(detectable_figure, worst)
+    if document.get("accuracy"):
+        figures["accuracy"] = partial(accuracy_figure, document)
+    if document["map"]["trajectory"]:
+        figures["map"] = partial(site_map, document)
+    return figures | _separability(document)
+
+
+def _separability(document):
+    is_matrix = len(document["correlation"]["names"]) > 1
+    if is_matrix:
+        return {"separability": partial(heat_figure, document)}
+    return {}
+
 
 SECTIONS = {  # in their order; one without anything to show is left out
     "where": "Where it shows",
@@ -122,8 +182,10 @@ def plan_page(document: dict, name: str) -> Page:
         "smallest_rows": [],
         "open_causes": [lowered(titles(members)) for members in document["classes"]],
         "compared": False,
-        "accuracy_words": accuracy_sentence(known) if (known := document.get("accuracy")) else "",
+        "accuracy_words": "",
     }
+    if document.get("accuracy"):
+        content["accuracy_words"] = accuracy_sentence(document["accuracy"])
     if document["advice"]:
         content["advice_title"] = "What to add"
     sections = {key: text for key, text in PLANNED.items() if not is_empty.get(key)}

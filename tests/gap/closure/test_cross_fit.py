@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from mlscorr.gap.closure._cross_fit import CrossFit, cross_fitted
+from mlscorr.gap.closure.folds import CrossFit, cross_fitted
 from mlscorr.gap.evidence import SETTINGS
-from mlscorr.gap.evidence._error_models import STATED
+from mlscorr.gap.evidence.observations import STATED
 
 
 @pytest.fixture

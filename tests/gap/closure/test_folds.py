@@ -11,7 +11,7 @@ from mlscorr.gap.closure import cause_for_simulator
 from mlscorr.gap.closure._settings import SETTINGS
 from mlscorr.gap.closure.folds import Folds
 from mlscorr.gap.evidence import Inference, Predicted
-from mlscorr.gap.evidence._verdict import GapVerdict
+from mlscorr.gap.evidence.decision import GapVerdict
 from mlscorr.gap.signatures import Bench, signature
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.gap.closure._over_sigma import OverSigma, errors_over_sigma
+from mlscorr.gap.closure.closure import OverSigma, errors_over_sigma
 from mlscorr.gap.closure.folds import Folds
 from mlscorr.gap.evidence import Observations, Predicted
 from mlscorr.gap.residuals import background

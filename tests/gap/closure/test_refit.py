@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mlscorr.gap.closure._refit import _fitted, refit_targets
 from mlscorr.gap.closure._settings import SETTINGS
-from mlscorr.gap.closure.rerun import _boards, _drawn, _meet, _views_of
+from mlscorr.gap.closure.rerun import _boards, _drawn, _fitted, _meet, _views_of, refit_targets
 from mlscorr.survey import PointCloud, Trajectory
 
 pytestmark = pytest.mark.long

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mlscorr.gap.closure._settings import SETTINGS
-from mlscorr.gap.closure._sightings import SightedTarget, Sighting, board_of, sightings_of
+from mlscorr.gap.closure.surroundings import SightedTarget, Sighting, board_of, sightings_of
 from mlscorr.simulate.scan import FORMS, RecordedPulses
 from mlscorr.survey import PointCloud
 from mlscorr.targets import FittedTarget, Outline, TargetView

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mlscorr.gap.closure import Surroundings
-from mlscorr.gap.closure._sightings import sightings_of
+from mlscorr.gap.closure.surroundings import sightings_of
 from mlscorr.io.clouds import read_chunks
 from mlscorr.simulate.scan import recorded_platform
 

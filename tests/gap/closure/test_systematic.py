@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from mlscorr.gap.closure._cross_fit import CrossFit
 from mlscorr.gap.closure._systematic import SystematicGap, share_gone, unit_square
+from mlscorr.gap.closure.folds import CrossFit
 from mlscorr.gap.evidence import ColumnTable, Explanations, Observations
-from mlscorr.gap.evidence._error_models import STATED
-from mlscorr.gap.evidence.columns import ColumnBlock
+from mlscorr.gap.evidence.evidence import ColumnBlock
+from mlscorr.gap.evidence.observations import STATED
 from mlscorr.gap.residuals import background
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mlscorr.gap.closure._unreturned import unreturned
+from mlscorr.gap.closure.surroundings import unreturned
 from mlscorr.simulate.scan import RecordedPulses
 
 START = 413_200.0  # s

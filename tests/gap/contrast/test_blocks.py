@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mlscorr.gap.contrast._blocks import (
+from mlscorr.gap.contrast.tables import (
     block_of,
     effective,
     joined_bins,

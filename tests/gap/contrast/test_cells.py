@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mlscorr.gap.contrast._cells import CellCollector, cells_of, sampled
+from mlscorr.gap.contrast.sample import CellCollector, cells_of, sampled
 from mlscorr.gap.residuals import cell_corner
 from mlscorr.survey import PointCloud
 from mlscorr.targets import NO_POINTS

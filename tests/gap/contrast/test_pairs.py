@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mlscorr.gap.contrast._pairs import paired_cells
+from mlscorr.gap.contrast.channels import paired_cells
 
 
 def test_neither_cloud_is_chosen_by(pair):

@@ -5,9 +5,8 @@ import re
 import numpy as np
 import pytest
 
-from mlscorr.gap.contrast._blocks import weights_of
 from mlscorr.gap.contrast._words import sentence
-from mlscorr.gap.contrast.tables import Binning, Measure
+from mlscorr.gap.contrast.tables import Binning, Measure, weights_of
 
 EDGES = (0, 10, 20, 40, 80)
 

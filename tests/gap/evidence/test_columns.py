@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mlscorr.gap.evidence import SETTINGS, Observations, column_table, unknown_blocks
-from mlscorr.gap.evidence.columns import is_of_one_target
+from mlscorr.gap.evidence.evidence import is_of_one_target
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from mlscorr.gap.evidence import Costs
-from mlscorr.gap.evidence.decision import KINDS, JointScore, cheapest, features, kind_of, learned
+from mlscorr.gap.evidence.decision import cheapest, features, learned
+from mlscorr.gap.evidence.labels import KINDS, JointScore, kind_of
 from tests.beds.joint_scores import joint
 
 NOISY = ("range_noise",)

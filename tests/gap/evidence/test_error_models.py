@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mlscorr.gap.evidence import error_models
-from mlscorr.gap.evidence._error_models import shares
+from mlscorr.gap.evidence.observations import shares
 
 
 def test_settings_are_a_prior():

@@ -12,9 +12,8 @@ from mlscorr.gap.evidence import (
     error_models,
     unknown_blocks,
 )
-from mlscorr.gap.evidence._error_models import STATED
 from mlscorr.gap.evidence.evidence import block_gain, suited_models, weigh_blocks, without_known
-from mlscorr.gap.evidence.observations import relevant_models
+from mlscorr.gap.evidence.observations import STATED, relevant_models
 from mlscorr.gap.residuals import background
 from mlscorr.gap.signatures import signatures
 from tests.gap.inference import surveyed

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mlscorr.gap.evidence._extent import extent_of
+from mlscorr.gap.evidence.where import extent_of
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.1])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mlscorr.gap.evidence import ErrorModel, Observations
-from mlscorr.gap.evidence._error_models import STATED
+from mlscorr.gap.evidence.observations import STATED
 from mlscorr.gap.residuals import background
 from tests.gap.inference import dense
 

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from mlscorr.gap.evidence import SETTINGS, Observations
-from mlscorr.gap.evidence._error_models import STATED
 from mlscorr.gap.evidence._windows import Window
-from mlscorr.gap.evidence.parameters import (
+from mlscorr.gap.evidence.causes import (
     fit_amplitudes,
     most_probable_size,
     window_parameters,
 )
+from mlscorr.gap.evidence.observations import STATED
 from tests.gap.inference import dense
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from mlscorr.effects import EFFECTS
 from mlscorr.gap.evidence import SETTINGS, Observations, compare_signatures
-from mlscorr.gap.evidence._error_models import STATED
+from mlscorr.gap.evidence.observations import STATED
 from mlscorr.gap.plan import next_data
 from mlscorr.gap.signatures import signatures
 from tests.gap.inference import dense

@@ -4,8 +4,7 @@ import numpy as np
 
 from mlscorr.gap.evidence import unknown_blocks
 from mlscorr.gap.plan import Ruler
-from mlscorr.gap.plan.draws import SizedMechanism
-from mlscorr.gap.plan.sizing import shift_by
+from mlscorr.gap.plan.draws import SizedMechanism, shift_by
 from mlscorr.simulate import Mechanism
 
 

@@ -16,9 +16,9 @@ from mlscorr.gap.evidence import (
     infer_causes,
     window_growth,
 )
-from mlscorr.gap.evidence._error_models import STATED
 from mlscorr.gap.evidence._windows import models_with_windows, weigh_windows
 from mlscorr.gap.evidence.evidence import weigh_blocks
+from mlscorr.gap.evidence.observations import STATED
 from mlscorr.gap.residuals import background
 from mlscorr.gap.signatures import signatures
 

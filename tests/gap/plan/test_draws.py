@@ -8,7 +8,7 @@ from gap_training.worlds import World
 from mlscorr.effects.catalogue import SYSTEMATIC
 from mlscorr.gap.evidence import SETTINGS
 from mlscorr.gap.plan import ATTEMPTS, Ruler, draw_effects, draw_mechanism, names_to_try
-from mlscorr.gap.plan.sizing import likeness, shift_by
+from mlscorr.gap.plan.draws import likeness, shift_by
 
 
 @pytest.fixture(scope="module")

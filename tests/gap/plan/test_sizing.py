@@ -7,7 +7,7 @@ import pytest
 from mlscorr.effects import EFFECTS
 from mlscorr.effects.catalogue import RANDOM, SYSTEMATIC
 from mlscorr.gap.plan import Ruler
-from mlscorr.gap.plan.sizing import draw_effect, likeness, shift_by
+from mlscorr.gap.plan.draws import draw_effect, likeness, shift_by
 from mlscorr.gap.signatures import Bench, signatures
 
 KINDS = {kind.name: kind for kind in EFFECTS}

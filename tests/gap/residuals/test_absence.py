@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mlscorr.gap.evidence._verdict import with_absence
+from mlscorr.gap.evidence.decision import with_absence
 from mlscorr.gap.residuals import Absence, find_absence
 from mlscorr.gap.residuals.absence import AbsentRun
 from mlscorr.matching import Matches, Refusal

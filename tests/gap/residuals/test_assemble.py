@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from mlscorr.frames import georeference, scanner_position, to_scanner
 from mlscorr.gap.residuals import assemble, sample_pulses
-from mlscorr.gap.residuals._assemble import patch_pulses
+from mlscorr.gap.residuals._surfaces import patch_pulses
 
 COUNT = 40
 

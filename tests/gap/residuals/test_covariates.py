@@ -3,7 +3,7 @@
 import numpy as np
 
 from mlscorr.gap.residuals import scanner_origin
-from mlscorr.gap.residuals._covariates import to_scanner_or_nan
+from mlscorr.gap.residuals.rows import to_scanner_or_nan
 
 
 def test_covariates_are_those_of_the_drive(survey, pairing):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mlscorr.gap.residuals import place_key
-from mlscorr.gap.residuals.plane_fit import fit_patches
+from mlscorr.gap.residuals.patches import fit_patches
 from mlscorr.survey import PointCloud
 
 NOISE = 0.004  # m

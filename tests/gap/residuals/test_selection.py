@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mlscorr.gap.residuals.selection import consistent, spread
+from mlscorr.gap.residuals._surfaces import consistent, spread
 
 
 def test_odd_surfaces_are_left_out_but_no_shift():

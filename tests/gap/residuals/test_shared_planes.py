@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mlscorr.gap.residuals._shared_planes import shared_rows
+from mlscorr.gap.residuals._surfaces import shared_rows
 from tests.beds.displaced import correction_of, displaced
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from mlscorr.report.gap import accuracy_sentence
-from mlscorr.report.gap.accuracy import accuracy_figure
+from mlscorr.report.gap._plan import accuracy_figure
 from tests.beds.gap_documents import plan_document
 
 

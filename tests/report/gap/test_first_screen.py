@@ -38,15 +38,15 @@ def test_what_the_simulator_has_already_is_off_the_residuals():
 
 
 @pytest.mark.parametrize(
-    ("left_out", "rating"),
+    ("left_out", "mendable", "rating"),
     [
-        ({"range_bias": "It acts on the range, and the survey has no [mounting]."}, "amber"),
-        ({"dropout": "No row of this survey depends on it."}, "green"),
+        ({"range_bias": "It acts on the range, and the survey has no [mounting]."}, True, "amber"),
+        ({"dropout": "No row of this survey depends on it."}, False, "green"),
     ],
 )
-def test_what_could_not_be_judged_is_said_first(left_out, rating):
+def test_what_could_not_be_judged_is_said_first(left_out, mendable, rating):
     "With the reason, and amber where the user could give what is missing"
-    _, rows = facts(gap_document("none", left_out=left_out))
+    _, rows = facts(gap_document("none", left_out=left_out, mendable=[*left_out] * mendable))
     row = rows["Not judged"]
     assert row["rating"] == rating and row["sentence"].startswith("1 of ")
     assert row["items"][0]["text"] in left_out.values()

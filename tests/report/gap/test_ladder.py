@@ -1,7 +1,7 @@
 """The ladder of evidence holds what a reader looks for."""
 
 from mlscorr.effects import EFFECTS
-from mlscorr.report.gap._ladder import ladder
+from mlscorr.report.gap._evidence import ladder
 from tests.beds.gap_documents import gap_document
 
 

@@ -1,6 +1,6 @@
 """The figure of what can be told apart."""
 
-from mlscorr.report.gap._separability import classes_in_order
+from mlscorr.report.gap._evidence import classes_in_order
 from tests.beds.gap_documents import gap_document
 
 

@@ -3,8 +3,8 @@
 import pytest
 
 from mlscorr.report.gap import diagnosis_page
-from mlscorr.report.gap._shrinking import NOTHING_TO_CLOSE, is_within, shrinking, shrunk
 from mlscorr.report.gap._splits import closure_figure
+from mlscorr.report.gap._verdict import NOTHING_TO_CLOSE, is_within, shrinking, shrunk
 from tests.beds.gap_documents import gap_document
 from tests.report.gap.test_verdict import summary
 

@@ -1,12 +1,20 @@
-"""The accuracy that a planned survey will reach along the drive."""
+"""What a planned survey will reach: accuracy along the drive, and how small an error would show."""
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from mlscorr.report.gap._innovations import passes_of
-from mlscorr.report.gap.numbers import numbers
-from mlscorr.report.style import BLUE, GREY, VERMILLION, legend_above, new_figure, styled
-from mlscorr.wording import length_in_words
+from mlscorr.report.gap._rows import DetectableRow, numbers
+from mlscorr.report.style import (
+    BLUE,
+    GREY,
+    VERMILLION,
+    legend_above,
+    mark_handle,
+    new_figure,
+    styled,
+)
+from mlscorr.wording import known, length_in_words
 
 
 def accuracy_sentence(accuracy: dict) -> str:
@@ -59,4 +67,38 @@ def accuracy_figure(document: dict) -> Figure:
     panels[0].set_ylim(bottom=-0.04 * sigma.max())  # of all, after all: it ends their scaling
     panels[0].set_ylabel("Sigma (cm)")
     legend_above(figure, panels[0].get_legend_handles_labels()[0])
+    return figure
+
+
+@styled
+def detectable_figure(rows: list[DetectableRow]) -> Figure:
+    """How small an effect shows, over its usual size; left of one the survey can see it.
+
+    Parameters
+    ----------
+    rows : list of DetectableRow
+        The plainest first; those without a ratio are left out.
+    """
+    rows = [row for row in rows if known(row.ratio)]
+    ratio = np.array([row.ratio for row in rows])
+    figure = new_figure(1.0 + 0.2 * len(rows))
+    panel = figure.add_subplot()
+    low = min(0.5, ratio.min() / 1.6)
+    high = max(2.0, ratio.max() * 1.6)
+    panel.axvspan(low, 1.0, color="#e6f1f8", zorder=0)
+    marks = (("o", BLUE, "Shows at its usual size"), ("X", VERMILLION, "Must be larger to show"))
+    for place, value in enumerate(ratio):
+        mark, color, _ = marks[int(value > 1)]
+        panel.plot([1.0, value], [place] * 2, color="#b8bfc5", linewidth=1.2, zorder=1)
+        panel.plot(value, place, mark, color=color, zorder=3)
+    panel.axvline(1.0, color="black", linewidth=0.9, zorder=2)
+    panel.set_xscale("log")
+    panel.set_xlim(low, high)
+    panel.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    panel.set_yticks(range(len(rows)), [row.title for row in rows])
+    panel.set_ylim(len(rows) - 0.4, -0.6)
+    panel.grid(axis="y", visible=False)
+    panel.tick_params(axis="y", length=0)
+    panel.set_xlabel("Smallest size that shows, over the usual size (logarithmic)")
+    legend_above(figure, [mark_handle(*mark) for mark in marks])
     return figure
