@@ -3,45 +3,14 @@
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from mlscorr.survey import Mounting, Trajectory
+from mlscorr.survey import angles_from_attitude as angles_from_attitude
+from mlscorr.survey import attitude_from_angles as attitude_from_angles
 
 # Roll turns about the body's Y (forward), pitch about X (right), heading about -Z
 BODY_AXES = [1, 0, 2]  # numbers of pitch, roll, heading among roll, pitch, heading; own inverse
-
-
-def attitude_from_angles(roll: ArrayLike, pitch: ArrayLike, heading: ArrayLike) -> Rotation:
-    """Rotation R_P^G from body to map: Rz(-heading) Rx(pitch) Ry(roll).
-
-    Parameters
-    ----------
-    roll, pitch, heading : (n,) array or float
-        Roll right side down, pitch nose up, heading clockwise from grid north. Units: rad.
-
-    >>> attitude_from_angles(0.0, 0.0, np.pi / 2).apply([0.0, 1.0, 0.0]).round(12) + 0.0
-    array([1., 0., 0.])
-    """
-    angles = np.stack(np.broadcast_arrays(-np.asarray(heading), pitch, roll), axis=-1)
-    return Rotation.from_euler("ZXY", angles)
-
-
-def angles_from_attitude(attitude: Rotation) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Roll, pitch and heading of rotations R_P^G.
-
-    Parameters
-    ----------
-    attitude : Rotation
-        n rotations.
-
-    Returns
-    -------
-    roll, pitch, heading : (n,) array
-        Heading in [0, 2 pi). Units: rad.
-    """
-    minus_heading, pitch, roll = np.moveaxis(attitude.as_euler("ZXY"), -1, 0)
-    return roll, pitch, np.mod(-minus_heading, 2 * np.pi)
 
 
 def map_root(attitude: Rotation, angle_sigma: np.ndarray) -> np.ndarray:

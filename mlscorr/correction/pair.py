@@ -2,17 +2,31 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mlscorr.correction._kernel import fill_increments, move_integers, require_times
 from mlscorr.frames import angle_sigma, angles_from_attitude
-from mlscorr.survey import Mounting, PointCloud, Summary, Trajectory
+from mlscorr.survey import (
+    Mounting,
+    PointCloud,
+    Summary,
+    Trajectory,
+    as_cloud,
+    box_distance,
+    is_las,
+    las_record,
+)
 from mlscorr.wording import counted
+
+FARTHEST = 10_000.0  # m; of a point from the trajectory: no mobile scanner reaches a third of it
 
 
 @dataclass(frozen=True, repr=False)
@@ -152,10 +166,99 @@ class Correction(Summary):
         )
         return increments, inside
 
-    def apply(self, cloud: PointCloud) -> PointCloud:
-        """Corrected PointCloud; outside the trajectory the datum alone moves points."""
-        moved, _ = self.increments(cloud.xyz, cloud.gps_time)
-        return PointCloud(np.add(cloud.xyz, moved, out=moved), cloud.gps_time, cloud.intensity)
+    def apply(self, cloud: Any) -> Any:
+        """Correct points by their times; those outside the trajectory are moved by the datum alone.
+
+        Parameters
+        ----------
+        cloud : PointCloud, open3d.t.geometry.PointCloud, (xyz, gps_time) or points of laspy
+            With times in the trajectory's system, places in the map: those of an Open3D cloud
+            count from its attribute ``origin``, if it has one.
+
+        Returns
+        -------
+        as given
+            A new cloud in the form that was given; the one given stays as it is. Coordinates of
+            laspy keep their scale. Warns where points lie outside the trajectory.
+
+        Raises
+        ------
+        ValueError
+            For values that are not finite, and where no point of another form than a PointCloud
+            has a time within the trajectory, or all lie far from it, as about a local origin.
+        TypeError
+            For another form.
+
+        >>> import numpy as np
+        >>> from mlscorr.frames import attitude_from_angles
+        >>> from mlscorr.survey import Trajectory
+        >>> time, zero = np.arange(413200.0, 413204.0), np.zeros(4)
+        >>> path = np.tile([532_000.0, 3_374_000.0, 42.0], (4, 1))
+        >>> recorded = Trajectory(time, path, attitude_from_angles(zero, zero, zero))
+        >>> corrected = replace(recorded, position=path + [0.0, 0.0, 0.5])
+        >>> xyz, gps_time = Correction(recorded, corrected).apply((path[:1], time[:1]))
+        >>> xyz.tolist()
+        [[532000.0, 3374000.0, 42.5]]
+        """
+        if isinstance(cloud, PointCloud):
+            return self._moved(cloud)[0]
+        if is_las(cloud):
+            return self._moved_las(cloud)
+        points, back = as_cloud(cloud)
+        self._require_near(points.xyz)
+        moved, inside = self._moved(points)
+        self._require_inside(np.count_nonzero(~inside), points.gps_time)
+        return back(moved)
+
+    def _moved(self, cloud):
+        """A PointCloud corrected, and which points lie within the trajectory."""
+        moved, inside = self.increments(cloud.xyz, cloud.gps_time)
+        return replace(cloud, xyz=np.add(cloud.xyz, moved, out=moved)), inside
+
+    def _moved_las(self, points):
+        """Points of laspy, corrected in a copy by whole steps of their scale."""
+        copied = deepcopy(points)
+        record = las_record(copied)
+        if len(record) == 0:
+            return copied
+        time = np.asarray(record["gps_time"], float)
+        integers = [np.array(record[name]) for name in "XYZ"]
+        scale = np.asarray(record.scales)
+        offset = np.asarray(record.offsets)
+        ends = [[values.min() for values in integers], [values.max() for values in integers]]
+        self._require_near(np.array(ends) * scale + offset)
+        outside = self.shift_integers(integers, scale, offset, time)
+        self._require_inside(outside, time)
+        for name, values in zip("XYZ", integers, strict=True):
+            record[name] = values
+        return copied
+
+    def _require_near(self, xyz):
+        """Refuse points that no scanner on the trajectory can have measured."""
+        distance = box_distance(xyz, self.recorded.position)
+        if distance > FARTHEST:
+            raise ValueError(
+                f"The points lie {distance / 1000:.0f} km from the trajectory: they are in another "
+                "CRS, or about a local origin. Give them in map coordinates, an Open3D cloud with "
+                "its origin: PointCloud.from_open3d(cloud, origin=...)."
+            )
+
+    def _require_inside(self, outside, gps_time):
+        """Refuse points of which none was measured within the trajectory; warn of some."""
+        if outside == 0 or len(gps_time) == 0:
+            return
+        first, last = self.recorded.gps_time[[0, -1]]
+        sentence = (
+            f"{outside} of {counted(len(gps_time), 'point')} have a gps_time outside the "
+            f"trajectory [{first:.3f}, {last:.3f}] s or in its gaps (first point: "
+            f"{gps_time[0]:.3f} s)."
+        )
+        if outside == len(gps_time):
+            raise ValueError(
+                f"{sentence} Cloud and trajectory may use different time systems: add the constant "
+                "between both to the cloud's times."
+            )
+        warnings.warn(f"{sentence} No correction over time moves them.", stacklevel=3)
 
     def shift_integers(
         self,

@@ -110,16 +110,14 @@ def path_lines(
     values : dict
         One array (n,) of the epochs by its name, which colours the lines and is their attribute.
     """
-    first = np.arange(len(trajectory) - 1)
-    first = first[~np.isin(trajectory.gps_time[:-1], trajectory.gaps[:, 0])]
+    pairs = trajectory.line_pairs
     attributes = {}
     for name, of_epoch in values.items():
-        of_line = (of_epoch[first] + of_epoch[first + 1]) / 2
+        of_line = of_epoch[pairs].mean(axis=1)
         low, high = percentiles(of_line)
         share = np.clip((of_line - low) / max(high - low, np.finfo(float).tiny), 0, 1)
         attributes["colors"] = colour_table("sigma")[np.rint(255 * share).astype(int)] / 255
         attributes[name] = of_line
-    pairs = np.column_stack([first, first + 1])
     return line_geometry(trajectory.position, pairs, origin, attributes)
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import matplotlib
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -110,7 +111,7 @@ def pos_error_figure(estimate: Estimate) -> Figure:
         panel.set_ylabel(f"{AXES[axis]} (m)")
     panels[0].set_title("Correction of the position: corrected − recorded, with 1 sigma")
     panels[-1].set_xlabel(f"Time since gps_time {start:.0f} s (s)")
-    handles = [
+    handles: list[Artist] = [
         Line2D([], [], color=style.BLUE, label="Correction"),
         Patch(**style.BAND, label="1 sigma"),
     ]

@@ -26,11 +26,14 @@ GREY = "#767676"
 BEFORE = ORANGE
 AFTER = BLUE
 BAND: dict[str, Any] = {"facecolor": f"{SKY}59", "edgecolor": "none"}  # of one sigma
-OUTSIDE = {"facecolor": "#f3e9c9", "edgecolor": "none"}  # of what control points hold
-OUTAGE = {"facecolor": "#8fb0dd", "edgecolor": "none"}
+OUTSIDE: dict[str, Any] = {
+    "facecolor": "#f3e9c9",
+    "edgecolor": "none",
+}  # of what control points hold
+OUTAGE: dict[str, Any] = {"facecolor": "#8fb0dd", "edgecolor": "none"}
 STEP: dict[str, Any] = {"color": "#7b4fa3", "linewidth": 0.9, "linestyle": (0, (1, 1.5))}
 SPAN: dict[str, Any] = {"color": "#8a6d00", "linewidth": 0.8, "linestyle": (0, (4, 3))}
-GAP = {"facecolor": "#e3e3e3", "edgecolor": "#9a9a9a", "hatch": "////"}
+GAP: dict[str, Any] = {"facecolor": "#e3e3e3", "edgecolor": "#9a9a9a", "hatch": "////"}
 TRACK: dict[str, Any] = {"color": "#9a9a9a"}
 
 MARKS: dict[str, dict[str, Any]] = {

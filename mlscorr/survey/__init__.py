@@ -3,12 +3,15 @@
 float64, SI units, radians inside; map axes E, N, H; body axes X right, Y forward, Z up.
 """
 
+from mlscorr.survey._angles import angles_from_attitude, attitude_from_angles
+from mlscorr.survey._interchange import as_cloud, box_distance, is_las, las_record
 from mlscorr.survey._open3d import line_geometry
 from mlscorr.survey.clouds import (
     COORDINATE_ROUNDING,
     NOISE_CLASSES,
     WEEK,
     CloudFile,
+    CloudInMemory,
     Correcting,
     PointCloud,
     counted_on,

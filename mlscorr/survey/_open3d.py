@@ -139,9 +139,24 @@ def geometry_columns(geometry: Any, origin: np.ndarray | None) -> tuple[np.ndarr
     return positions + place, attributes
 
 
-def has_origin(geometry: Any) -> bool:
-    """Whether an Open3D geometry says where its origin lies."""
-    return "origin" in getattr(geometry, "point", ())
+def moved_geometry(geometry: Any, xyz: np.ndarray) -> Any:
+    """A tensor cloud with other places, and all else of another, whose memory it shares.
+
+    Parameters
+    ----------
+    geometry : open3d.t.geometry.PointCloud
+    xyz : (n, 3) array
+        About its origin. Units: m.
+    """
+    moved = _open3d().t.geometry.PointCloud()
+    place = np.zeros(3)
+    if "origin" in geometry.point:
+        place = geometry.point["origin"].cpu().numpy()
+    moved.point["positions"] = _tensor(xyz - place)
+    for name in geometry.point:
+        if name != "positions":
+            moved.point[name] = geometry.point[name]
+    return moved
 
 
 def _open3d():

@@ -1,12 +1,22 @@
-"""Points as they pass in chunks, and the files that hold them."""
+"""Points as they pass in chunks, and the files or arrays that hold them."""
 
-from dataclasses import dataclass
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from mlscorr.survey import _open3d
 from mlscorr.survey.columns import Columns
+from mlscorr.wording import counted
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 WEEK = 604_800.0  # s
 COORDINATE_ROUNDING = 0.0003  # m; one sigma of a coordinate at the usual LAS scale of 1 mm
@@ -24,11 +34,137 @@ class PointCloud(Columns):
     gps_time : (n,) array
         In the trajectory's time system. Units: s.
     intensity : (n,) array
+    attributes : mapping
+        Further arrays (n,) or (n, k) by name, as ``classification``; they go where the points go.
     """
 
     xyz: np.ndarray
     gps_time: np.ndarray
     intensity: np.ndarray
+    attributes: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+    @classmethod
+    def from_arrays(
+        cls,
+        xyz: ArrayLike,
+        gps_time: ArrayLike,
+        intensity: ArrayLike | None = None,
+        attributes: Mapping[str, ArrayLike] | None = None,
+    ) -> PointCloud:
+        """Make a cloud of arrays, which are checked and, where their types allow, not copied.
+
+        Parameters
+        ----------
+        xyz : (n, 3) array
+            float64. Units: m.
+        gps_time : (n,) array
+            In the trajectory's time system. Units: s.
+        intensity : (n,) array, optional
+            Zero by default: then targets are found by their edges alone.
+        attributes : mapping, optional
+            Further arrays (n,) or (n, k) by name.
+
+        Returns
+        -------
+        PointCloud
+            Warns where float32 has rounded coordinates by more than the noise of a LAS file.
+
+        Raises
+        ------
+        ValueError
+            For arrays of other shapes or unlike lengths, and values that are not finite.
+
+        >>> import numpy as np
+        >>> from mlscorr.survey import PointCloud
+        >>> PointCloud.from_arrays(np.array([[532_000.0, 3_374_000.0, 42.0]]), [357_700.0])
+        PointCloud(1 rows)
+        """
+        given = np.asarray(xyz)
+        times = np.asarray(gps_time, float)
+        if given.ndim != 2 or given.shape[1] != 3:
+            raise ValueError(f"xyz has the shape {given.shape}: give (n, 3), E, N, H in m.")
+        if intensity is None:
+            intensity = np.zeros(len(given), np.uint16)
+        further = {name: np.asarray(values) for name, values in (attributes or {}).items()}
+        cloud = cls(given.astype(float, copy=False), times, np.asarray(intensity), further)
+        _require_numbers("coordinates", np.isfinite(cloud.xyz).all(axis=1))
+        _require_numbers("a gps_time", np.isfinite(times))
+        _warn_of_rounding(given)
+        return cloud
+
+    def to_open3d(self, origin: ArrayLike | None = None) -> Any:
+        """The cloud as Open3D's tensor geometry, about an origin that travels with it.
+
+        ``gps_time``, ``intensity`` and further attributes share the memory of this cloud.
+
+        Parameters
+        ----------
+        origin : (3,) array, optional
+            From which ``positions`` count, float64; a whole metre near the middle by default. The
+            geometry's attribute ``origin`` has it. Units: m.
+
+        Returns
+        -------
+        open3d.t.geometry.PointCloud
+
+        Raises
+        ------
+        ValueError
+            For an origin that is no place.
+
+        >>> import numpy as np
+        >>> from mlscorr.survey import PointCloud
+        >>> cloud = PointCloud.from_arrays([[532_000.5, 3_374_000.0, 42.0]], [357_700.0])
+        >>> geometry = cloud.to_open3d(origin=[532_000.0, 3_374_000.0, 0.0])
+        >>> geometry.point.positions.numpy().tolist()
+        [[0.5, 0.0, 42.0]]
+        >>> PointCloud.from_open3d(geometry).xyz.tolist()
+        [[532000.5, 3374000.0, 42.0]]
+        """
+        columns = {"gps_time": self.gps_time, "intensity": self.intensity, **self.attributes}
+        place = None if origin is None else np.asarray(origin, float)
+        return _open3d.cloud_geometry(self.xyz, columns, place)
+
+    @classmethod
+    def from_open3d(cls, cloud: Any, origin: ArrayLike | None = None) -> PointCloud:
+        """Make a cloud of Open3D's tensor geometry.
+
+        Parameters
+        ----------
+        cloud : open3d.t.geometry.PointCloud
+            With the point attribute ``gps_time`` (s); ``intensity`` and others are kept.
+        origin : (3,) array, optional
+            From which its positions count; its attribute ``origin`` by default, and without one
+            the positions are taken as map coordinates. Units: m.
+
+        Returns
+        -------
+        PointCloud
+            Warns where float32 has rounded coordinates.
+
+        Raises
+        ------
+        ValueError
+            Without gps_time or positions, and for values that are not finite.
+        """
+        place = None if origin is None else np.asarray(origin, float)
+        xyz, columns = _open3d.geometry_columns(cloud, place)
+        if "gps_time" not in columns:
+            known = ", ".join(columns) or "none"
+            raise ValueError(
+                f"The Open3D cloud of {counted(len(xyz), 'point')} has no point attribute gps_time "
+                f"(it has: {known}): without times nothing tells where the vehicle was. Set "
+                "cloud.point.gps_time to a float64 tensor (n, 1), in s."
+            )
+        _warn_of_rounding(cloud.point["positions"].numpy())
+        times = columns.pop("gps_time")
+        return cls.from_arrays(xyz, times, columns.pop("intensity", None), columns)
+
+    def plot(self) -> Figure:
+        """The cloud from above, coloured by intensity; of many points every k-th."""
+        from mlscorr.survey._figure import cloud_figure
+
+        return cloud_figure(self.xyz, self.intensity)
 
 
 class Correcting(Protocol):
@@ -36,6 +172,31 @@ class Correcting(Protocol):
 
     def apply(self, cloud: PointCloud) -> PointCloud:
         """The PointCloud, corrected."""
+
+
+def _require_numbers(what, is_number):
+    """Refuse points that have something that is not a number."""
+    bad = np.flatnonzero(~is_number)
+    if len(bad):
+        raise ValueError(
+            f"{len(bad)} of {counted(len(is_number), 'point')} have {what} that are not finite "
+            f"(first: point {bad[0]}). Leave them out: nothing places them."
+        )
+
+
+def _warn_of_rounding(xyz):
+    """Warn where float32 coordinates are rounded by more than those of a LAS file."""
+    if xyz.dtype != np.float32 or len(xyz) == 0:
+        return
+    largest = np.abs(xyz).max()
+    step = float(np.spacing(largest))
+    if step > COORDINATE_ROUNDING:
+        warnings.warn(
+            f"Coordinates are float32: at {largest:.0f} m they are rounded to steps of {step:.3g} "
+            f"m, so that up to {step / 2:.3g} m is lost. Give float64, or subtract an origin "
+            "before they become float32.",
+            stacklevel=4,
+        )
 
 
 @dataclass(frozen=True)
@@ -105,6 +266,36 @@ class CloudFile:
             As the file has them. Units: s.
         """
         return self.counted(gps_time) + self.time_constant
+
+
+@dataclass(frozen=True)
+class CloudInMemory(CloudFile):
+    """Points in memory, which stand for a file: ``path`` is the name of what would be written.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+        Two of one name are taken as the same.
+    crs : str, optional
+    """
+
+    cloud: PointCloud | None = field(default=None, compare=False, repr=False)
+    crs: str | None = None
+
+    def chunks(self, size: int, first: int = 0, end: int | None = None) -> Iterator[PointCloud]:
+        """Points in their order, without a copy.
+
+        Parameters
+        ----------
+        size : int
+            Points at a time.
+        first, end : int
+            Numbers of the points at which to start, and to end before.
+        """
+        assert self.cloud is not None
+        end = self.points if end is None else min(end, self.points)
+        for start in range(first, end, size):
+            yield self.cloud[start : min(start + size, end)]
 
 
 def counted_on(gps_time: np.ndarray, new_week: float) -> np.ndarray:

@@ -14,14 +14,13 @@ from scipy.spatial.transform import Rotation
 
 if TYPE_CHECKING:
     import pandas
+
 AXES = ("easting", "northing", "height")
-if TYPE_CHECKING:
-    import pandas
 
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """What dataclasses of arrays (n, ...), tuples of n and Columns have in common.
+    """What dataclasses of arrays (n, ...), tuples of n, mappings of these and Columns share.
 
     Numbers among their fields hold for all rows. Raises ValueError for columns of unlike lengths.
     """
@@ -63,7 +62,9 @@ def check_lengths(record: Any) -> None:
     ------
     ValueError
     """
-    columns = ((field.name, getattr(record, field.name)) for field in fields(record))
+    columns = [(field.name, getattr(record, field.name)) for field in fields(record)]
+    for _, mapping in [pair for pair in columns if isinstance(pair[1], Mapping)]:
+        columns += mapping.items()
     rows = {
         name: 1 if getattr(column, "single", False) else len(column)
         for name, column in columns
@@ -80,6 +81,9 @@ def check_lengths(record: Any) -> None:
 def _joined(columns):
     if isinstance(columns[0], tuple):
         return sum(columns, ())
+    if isinstance(columns[0], Mapping):  # what all of them have
+        shared = [name for name in columns[0] if all(name in others for others in columns)]
+        return {name: np.concatenate([column[name] for column in columns]) for name in shared}
     return np.concatenate(columns)
 
 
@@ -88,6 +92,8 @@ def _selected(column, rows):
         return tuple(np.array(column, object)[rows])
     if isinstance(column, np.ndarray | Columns):
         return column[rows]
+    if isinstance(column, Mapping):
+        return {name: values[rows] for name, values in column.items()}
     return column
 
 
@@ -96,6 +102,9 @@ def _named_columns(record):
     columns = {}
     for field in fields(record):
         value = getattr(record, field.name)
+        if isinstance(value, Mapping):
+            columns |= value
+            continue
         if isinstance(value, Columns):
             nested = _named_columns(value)
         else:

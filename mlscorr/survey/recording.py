@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from mlscorr.survey.clouds import CloudFile
+from mlscorr.survey.clouds import CloudFile, CloudInMemory, PointCloud
 from mlscorr.survey.summary import Summary
 from mlscorr.survey.targets import ControlPoints
 from mlscorr.survey.trajectory import Mounting, Trajectory
@@ -189,6 +190,95 @@ class Survey(Summary):
     is_remounted: bool = False
     beam_origin: np.ndarray | None = None
 
+    @classmethod
+    def from_arrays(
+        cls,
+        clouds: PointCloud | Sequence[PointCloud] | tuple[ArrayLike, ...],
+        trajectory: Trajectory,
+        control: ControlPoints,
+        check: ControlPoints | None = None,
+        mounting: Mounting | None = None,
+        crs: str | None = None,
+        name: str = "arrays",
+        scanner: Scanner | None = None,
+        pos: Pos | None = None,
+        search_radius: float = SEARCH_RADIUS,
+        use_ties: bool = True,
+    ) -> Survey:
+        """Make a survey of what is in memory, without a file.
+
+        Parameters
+        ----------
+        clouds : PointCloud, or a sequence of them
+            Each stands for a file. Or arrays: (xyz, gps_time) or (xyz, gps_time, intensity).
+        trajectory : Trajectory
+        control : ControlPoints
+        check : ControlPoints, optional
+            They take part in no estimate.
+        mounting : Mounting, optional
+            Scanner to body; a correction does without, a calibration does not.
+        crs : str, optional
+            As ``EPSG:32650``.
+        name : str
+        scanner, pos : Scanner, Pos, optional
+            What is assumed of them.
+        search_radius : float
+            How far from its surveyed place a target may lie. Units: m.
+        use_ties : bool
+
+        Returns
+        -------
+        Survey
+            For every command that takes one; ``write`` of a result makes LAZ files of its clouds.
+
+        Raises
+        ------
+        ValueError
+            For clouds without points, of which none was measured within the trajectory, and as
+            ``PointCloud.from_arrays``.
+
+        >>> import numpy as np
+        >>> from mlscorr.survey import ControlPoints, Survey, Trajectory
+        >>> place = np.array([[532_000.0, 3_374_000.0, 42.0], [532_001.0, 3_374_000.0, 42.0]])
+        >>> time = np.array([357_700.0, 357_700.1])
+        >>> path = Trajectory.from_arrays(time, place, np.zeros((2, 3)))
+        >>> control = ControlPoints.from_arrays(["T01"], place[:1], [0.003] * 3, "circle", 0.6)
+        >>> Survey.from_arrays((place, time), path, control).points
+        2
+        """
+        parts = _clouds_of(clouds)
+        nothing = control[[]]
+        files = []
+        for number, cloud in enumerate(parts, start=1):
+            inside = trajectory.segment(cloud.gps_time) >= 0
+            if not inside.any():
+                first, last = trajectory.gps_time[[0, -1]]
+                raise ValueError(
+                    f"None of the {counted(len(cloud), 'point')} of cloud {number} has a gps_time "
+                    f"within the trajectory [{first:.3f}, {last:.3f}] s. Cloud and trajectory may "
+                    "use different time systems: add the constant between both to the times."
+                )
+            stem = name if len(parts) == 1 else f"{name}-{number}"
+            files.append(
+                CloudInMemory(
+                    Path(f"{stem}.laz"), len(cloud), 0.0, "of the trajectory", cloud=cloud, crs=crs
+                )
+            )
+        return cls(
+            name=name,
+            path=Path(name),
+            crs=crs,
+            clouds=tuple(files),
+            trajectory=trajectory,
+            mounting=mounting,
+            control=control,
+            check=nothing if check is None else check,
+            scanner=scanner or Scanner(assumed=("range_noise", "angle_noise")),
+            pos=pos or Pos(assumed=("position_sigma", "attitude_sigma", "correlation_time")),
+            search_radius=search_radius,
+            use_ties=use_ties,
+        )
+
     @cached_property
     def surveyed(self) -> ControlPoints:
         """Control and check points, in this order."""
@@ -351,6 +441,19 @@ class Survey(Summary):
                 "mounting. Give it a survey.toml of each scanner: its files under [cloud] (split "
                 "one with points of several), its [mounting] and its [scanner]."
             )
+
+
+def _clouds_of(clouds):
+    """A list of PointClouds, from one, several or arrays."""
+    if isinstance(clouds, PointCloud):
+        parts = [clouds]
+    elif all(isinstance(part, PointCloud) for part in clouds):
+        parts = list(clouds)
+    else:
+        parts = [PointCloud.from_arrays(*clouds)]
+    if not parts or not all(map(len, parts)):
+        raise ValueError("A survey needs clouds, each with a point at least.")
+    return parts
 
 
 class SurveyFileError(ValueError):

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mlscorr.survey.columns import Columns
 
@@ -39,6 +42,70 @@ class ControlPoints(Columns):
     kind: tuple[str, ...]
     size: np.ndarray
     normal: np.ndarray
+
+    @classmethod
+    def from_arrays(
+        cls,
+        name: Sequence[str],
+        position: ArrayLike,
+        sigma: ArrayLike,
+        kind: str | Sequence[str],
+        size: ArrayLike,
+        normal: ArrayLike | None = None,
+    ) -> ControlPoints:
+        """Make surveyed points of arrays; what all of them share may be given once.
+
+        Parameters
+        ----------
+        name : sequence of n str
+            Each different.
+        position : (n, 3) array
+            E, N, H. Units: m.
+        sigma : (n, 3) or (3,) array
+            One sigma of E, N, H. Units: m.
+        kind : str or sequence of n str
+            One of ``circle``, ``square``, ``hole``, ``checkerboard``, ``board``.
+        size : (n,) array or float
+            Diameter or edge. Units: m.
+        normal : (n, 3) array, optional
+            Unit normals of the targets' planes, where they were surveyed.
+
+        Raises
+        ------
+        ValueError
+            For arrays of unlike lengths, values that are not finite, names that stand twice, and
+            kinds that are none.
+
+        >>> from mlscorr.survey import ControlPoints
+        >>> place = [[532_000.0, 3_374_000.0, 42.0], [532_040.0, 3_374_003.0, 42.1]]
+        >>> ControlPoints.from_arrays(["T01", "T02"], place, [0.003] * 3, "circle", 0.6)
+        ControlPoints(2 rows)
+        """
+        names = tuple(map(str, name))
+        count = len(names)
+        places = np.asarray(position, float).reshape(-1, 3)
+        kinds = (kind,) * count if isinstance(kind, str) else tuple(kind)
+        if normal is None:
+            normals = np.full((count, 3), np.nan)
+        else:
+            normals = np.asarray(normal, float)
+        sigmas = np.array(np.broadcast_to(np.asarray(sigma, float), (count, 3)))
+        sizes = np.array(np.broadcast_to(np.asarray(size, float), count))
+        points = cls(names, places, sigmas, kinds, sizes, normals)
+        values = np.column_stack([places, sigmas, sizes])
+        if bad := [n for n, row in zip(names, values, strict=True) if not np.isfinite(row).all()]:
+            raise ValueError(
+                f"{len(bad)} of {count} surveyed points have a place, sigma or size that is not "
+                f"finite (first: {bad[0]}). Leave them out, or give the numbers."
+            )
+        if twice := [n for n, times in Counter(names).items() if times > 1]:
+            raise ValueError(
+                f"{len(twice)} names stand twice among {count} surveyed points (first: "
+                f"{twice[0]}): give each point a name of its own."
+            )
+        if strange := [k for k in kinds if k not in KINDS]:
+            raise ValueError(f"kind = {strange[0]!r} is none of {', '.join(KINDS)}.")
+        return points
 
     @cached_property
     def _row_of(self):

@@ -5,15 +5,23 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation, Slerp
 
+from mlscorr.survey._angles import angles_from_attitude, attitude_from_angles
+from mlscorr.survey._open3d import line_geometry
 from mlscorr.survey.clouds import WEEK
-from mlscorr.survey.columns import check_lengths
+from mlscorr.survey.columns import AXES, check_lengths, columns_frame
 from mlscorr.survey.summary import Summary
 
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.figure import Figure
+
+ANGLES = ("roll", "pitch", "heading")
 GAP_FACTOR = 10.0  # a step longer than ten median steps is a gap
 SAME_EPOCH = 1.0  # s; closer together, two targets say the same of the POS
 
@@ -74,6 +82,106 @@ class Trajectory(Summary):
                 f"{self.gps_time[np.argmax(steps <= 0)]:.3f} s). Sort the file and remove repeated "
                 "epochs."
             )
+
+    @classmethod
+    def from_arrays(
+        cls,
+        gps_time: ArrayLike,
+        position: ArrayLike,
+        attitude: ArrayLike,
+        position_sigma: ArrayLike | None = None,
+        attitude_sigma: ArrayLike | None = None,
+    ) -> Trajectory:
+        """Make a trajectory of arrays, angles in degrees as in trajectory.csv.
+
+        Parameters
+        ----------
+        gps_time : (n,) array
+            Strictly increasing. Units: s.
+        position : (n, 3) array
+            Easting, northing, height of the navigation centre. Units: m.
+        attitude : (n, 3) array
+            Roll (right side down), pitch (nose up), heading (clockwise from grid north). Units:
+            deg.
+        position_sigma : (n, 3) or (3,) array, optional
+            One sigma of E, N, H. Units: m.
+        attitude_sigma : (n, 3) or (3,) array, optional
+            One sigma of roll, pitch, heading. Units: deg.
+
+        Raises
+        ------
+        ValueError
+            As the class itself does.
+
+        >>> from mlscorr.survey import Trajectory
+        >>> path = [[532_000.0, 3_374_000.0, 42.0], [532_001.0, 3_374_000.0, 42.0]]
+        >>> len(Trajectory.from_arrays([357_700.0, 357_700.1], path, [[0.0, 0.0, 90.0]] * 2))
+        2
+        """
+        time = np.asarray(gps_time, float)
+        angles = np.radians(np.asarray(attitude, float))
+        if angles.shape != (len(time), 3):
+            raise ValueError(
+                f"attitude has the shape {angles.shape}: give ({len(time)}, 3), roll, pitch and "
+                "heading of each epoch in degrees."
+            )
+        if not np.isfinite(angles).all():
+            bad = int((~np.isfinite(angles)).any(axis=1).sum())
+            raise ValueError(
+                f"{bad} of {len(time)} trajectory epochs have an attitude that is not a number."
+            )
+        sigmas = []
+        for sigma, unit in ((position_sigma, 1.0), (attitude_sigma, np.radians(1.0))):
+            rows = None
+            if sigma is not None:
+                of_epoch = np.broadcast_to(np.asarray(sigma, float), (len(time), 3))
+                rows = of_epoch * unit
+            sigmas.append(rows)
+        place = np.asarray(position, float)
+        return cls(time, place, attitude_from_angles(*angles.T), *sigmas)
+
+    def plot(self) -> Figure:
+        """The path from above, with a mark at its start."""
+        from mlscorr.survey._figure import path_figure
+
+        return path_figure(self.position, self.line_pairs)
+
+    def to_open3d(self, origin: ArrayLike | None = None) -> Any:
+        """The path as lines between epochs, broken at its gaps.
+
+        Parameters
+        ----------
+        origin : (3,) array, optional
+            As of ``PointCloud.to_open3d``.
+
+        Returns
+        -------
+        open3d.t.geometry.LineSet
+        """
+        place = None if origin is None else np.asarray(origin, float)
+        return line_geometry(self.position, self.line_pairs, place, {})
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A row for each epoch, angles in degrees, as trajectory.csv; pandas is needed for it."""
+        angles = np.degrees(angles_from_attitude(self.attitude))
+        columns = {"gps_time": self.gps_time}
+        columns |= dict(zip(AXES, self.position.T, strict=True))
+        columns |= dict(zip(ANGLES, angles, strict=True))
+        for names, sigma, unit in (
+            (AXES, self.position_sigma, 1.0),
+            (ANGLES, self.attitude_sigma, np.degrees(1.0)),
+        ):
+            if sigma is not None:
+                parts = zip(names, (sigma * unit).T, strict=True)
+                columns |= {f"sigma_{name}": values for name, values in parts}
+        return columns_frame(columns)
+
+    @property
+    def line_pairs(self) -> np.ndarray:
+        """Numbers (k, 2) of the epochs between which no gap lies."""
+        first = np.arange(len(self) - 1)
+        first = first[~np.isin(self.gps_time[:-1], self.gaps[:, 0])]
+        return np.column_stack([first, first + 1])
 
     def __len__(self) -> int:
         return len(self.gps_time)
@@ -320,6 +428,33 @@ class Mounting:
     boresight: Rotation
     covariance: np.ndarray | None = None
     measured: np.ndarray | None = None
+
+    @classmethod
+    def from_angles(cls, lever_arm: ArrayLike, boresight: ArrayLike) -> Mounting:
+        """Make a mounting of the numbers that survey.toml has.
+
+        Parameters
+        ----------
+        lever_arm : (3,) array
+            Right, forward, up from the navigation centre to the scanner's origin. Units: m.
+        boresight : (3,) array
+            [a, b, c] of R_L^P = Rz(c) Ry(b) Rx(a). Units: deg.
+
+        Raises
+        ------
+        ValueError
+            Unless both are three finite numbers.
+
+        >>> from mlscorr.survey import Mounting
+        >>> Mounting.from_angles([0.1, -0.6, 0.4], [90.0, 0.0, 35.0]).lever_arm.tolist()
+        [0.1, -0.6, 0.4]
+        """
+        arm = np.asarray(lever_arm, float)
+        angles = np.asarray(boresight, float)
+        for name, values, unit in (("lever_arm", arm, "m"), ("boresight", angles, "deg")):
+            if values.shape != (3,) or not np.isfinite(values).all():
+                raise ValueError(f"{name} must be three finite numbers in {unit}, not {values}.")
+        return cls(arm, Rotation.from_euler("xyz", angles, degrees=True))
 
 
 def control_epochs(gps_time: np.ndarray) -> np.ndarray:

@@ -20,7 +20,7 @@ from mlscorr.io.clouds.las_layout import LasLayout, decoding_points, read_record
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.store import open_file
 from mlscorr.io.trajectories import lacks_time
-from mlscorr.survey import CloudFile, PointCloud
+from mlscorr.survey import CloudFile, CloudInMemory, PointCloud
 
 
 def read_chunks(
@@ -53,6 +53,9 @@ def read_chunks(
     ValueError
         For a file that is cut off or damaged.
     """
+    if isinstance(cloud_file, CloudInMemory):
+        yield from cloud_file.chunks(chunk_size, first, end)
+        return
     layout = in_time_order(read_layout(cloud_file.path), cloud_file.new_week)
     scale = layout.scale
     offset = layout.offset
@@ -108,6 +111,13 @@ def read_windows(
     ValueError
         Where points of a long file are not in order of time, or can't be decoded.
     """
+    if isinstance(file, CloudInMemory):
+        for chunk in file.chunks(limit):
+            near = (chunk.gps_time[:, None] >= spans[:, 0]) & (
+                chunk.gps_time[:, None] <= spans[:, 1]
+            )
+            yield chunk[near.any(axis=1)]
+        return
     layout = in_time_order(read_layout(file.path), file.new_week)
     if layout.points <= limit:
         yield from read_chunks(file)

@@ -14,11 +14,11 @@ from mlscorr.io.clouds._copc_writer import CopcWriter
 from mlscorr.io.clouds.las import read_records, records_at
 from mlscorr.io.clouds.las_checks import read_layout, variable_records
 from mlscorr.io.clouds.las_layout import LasLayout
-from mlscorr.io.clouds.las_writer import INTEGER_LIMIT, LasOutput, PlainWriter
+from mlscorr.io.clouds.las_writer import INTEGER_LIMIT, LasOutput, PlainWriter, cloud_writer
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.store import PART, is_remote, open_file, output_file
 from mlscorr.io.trajectories import PLACEHOLDERS
-from mlscorr.survey import CloudFile, Correcting, PointCloud
+from mlscorr.survey import CloudFile, CloudInMemory, Correcting, PointCloud
 
 NAMES = ("sigma_easting", "sigma_northing", "sigma_height")
 UINT16 = 3  # number of the type, ASPRS LAS 1.4 R15, table 24
@@ -76,6 +76,31 @@ class CorrectedPart:
         return outside
 
 
+def _write_points(part, file, target):
+    """Write points in memory, corrected, as a new file; the number of those outside."""
+    if part.sigma is not None:
+        raise ValueError(
+            f"{file.name} stands for points in memory, which are written without the fields of "
+            "sigmas: point_sigma() of the result gives these."
+        )
+    outside = 0
+    with cloud_writer(target, file.cloud.xyz[0], file.crs) as writer:
+        for chunk in file.chunks(SETTINGS.chunk_points):
+            moved = part.correction.apply(chunk)
+            if hasattr(part.correction, "increments"):
+                outside += int(np.count_nonzero(~part.correction.increments(*_places(chunk))[1]))
+            levels = np.clip(np.rint(moved.intensity), 0, UNKNOWN).astype(np.uint16)
+            writer.write(replace(moved, intensity=levels, attributes={}))
+            if part.watch is not None:
+                part.watch(chunk.gps_time, np.zeros(len(chunk), bool))
+    return outside
+
+
+def _places(cloud):
+    """What an increment goes by."""
+    return cloud.xyz, cloud.gps_time
+
+
 def write_parts(parts: Sequence[CorrectedPart], target: str | Path) -> list[int]:
     """Copy a file with corrected coordinates; all else stays as it was, byte for byte.
 
@@ -104,6 +129,8 @@ def write_parts(parts: Sequence[CorrectedPart], target: str | Path) -> list[int]
     OSError
         When the target cannot be written.
     """
+    if isinstance(parts[0].file, CloudInMemory):
+        return [_write_points(part, part.file, target) for part in parts]
     layout = read_layout(parts[0].file.path)
     target = Path(target)
     _check_target(layout.path, target)

@@ -1,0 +1,91 @@
+"""What users hold points in, as a PointCloud, and back: Open3D's tensor clouds and arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from mlscorr.survey import _open3d
+from mlscorr.survey.clouds import PointCloud
+
+
+def as_cloud(points: Any) -> tuple[PointCloud, Callable[[PointCloud], Any]]:
+    """Points as a PointCloud, and a function that puts a moved one into the form they came in.
+
+    Parameters
+    ----------
+    points : PointCloud, open3d.t.geometry.PointCloud, or a pair (xyz, gps_time) of arrays
+
+    Returns
+    -------
+    cloud : PointCloud
+    back : function of a PointCloud
+        Of the same points: only its places are taken.
+
+    Raises
+    ------
+    TypeError
+        For another form.
+    ValueError
+        As ``PointCloud.from_arrays`` and ``from_open3d``.
+    """
+    if isinstance(points, PointCloud):
+        return points, lambda moved: moved
+    if _open3d.is_geometry(points):
+        cloud = PointCloud.from_open3d(points)
+        return cloud, lambda moved: _open3d.moved_geometry(points, moved.xyz)
+    if isinstance(points, tuple | list) and len(points) == 2:
+        cloud = PointCloud.from_arrays(*points)
+        return cloud, lambda moved: (moved.xyz, moved.gps_time)
+    raise TypeError(
+        f"A correction moves a PointCloud, an open3d.t.geometry.PointCloud with gps_time, a pair "
+        f"(xyz, gps_time) of arrays or points of laspy, not {type(points).__name__}."
+    )
+
+
+def is_las(points: Any) -> bool:
+    """Whether a value is a record of points of laspy, or a file that it has read.
+
+    Parameters
+    ----------
+    points : object
+    """
+    return type(points).__module__.startswith("laspy")
+
+
+def las_record(points: Any) -> Any:
+    """The points of laspy within what ``laspy.read`` gives, or as they are.
+
+    Parameters
+    ----------
+    points : laspy.LasData or ScaleAwarePointRecord
+
+    Raises
+    ------
+    ValueError
+        For a point format without times.
+    """
+    record = getattr(points, "points", points)
+    if "gps_time" not in record.point_format.dimension_names:
+        raise ValueError(
+            f"Points of format {record.point_format.id} have no gps_time: without times nothing "
+            "tells where the vehicle was. Export the cloud as format 1, 3 or 6 to 8."
+        )
+    return record
+
+
+def box_distance(xyz: np.ndarray, place: np.ndarray) -> float:
+    """Distance between the boxes about two sets of points (n, 3) and (m, 3). Units: m.
+
+    Parameters
+    ----------
+    xyz, place : (n, 3), (m, 3) array
+        Units: m.
+    """
+    if len(xyz) == 0:
+        return 0.0
+    below = place.min(axis=0) - xyz.max(axis=0)
+    above = xyz.min(axis=0) - place.max(axis=0)
+    return float(np.linalg.norm(np.maximum(0.0, np.maximum(below, above))))
