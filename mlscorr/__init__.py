@@ -1,4 +1,8 @@
-"""Correct mobile laser scans with surveyed targets by least squares collocation."""
+"""Correct mobile laser scans with surveyed targets by least squares collocation.
+
+Commands take a Survey and return a result with ``write``; the stages of ``correct`` stand beside
+it: read_cloud, find_targets, match_targets, find_ties, estimate_pos_error, score.
+"""
 
 import os
 from importlib import import_module
@@ -8,44 +12,77 @@ from mlscorr.compiled_loops import choose_folder
 
 if TYPE_CHECKING:  # what editors and type checkers see of the names that are loaded when used
     from mlscorr import simulate
+    from mlscorr.correction import Correction
+    from mlscorr.io.clouds import read_cloud
     from mlscorr.io.surveys import read_survey
     from mlscorr.pipeline import (
         apply,
         calibrate,
         check,
         compare,
+        compare_results,
         correct,
         diagnose,
         doctor,
+        estimate_pos_error,
         extract,
+        find_targets,
         find_ties,
         init,
+        match_targets,
         plan,
         render,
+        score,
     )
+    from mlscorr.report import show
     from mlscorr.simulate import read_simulator
+    from mlscorr.survey import (
+        ControlPoints,
+        Mounting,
+        PointCloud,
+        Pos,
+        Scanner,
+        Survey,
+        Trajectory,
+    )
 
-__all__ = [
-    "apply",
-    "calibrate",
-    "check",
-    "compare",
-    "correct",
-    "diagnose",
-    "doctor",
-    "extract",
-    "find_ties",
-    "init",
-    "plan",
-    "read_simulator",
-    "read_survey",
-    "render",
-    "simulate",
-]
-_READERS = {
-    "read_simulator": "mlscorr.simulate.simulator_file",
-    "read_survey": "mlscorr.io.surveys.survey_file",
+_HOMES = {
+    "mlscorr.correction": ["Correction"],
+    "mlscorr.io.clouds": ["read_cloud"],
+    "mlscorr.io.surveys": ["read_survey"],
+    "mlscorr.pipeline": [
+        "apply",
+        "calibrate",
+        "check",
+        "compare",
+        "compare_results",
+        "correct",
+        "diagnose",
+        "doctor",
+        "estimate_pos_error",
+        "extract",
+        "find_targets",
+        "find_ties",
+        "init",
+        "match_targets",
+        "plan",
+        "render",
+        "score",
+    ],
+    "mlscorr.report": ["show"],
+    "mlscorr.simulate": ["read_simulator"],
+    "mlscorr.survey": [
+        "ControlPoints",
+        "Mounting",
+        "PointCloud",
+        "Pos",
+        "Scanner",
+        "Survey",
+        "Trajectory",
+    ],
 }
+_HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
+__all__ = [*_HOME_OF, "simulate"]
 
 _HOME = os.path.expanduser("~")
 choose_folder(__path__[0], _HOME, os.environ.get("XDG_CACHE_HOME", os.path.join(_HOME, ".cache")))
@@ -55,10 +92,14 @@ def __getattr__(name: str) -> Any:
     """Load what is asked for, and the libraries it needs, only then."""
     if name == "simulate":  # the package: mlscorr.simulate.simulate(scenario, rng)
         return import_module("mlscorr.simulate")
-    if name in __all__:
-        return getattr(import_module(_READERS.get(name, "mlscorr.pipeline")), name)
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("mlscorr")
+    if name in _HOME_OF:
+        return getattr(import_module(_HOME_OF[name]), name)
     raise AttributeError(f"module 'mlscorr' has no attribute '{name}'")
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted([*__all__, "__version__"])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -21,8 +20,8 @@ from mlscorr.survey import (
     Trajectory,
     as_cloud,
     box_distance,
+    copied_las,
     is_las,
-    las_record,
 )
 from mlscorr.wording import counted
 
@@ -217,8 +216,7 @@ class Correction(Summary):
 
     def _moved_las(self, points):
         """Points of laspy, corrected in a copy by whole steps of their scale."""
-        copied = deepcopy(points)
-        record = las_record(copied)
+        copied, record = copied_las(points)
         if len(record) == 0:
             return copied
         time = np.asarray(record["gps_time"], float)

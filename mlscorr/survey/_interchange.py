@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import deepcopy
 from typing import Any
 
 import numpy as np
@@ -55,8 +56,8 @@ def is_las(points: Any) -> bool:
     return type(points).__module__.startswith("laspy")
 
 
-def las_record(points: Any) -> Any:
-    """The points of laspy within what ``laspy.read`` gives, or as they are.
+def copied_las(points: Any) -> tuple[Any, Any]:
+    """A copy of points of laspy, and the record within it.
 
     Parameters
     ----------
@@ -67,13 +68,17 @@ def las_record(points: Any) -> Any:
     ValueError
         For a point format without times.
     """
-    record = getattr(points, "points", points)
-    if "gps_time" not in record.point_format.dimension_names:
+    given = getattr(points, "points", points)
+    point_format = given.point_format
+    if "gps_time" not in point_format.dimension_names:
         raise ValueError(
-            f"Points of format {record.point_format.id} have no gps_time: without times nothing "
-            "tells where the vehicle was. Export the cloud as format 1, 3 or 6 to 8."
+            f"Points of format {point_format.id} have no gps_time: without times nothing tells "
+            "where the vehicle was. Export the cloud as format 1, 3 or 6 to 8."
         )
-    return record
+    record = type(given)(given.array.copy(), point_format, given.scales, given.offsets)
+    if given is points:
+        return record, record
+    return type(points)(deepcopy(points.header), record), record
 
 
 def box_distance(xyz: np.ndarray, place: np.ndarray) -> float:

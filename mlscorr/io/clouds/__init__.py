@@ -18,6 +18,7 @@ from mlscorr.io.clouds.las import (
     count_sources,
     counted_noise,
     read_chunks,
+    read_cloud,
     read_windows,
     sample_gps_times,
     sha256,

@@ -5,7 +5,7 @@ beside it (they waited on the same cores, and its single-threaded coders hold Py
 """
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -18,7 +18,7 @@ from mlscorr.io.clouds._time_order import in_time_order
 from mlscorr.io.clouds.las_checks import read_layout
 from mlscorr.io.clouds.las_layout import LasLayout, decoding_points, read_records
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.store import open_file
+from mlscorr.io.store import as_path, open_file
 from mlscorr.io.trajectories import lacks_time
 from mlscorr.survey import CloudFile, CloudInMemory, PointCloud
 
@@ -84,6 +84,71 @@ def read_chunks(
         if first > 0 or end not in (None, layout.points):
             part = (first, end or layout.points)
         count.add(cloud_file, part, flagged, read)
+
+
+def read_cloud(
+    file: CloudFile | str | Path,
+    attributes: Sequence[str] = (),
+    chunk_points: int = SETTINGS.chunk_points,
+) -> Iterator[PointCloud]:
+    """Read the points of a cloud chunk by chunk, all of them, in the order of the file.
+
+    Parameters
+    ----------
+    file : CloudFile or path
+        One of ``survey.clouds``: its times come in the trajectory's system. Of a path of a LAS or
+        LAZ file they come as the file has them.
+    attributes : sequence of str
+        Names of further dimensions, as laspy calls them, as ``classification``.
+    chunk_points : int
+        Points at a time.
+
+    Yields
+    ------
+    PointCloud
+
+    Raises
+    ------
+    ValueError
+        For a file that is cut off, damaged or without times, and a dimension that it has not.
+    OSError
+        When reading fails.
+
+    >>> import mlscorr, numpy as np, tempfile
+    >>> from mlscorr.simulate import Scenario, simulate
+    >>> folder = tempfile.mkdtemp()
+    >>> short = Scenario(
+    ...     drive={"duration": 8.0},
+    ...     targets={"control": 4, "check": 1},
+    ...     scanner=[{"lines_per_second": 75, "points_per_line": 400}],
+    ... )
+    >>> simulate(short, np.random.default_rng(1)).write(folder)
+    >>> survey = mlscorr.read_survey(folder)
+    >>> clouds = mlscorr.read_cloud(survey.clouds[0], attributes=["return_number"])
+    >>> sum(len(cloud) for cloud in clouds) == survey.points
+    True
+    """
+    if isinstance(file, CloudInMemory):
+        yield from file.chunks(chunk_points)
+        return
+    if not isinstance(file, CloudFile):
+        layout = read_layout(as_path(file))
+        file = CloudFile(layout.path, layout.points, layout.time_offset, "of the file")
+    else:
+        layout = read_layout(file.path)
+    for records in read_records(layout, chunk_points):
+        rows = file.rows(records["point_source_id"])
+        own = records[rows]
+        xyz = np.empty((len(own), 3))
+        for axis, name in enumerate("XYZ"):
+            np.multiply(own[name], layout.scale[axis], out=xyz[:, axis])
+        xyz += layout.offset
+        yield PointCloud(
+            xyz,
+            file.trajectory_time(own["gps_time"]) + 0.0,  # of its own memory: records are reused
+            own["intensity"].copy(),
+            {name: layout.dimension(records, name)[rows] for name in attributes},
+        )
 
 
 def read_windows(

@@ -20,7 +20,7 @@ from typing import Any, BinaryIO
 
 import lazrs
 import numpy as np
-from laspy import PointFormat
+from laspy import PackedPointRecord, PointFormat
 
 from mlscorr.io.store import open_file
 from mlscorr.io.trajectories import ADJUSTMENT
@@ -158,6 +158,37 @@ class LasLayout:
         kinds, starts = zip(*(fields[name][:2] for name in names), strict=True)
         form: Any = {"names": names, "formats": kinds, "offsets": starts}
         return np.dtype(form | {"itemsize": self.record_length})
+
+    def dimension(self, records: np.ndarray, name: str) -> np.ndarray:
+        """A dimension (n,) of points by its name in laspy, of its own memory.
+
+        Parameters
+        ----------
+        records : (n,) structured array
+            Contiguous, as read_records gives them.
+        name : str
+            As ``classification``, ``return_number`` or ``scan_angle``.
+
+        Raises
+        ------
+        ValueError
+            Where points of this format have none of that name.
+        """
+        point_format = PointFormat(self.point_format)
+        known = list(point_format.dimension_names)
+        if name not in known:
+            raise ValueError(
+                f"{self.path} has no dimension {name!r}: points of format {self.point_format} have "
+                f"{', '.join(known)}."
+            )
+        kinds = point_format.dtype().fields
+        form: Any = {
+            "names": list(kinds),
+            "formats": [kind[0] for kind in kinds.values()],
+            "offsets": [kind[1] for kind in kinds.values()],
+        }
+        whole = np.dtype(form | {"itemsize": self.record_length})
+        return np.array(PackedPointRecord(records.view(whole), point_format)[name])
 
     def is_noise(self, records: np.ndarray, classes: Collection[int]) -> np.ndarray:
         """Which points are withheld or of some classes: (n,) bool.
