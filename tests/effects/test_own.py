@@ -117,13 +117,13 @@ def test_a_simulator_whose_effect_moves_everything_is_refused(tmp_path):
     g = geometry(3, targets=6, patches=60)
     with pytest.raises(ValueError, match=r"everything of 0\.1 moves points by 1e\+04 m"):
         expected(g.rows, g.survey, [kind(0.1)])
-    assert "Is its unit right" in signatures(g.rows, g.survey, [kind])[1]["everything"]
+    (why,) = signatures(g.rows, g.survey, [kind])[1].values()
+    assert why.key == "not usable" and "Is its unit right" in why.values["why"]
 
 
 @pytest.mark.parametrize(
     ("name", "body", "said"),
     [
-        ("nothing", "np.zeros(3)", "No row of this survey depends on it"),
         ("everything", "np.array([0.0, 0.0, 1e5])", "Is its unit right"),
         ("nan", "np.array([0.0, 0.0, np.nan])", "not a number"),
         ("raises", "value.speed", "AttributeError"),
@@ -131,11 +131,19 @@ def test_a_simulator_whose_effect_moves_everything_is_refused(tmp_path):
     ],
 )
 def test_an_effect_that_cannot_be_applied_is_left_out(tmp_path, name, body, said):
-    "It changes nothing, everything, into no numbers, or raises: the reason is said"
+    "It changes everything, into no numbers, or raises: the reason is said"
     file = written(tmp_path, name, body)
     kinds = register_file(file)
     g = geometry(3, targets=6, patches=10)
     with np.errstate(invalid="ignore"):
         signs, left_out = signatures(g.rows, g.survey, kinds)
     assert signs == ()
-    assert said in left_out[name].values["why"]
+    assert left_out[name].key == "not usable" and said in left_out[name].values["why"]
+
+
+def test_an_effect_that_changes_nothing_is_left_out(tmp_path):
+    "No row of a survey depends on it"
+    kinds = register_file(written(tmp_path, "nothing", "np.zeros(3)"))
+    g = geometry(3, targets=6, patches=10)
+    signs, left_out = signatures(g.rows, g.survey, kinds)
+    assert signs == () and left_out["nothing"].key == "no row"
