@@ -9,8 +9,7 @@ from scipy.optimize import brentq
 
 from mlscorr.frames import attitude_from_angles
 from mlscorr.simulate.drive._pace import Pace
-from mlscorr.simulate.drive._path import draw
-from mlscorr.simulate.drive._recorded_path import course, read_path
+from mlscorr.simulate.drive._path import course, draw, read_path
 from mlscorr.simulate.scenario import Scenario
 from mlscorr.simulate.scene import CentreLine, line_along, line_on_mesh, section, winding_line
 from mlscorr.simulate.settings import SETTINGS
