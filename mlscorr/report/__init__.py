@@ -12,11 +12,10 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
         "correction_page": ["write_report"],
         "correction_report": ["CorrectionReport", "Coverage", "FileRow"],
         "figures": ["correction_figures", "write_pictures"],
-        "headline": ["RATINGS", "capped", "first_screen", "statements_section"],
+        "headline": ["RATINGS", "StatementRow", "capped", "first_screen", "statements_section"],
         "project_page": ["write_project"],
-        "_statement": ["StatementRow"],
         "style": ["draw"],
         "target_figures": ["write_contact_sheet"],
-        "tie_words": ["tie_sentences"],
+        "tables": ["tie_sentences"],
     },
 )

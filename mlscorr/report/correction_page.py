@@ -15,7 +15,6 @@ from mlscorr.report.headline import statements, statements_section
 from mlscorr.report.pages import Page, data_uri, drawn
 from mlscorr.report.settings import SETTINGS
 from mlscorr.report.target_figures import target_drawings
-from mlscorr.report.tie_words import tie_sentences
 from mlscorr.survey import Survey
 from mlscorr.targets import FittedTarget
 from mlscorr.wording import number, thousands
@@ -94,7 +93,7 @@ def _content(survey, correction, report, ties):
         "report": report,
         **statements_section(statements(report)),
         "facts": key_figures(correction, report),
-        "tie_sentences": tie_sentences(report.ties, report.points("control").scored),
+        "tie_sentences": tables.tie_sentences(report.ties, report.points("control").scored),
         "tie_pairs": _largest(report.ties),
         "rmse_rows": tables.rmse_rows(report),
         "statistics": tables.statistics_rows(report),

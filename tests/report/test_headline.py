@@ -12,12 +12,14 @@ from mlscorr.evaluate import DatumDifference, TargetRow
 from mlscorr.report import first_screen
 from mlscorr.report.headline import headline, statements
 from mlscorr.survey import Assumption
-from tests.beds.reports import START, drive, fabricate, page, report_of, words
+from tests.beds.reports import START, because, drive, fabricate, page, report_of, words
 
 
 def lost(name, role="check", scanned=True, number=None):
     "A surveyed point that was not observed"
-    return TargetRow.unobserved(name, number, role, np.zeros(3), f"{name} is hidden.", scanned)
+    return TargetRow.unobserved(
+        name, number, role, np.zeros(3), because(f"{name} is hidden."), scanned
+    )
 
 
 def test_all_that_was_seen_and_held_is_said_plainly():
@@ -89,7 +91,7 @@ def test_what_was_found_half_a_metre_off_is_not_said_to_be_unseen():
     seen = {"scanned": True, "gps_time": 413_200.0}
     reason = "T40 lies 0.50 m from where the observation says."
     rows = [
-        TargetRow.unobserved(name, 1, role, np.zeros(3), reason, **seen)
+        TargetRow.unobserved(name, 1, role, np.zeros(3), because(reason), **seen)
         for name, role in (("T40", "control"), ("C40", "check"))
     ]
     report = replace(report, targets=[*report.targets, *rows])

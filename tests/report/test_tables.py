@@ -8,7 +8,7 @@ import pytest
 from mlscorr.estimate import Support
 from mlscorr.evaluate import TargetRow
 from mlscorr.report import tables
-from tests.beds.reports import drive, fabricate
+from tests.beds.reports import because, drive, fabricate
 
 ROLES = ("control", "check")
 
@@ -21,7 +21,9 @@ def held(report):
 def test_no_factor_is_boasted_of_where_the_cloud_may_be_as_far_off_as_it_was():
     "An extrapolated part, a missing check point or points left as they were take it away"
     report = held(fabricate(drive())[2])
-    lost = TargetRow.unobserved("C9", None, "check", np.zeros(3), "No target is left for it.")
+    lost = TargetRow.unobserved(
+        "C9", None, "check", np.zeros(3), because("No target is left for it.")
+    )
     untouched = replace(report.coverage, points_outside_trajectory=7)
     assert "times closer" in tables.verdict(report)[0][0]
     for other in (
@@ -105,7 +107,9 @@ def test_statistics_stand_in_the_order_of_their_heads():
 def test_check_points_that_were_not_seen_are_not_said_to_be_none():
     "A surveyed one without an observation, none that was surveyed, and no surveyed point at all"
     report = fabricate(drive(), checks=False)[2]
-    lost = TargetRow.unobserved("C9", None, "check", np.zeros(3), "No target is left for it.")
+    lost = TargetRow.unobserved(
+        "C9", None, "check", np.zeros(3), because("No target is left for it.")
+    )
     seen = tables.verdict(replace(report, targets=[*report.targets, lost]))[0][1]
     assert seen.startswith("No check point was seen. Control points, each left out in turn")
     assert tables.verdict(report)[0][1].startswith("There are no check points. Control points,")

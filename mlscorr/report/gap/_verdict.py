@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 from mlscorr.effects import family, lowered, meaning, title
 from mlscorr.gap import no_cause
-from mlscorr.report.assumed import has_assumed_sigma
 from mlscorr.report.gap._labels import place_of, sentences_of
 from mlscorr.report.gap._shrinking import Fact, is_closed, is_within, shrinking
+from mlscorr.report.headline import has_assumed_sigma
 from mlscorr.wording import DASH, joined, known, size, thousands
 
 CERTAINTY = (  # probability from which on one says so
