@@ -160,7 +160,7 @@ class TargetRow:
     ) -> TargetRow:
         """The row of a surveyed point that was not observed, or has an observation refused then."""
         nan = np.full(3, np.nan)
-        unknown = dict.fromkeys(VECTORS[1:], nan)
+        unknown: dict[str, Any] = dict.fromkeys(VECTORS[1:], nan)
         start = name, pass_number, gps_time, role, surveyed
         return cls(*start, **unknown, used=False, why=why, scanned=scanned)
 

@@ -116,16 +116,18 @@ def _tilt(size, sigma, **net):
 
 def _other_clock(file, lag, later, beside, shifted, samples):
     """Points lie about the vehicle `later` s after their times; beside it at these."""
+    order = "earlier"
+    side = "after"
+    clocks = "cloud seems to be in UTC, the trajectory in GPS time"
     if later < 0:
-        order, side, behind, ahead = "later", "before", "trajectory", "cloud"
-    else:
-        order, side, behind, ahead = "earlier", "after", "cloud", "trajectory"
+        order = "later"
+        side = "before"
+        clocks = "trajectory seems to be in UTC, the cloud in GPS time"
     return (
         f"The times of {file} are {lag} s {order} than the trajectory's: its points lie "
         f"{beside:.0f} m beside the vehicle, and {shifted:.0f} m beside where it is {lag} s {side} "
-        f"(horizontal medians of {samples} samples). The {behind} seems to be in UTC, the {ahead} "
-        f"in GPS time: export both in GPS time, or add {-later} to trajectory.time_constant (s) in "
-        "survey.toml."
+        f"(horizontal medians of {samples} samples). The {clocks}: export both in GPS time, or add "
+        f"{-later} to trajectory.time_constant (s) in survey.toml."
     )
 
 

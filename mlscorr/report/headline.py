@@ -17,12 +17,12 @@ from mlscorr.estimate import SETTINGS as ESTIMATE
 from mlscorr.evaluate import SEEN_BY_OTHERS, PointCounts, reason_in_words
 from mlscorr.report.correction_report import CorrectionReport
 from mlscorr.report.settings import SETTINGS
+from mlscorr.report.tables import AXES
 from mlscorr.report.wording import NAMED, assumed_in_words, in_words, stretch_in_words
 from mlscorr.survey import Severity, Statement
 
 RATINGS = ("green", "amber", "red")  # as it should be; mind it; not whole, or worse than before
 SEVERITIES: tuple[Severity, ...] = ("note", "warning", "fault")  # of statements, in this order
-AXES = ("E", "N", "H")
 SIGMAS = ("pos.position_sigma", "pos.attitude_sigma")
 
 
@@ -219,7 +219,7 @@ def _points_moved(report):
         "extrapolated": coverage.points_extrapolated,
         "left": coverage.points_outside_trajectory,
     }
-    severity: Severity = "note"
+    severity = "note"
     if values["left"] or not values["held"]:
         severity = "fault"
     return StatementRow.of("Points", Statement("points", severity, values))
@@ -308,7 +308,7 @@ def _extrapolated(report):
     share = report.coverage.share_extrapolated
     largest = max(stretch.sigma for stretch in weak)
     after = report.judgement[1]
-    severity: Severity = "warning"
+    severity = "warning"
     if after is not None and largest <= after.maximum[4] and share < 1:
         severity = "note"
     values = {

@@ -11,6 +11,7 @@ from mlscorr.report.correction_report import CorrectionReport
 from mlscorr.report.wording import in_words
 from mlscorr.survey import Statement
 
+AXES = ("E", "N", "H")
 QUANTITIES = ("Easting", "Northing", "Height (vertical)", "Horizontal distance", "3D distance")
 
 

@@ -5,7 +5,7 @@ import json
 import numpy as np
 
 from mlscorr.evaluate import TargetRow
-from mlscorr.report._viewer import thin_evenly, viewer_data
+from mlscorr.report.cloud import thin_evenly, viewer_data
 from tests.beds.reports import because
 from tests.beds.street_of_points import ORIGIN, shifted, street, target, unpacked
 

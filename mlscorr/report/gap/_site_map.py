@@ -7,9 +7,17 @@ from matplotlib.lines import Line2D
 from mlscorr.report.gap._innovations import channel_style
 from mlscorr.report.gap._settings import SETTINGS
 from mlscorr.report.gap.numbers import numbers
-from mlscorr.report.map_frame import corners, frame, map_panels
+from mlscorr.report.maps import (
+    NEXT,
+    NEXT_WORDS,
+    WORDS,
+    corners,
+    frame,
+    map_panels,
+    mark_places,
+    write_names,
+)
 from mlscorr.report.style import GREY, MARKS, TRACK, legend_above, mark_handle, styled
-from mlscorr.report.target_map import NEXT, NEXT_WORDS, WORDS, mark_places, write_names
 
 
 @styled

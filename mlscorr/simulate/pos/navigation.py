@@ -329,7 +329,9 @@ def aligned_poses(trajectory: Trajectory, gps_time: np.ndarray) -> tuple[np.ndar
 def _way(elapsed, velocity, nose):
     """Displacement (n, 3) from the edge of a pass with a velocity (3,) there. Units: m."""
     speed = np.linalg.norm(velocity)
-    course = velocity / speed if speed > 0.5 else nose  # a standing vehicle has no course
+    course = nose
+    if speed > 0.5:  # a standing vehicle has no course
+        course = velocity / speed
     fine = np.linspace(0.0, elapsed[np.argmax(np.abs(elapsed))], 4001)
     faster = (
         speed + SETTINGS.aligning_speed * np.sin(np.pi * fine / SETTINGS.aligning_speed_period) ** 2
@@ -337,7 +339,9 @@ def _way(elapsed, velocity, nose):
     moving = faster[:, None] * _turned(fine).apply(course)
     steps = (moving[1:] + moving[:-1]) / 2 * np.diff(fine)[:, None]
     way = np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
-    return CubicSpline(*((fine, way) if fine[-1] > 0 else (fine[::-1], way[::-1])))(elapsed)
+    if fine[-1] > 0:
+        return CubicSpline(fine, way)(elapsed)
+    return CubicSpline(fine[::-1], way[::-1])(elapsed)
 
 
 def _turned(elapsed):

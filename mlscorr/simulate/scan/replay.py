@@ -276,7 +276,9 @@ def without(
     effects = [effect for effect in effects if effect.stage == stage]
     true = recorded
     nothing: Any = {effect.name: None for effect in effects}
-    for _ in range(2 if effects else 0):
+    if not effects:
+        return recorded
+    for _ in range(2):
         true = take_off(recorded, true, apply_effects(effects, stage, true, reference, nothing))
     return true
 

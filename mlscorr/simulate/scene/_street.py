@@ -195,8 +195,11 @@ class Street:
                 front = self._front(side, s, s + width, rng.uniform(*FRONTS.setback))
                 if self._is_clear(front):
                     houses.append(front)
+                step = width
                 gap = rng.uniform(*FRONTS.gap)
-                s += width + (gap if rng.random() < self.scenario.gaps else 0.0)
+                if rng.random() < self.scenario.gaps:
+                    step += gap
+                s += step
         return houses
 
     def _front(self, side, start, end, setback):
@@ -226,7 +229,9 @@ class Street:
         """Ground and houses."""
         rng = self._house_rng
         low_high = self.scenario.house_height
-        pieces = [self._ground(), *(self._markings() if self.scenario.markings else ())]
+        pieces = [self._ground()]
+        if self.scenario.markings:
+            pieces += self._markings()
         for front in self.houses:
             inward = unit(front.side * np.cross(front.far - front.near, UP))
             height = rng.uniform(*low_high)

@@ -78,8 +78,10 @@ def _yaw(scanners):
     turns = []
     for scanner in scanners:
         across = Rotation.from_euler("xyz", scanner.boresight, degrees=True).apply(UP)
-        level = np.hypot(across[0], across[1]) < 0.5
-        turns.append(0.0 if level else np.arctan(-across[0] / across[1]) if across[1] else 0.0)
+        turn = 0.0
+        if np.hypot(across[0], across[1]) >= 0.5 and across[1]:
+            turn = np.arctan(-across[0] / across[1])
+        turns.append(turn)
     return float(np.mean(turns))
 
 

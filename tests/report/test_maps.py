@@ -7,7 +7,7 @@ import numpy as np
 
 from mlscorr.estimate import NextControl
 from mlscorr.evaluate import TargetRow
-from mlscorr.report.target_map import map_figure
+from mlscorr.report.maps import map_figure
 from tests.beds.reports import because, drive, fabricate
 
 
