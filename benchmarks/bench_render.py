@@ -18,9 +18,9 @@ from rich.table import Table
 from mlscorr.frames import attitude_from_angles as attitude
 from mlscorr.io import SETTINGS
 from mlscorr.report.render import draw
-from mlscorr.report.render._camera import Camera
 from mlscorr.report.render._sheet import Sheet
 from mlscorr.report.render._views import PictureOptions, View
+from mlscorr.report.render.view import Camera
 from mlscorr.survey import ControlPoints, PointCloud, Survey, Trajectory
 
 CORNER = np.array([532_000.0, 3_374_000.0, 40.0])  # UTM

@@ -46,10 +46,9 @@ SIMULATOR = (  # floors inside simulate; its rooms on one floor do not know each
     ("settings", "vehicle", "scenario", "columns"),
     ("scene",),
     ("drive", "pos", "scan"),
-    ("recording", "scenario_file", "simulator_file"),
+    ("recording", "simulator_file"),
     ("survey",),
-    ("displacement", "_random_survey"),
-    ("_mechanisms",),
+    ("_mechanisms", "_random_survey"),
 )
 SIMULATOR_FLOOR = {room: number for number, rooms in enumerate(SIMULATOR) for room in rooms}
 MODULES = sorted(

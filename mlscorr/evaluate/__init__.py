@@ -1,19 +1,18 @@
 """What a correction is worth.
 
 - rows: typed rows of report.json: statistics, scores, targets
-- scores: misclosures before and after a correction, and the accuracy that follows
-- target_rows: one row for every surveyed point and pass
-- model: what the estimate says of itself
-- datum, beams: sentences on control and clouds that belong to something else
+- scores: misclosures before and after a correction, and a row for every surveyed point and pass
+- model: what the estimate says of itself, and of what two passes both saw
+- datum, beams: control and clouds that belong to something else
 - accuracy: the ASPRS standard
 - quality: gates that make a command fail
+- wording: the sentences on all of it
 """
 
 from mlscorr.evaluate.beams import BeamCheck, outside_warnings
 from mlscorr.evaluate.datum import DatumDifference, datum_differences
-from mlscorr.evaluate.model import largest_sigma, model_section
+from mlscorr.evaluate.model import largest_sigma, misfit, misfit_section, model_section, tie_section
 from mlscorr.evaluate.quality import Gate, failures, read_gate
 from mlscorr.evaluate.rows import SEEN_BY_OTHERS, PointCounts, Score, Statistics, TargetRow
-from mlscorr.evaluate.scores import accuracy, misclosures, score
-from mlscorr.evaluate.target_rows import surveyed_rows, unseen_rows
-from mlscorr.evaluate.ties import misfit, misfit_section, tie_section
+from mlscorr.evaluate.scores import accuracy, misclosures, score, surveyed_rows, unseen_rows
+from mlscorr.evaluate.wording import reason_in_words

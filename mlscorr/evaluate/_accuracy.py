@@ -6,10 +6,14 @@ them, and for points twice as accurate as the product.
 """
 
 import math
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
 from mlscorr.evaluate._settings import SETTINGS
+from mlscorr.evaluate.wording import ACCURACY
+from mlscorr.survey import Statement
 
 STANDARD = "ASPRS Positional Accuracy Standards for Digital Geospatial Data, Edition 2 (2023)"
 AXES = ("horizontal", "vertical")
@@ -17,7 +21,7 @@ AXES = ("horizontal", "vertical")
 
 def positional_accuracy(
     residuals: np.ndarray, survey_sigma: np.ndarray, points: int, based_on: str | None = "check"
-) -> dict[str, object]:
+) -> dict[str, Any]:
     """Accuracy of a product from what remains at surveyed points, as report.json has it.
 
     RMSE_H and RMSE_V of the product join those of its fit to the points and those of the points:
@@ -63,7 +67,8 @@ def positional_accuracy(
         "class_vertical_cm": _class(both["rmse_vertical"]),
         "conformant": based_on == "check" and points >= SETTINGS.check_points,
     }
-    return {**accuracy, "statement": _statement(accuracy)}
+    sentences = [statement.sentence(ACCURACY) for statement in accuracy_statements(accuracy)]
+    return {**accuracy, "statement": sentences}
 
 
 def _rms(values, axes):
@@ -86,54 +91,36 @@ def _class(rmse):
     return max(1, math.ceil(round(100 * rmse, 6)))
 
 
-def _statement(accuracy):
-    """The accuracy in sentences, what is missing to a test by the standard before the classes."""
-    if accuracy["based_on"] is None:
-        return [
-            "Not determined: no check point was scored, and too few control points to leave one "
-            "out in turn."
-        ]
-    return [_test(accuracy), *(_classes(accuracy, axis) for axis in AXES), *_doubts(accuracy)]
+def accuracy_statements(accuracy: dict[str, Any]) -> Iterator[Statement]:
+    """What the sentences on an accuracy say: what is missing to a test before the classes.
 
-
-def _test(accuracy):
+    Parameters
+    ----------
+    accuracy : dict
+        As positional_accuracy gives it.
+    """
     points = accuracy["points"]
-    plural = "point was" if points == 1 else "points were"
+    if accuracy["based_on"] is None:
+        yield Statement("not determined")
+        return
     if accuracy["based_on"] != "check":
-        return (
-            f"No check point was scored. {points} control {plural} left out in turn and predicted "
-            "from the others: an estimate of the accuracy, and not a conformant test, as these "
-            "points took part in the correction."
-        )
-    if points < SETTINGS.check_points:
-        return (
-            f"The standard calls for at least {SETTINGS.check_points} check points and {points} "
-            f"{plural} used: fewer than {SETTINGS.check_points} check points are not a conformant "
-            "test."
-        )
-    return f"This data set was tested with {points} independent check points."
-
-
-def _classes(accuracy, axis):
-    rmse = accuracy[f"rmse_{axis}"]
-    name = f"RMSE_{axis[0].upper()}"
-    if accuracy["conformant"]:
-        tested = "It meets"
+        yield Statement("left out", values={"points": points})
+    elif points < SETTINGS.check_points:
+        yield Statement("too few", values={"points": points, "least": SETTINGS.check_points})
     else:
-        tested = "It would meet"
-    return (
-        f"{tested} the {accuracy[f'class_{axis}_cm']}-cm {axis} accuracy class: {name} is "
-        f"{100 * rmse:.1f} cm ({100 * accuracy['fit'][f'rmse_{axis}']:.1f} cm fit to the points, "
-        f"{100 * accuracy['survey'][f'rmse_{axis}']:.1f} cm survey of the points)."
-    )
-
-
-def _doubts(accuracy):
-    """Where the surveyed points aren't accurate enough to test such a product."""
+        yield Statement("tested", values={"points": points})
+    for axis in AXES:
+        values = {
+            "axis": axis,
+            "size": accuracy[f"class_{axis}_cm"],
+            "is_conformant": accuracy["conformant"],
+            "rmse": accuracy[f"rmse_{axis}"],
+            "fit": accuracy["fit"][f"rmse_{axis}"],
+            "survey": accuracy["survey"][f"rmse_{axis}"],
+        }
+        yield Statement("class", values=values)
     for axis in AXES:
         survey, product = (accuracy[part][f"rmse_{axis}"] for part in ("survey", "fit"))
         if SETTINGS.accuracy_ratio * survey > product:
-            yield (
-                f"The {axis} survey error of the points, {100 * survey:.1f} cm, is more than half "
-                "of what they found: points for a test should be twice as accurate as the product."
-            )
+            values = {"axis": axis, "survey": survey}
+            yield Statement("inaccurate points", "warning", values)

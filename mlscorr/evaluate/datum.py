@@ -34,20 +34,16 @@ from mlscorr.estimate import (
     with_mountings,
 )
 from mlscorr.evaluate._settings import SETTINGS
+from mlscorr.evaluate.wording import DATUM
 from mlscorr.io.trajectories import MapFactors, map_factors
 from mlscorr.matching import SETTINGS as MATCHING
 from mlscorr.pos import stated_sigma
-from mlscorr.survey import Matched, Pos, Trajectory
+from mlscorr.survey import Matched, Pos, Statement, Trajectory
 
 SHIFT, HEIGHT, SCALE, TURN, TILT = TERMS = ("shift", "height", "scale", "turn", "tilt")
 UNITS = {SHIFT: "m", HEIGHT: "m", SCALE: "ratio", TURN: "rad", TILT: "m/m"}
 COLUMNS = {SCALE: [0], TURN: [1], TILT: [2, 3]}  # of linear_columns
 SETS = [tuple(s) for k in range(4) for s in combinations(COLUMNS, k)]  # of terms, the empty first
-FOLLOWS = "The corrected cloud follows the control; find out which of the two is right."
-ASSUMED = (
-    "Nobody stated the sigma of the POS: {sigma:g} m is assumed, and a worse POS could differ as "
-    "much. State it under [pos] in survey.toml."
-)
 
 
 @dataclass(frozen=True)
@@ -92,7 +88,9 @@ class DatumDifference:
 
     def document(self) -> dict[str, object]:
         """The row of ``datum[]`` in report.json."""
-        ground = None if self.ground is None else self.ground.document()
+        ground = None
+        if self.ground is not None:
+            ground = self.ground.document()
         return {
             "term": self.term,
             "unit": UNITS[self.term],
@@ -107,96 +105,33 @@ class DatumDifference:
         }
 
     @property
+    def statement(self) -> Statement:
+        """The term with its size, the evidence for it, and what its likely cause is judged by."""
+        values = {"size": self.size, "log_evidence": self.log_evidence}
+        values["observations"] = self.observations
+        if self.term in (SHIFT, HEIGHT):
+            values["assumed_sigma"] = self.assumed_sigma
+        else:
+            values |= {"sigma": self.sigma, "extent": self.extent}
+        if self.term != HEIGHT:
+            values["length"] = self.length
+        if self.term in (SCALE, TURN):
+            values["ground"] = self.ground
+        if self.term == SCALE:
+            values["is_ground"] = self._has_ground_scale()
+        return Statement(self.term, "warning", values)
+
+    def _has_ground_scale(self):
+        """Whether the scale is that of ground distances; not where the map's is unknown."""
+        if self.ground is None:
+            return False
+        expected = 1 / self.ground.combined - 1
+        return bool(abs(self.size[0] - expected) <= 3 * self.sigma[0])
+
+    @property
     def sentence(self) -> str:
         """The warning that check, correct and the page share."""
-        sentence = f"{self._finding()} {self._cause()} {FOLLOWS}"
-        if self.assumed_sigma is None or self.term not in (SHIFT, HEIGHT):
-            return sentence
-        return f"{sentence} {ASSUMED.format(sigma=self.assumed_sigma)}"
-
-    def _finding(self):
-        """The term with its size, and the evidence for it."""
-        size = self.size
-        if self.term == HEIGHT:
-            where = "below" if size[0] < 0 else "above"
-            return (
-                f"The control points lie {abs(size[0]):.2f} m {where} the cloud as the POS puts "
-                f"it ({self._evidence()})."
-            )
-        if self.term == SHIFT:
-            return (
-                f"The control points lie {self.length:.2f} m beside the cloud as the POS puts it "
-                f"(E {size[0]:+.2f}, N {size[1]:+.2f} m; {self._evidence()})."
-            )
-        if self.term == SCALE:
-            ppm = 1e6 * size[0]
-            sigma = 1e6 * self.sigma[0]
-            words = f"larger than in the cloud by {ppm:+.0f} +/- {sigma:.0f} ppm"
-        elif self.term == TURN:
-            turn, sigma = np.degrees([size[0], self.sigma[0]])
-            words = f"turned to the left against the cloud by {turn:+.4f} +/- {sigma:.4f} deg"
-        else:
-            rise = 1e3 * size
-            sigma = 1e3 * self.sigma
-            words = (
-                f"tilted against the cloud: it rises by {rise[0]:+.2f} +/- {sigma[0]:.2f} mm/m "
-                f"towards east and {rise[1]:+.2f} +/- {sigma[1]:.2f} mm/m towards north"
-            )
-        edge = f"{self.length:.3f} m at {self.extent:.0f} m from its middle"
-        return f"The net of control points is {words} ({edge}; {self._evidence()})."
-
-    def _evidence(self):
-        return (
-            f"{self.observations} observations, Bayes factor {_rounded(self.log_evidence)} against "
-            "an error of the POS"
-        )
-
-    def _cause(self):
-        """The likely cause, and the way out."""
-        if self.term == HEIGHT:
-            return (
-                "It looks like heights of another vertical datum or geoid, or a wrong height of an "
-                "antenna, an instrument or a post."
-            )
-        if self.term == SHIFT:
-            return "It looks like another horizontal datum, realization or epoch."
-        if self.term == TILT:
-            return (
-                "It looks like heights of another geoid model, or like a network whose vertical "
-                "was never levelled: export the control with the geoid of the cloud."
-            )
-        if self.term == TURN:
-            beside = ""
-            if self.ground is not None:
-                angle = -np.degrees(self.ground.convergence)
-                beside = f" (one to true north would be turned by {angle:+.4f} deg)"
-            return (
-                "It looks like another projection or zone, or a local net oriented to another "
-                f"north{beside}: export the control in the crs of the cloud."
-            )
-        return self._cause_of_scale()
-
-    def _cause_of_scale(self):
-        """The scale beside that of ground distances, and how to declare it."""
-        factor = f"scale_factor = {1 / (1 + self.size[0]):.6f}"
-        if self.ground is None:
-            return (
-                "It looks like ground distances without the scale of the map: if they are, set "
-                f"{factor} under [control]."
-            )
-        expected = 1 / self.ground.combined - 1
-        where = (
-            f"Ground distances would be larger by {1e6 * expected:+.0f} ppm there ({self.ground})"
-        )
-        if abs(self.size[0] - expected) <= 3 * self.sigma[0]:
-            return (
-                f'{where}, which fits: if the control is in them, set scale_factor = "ground" '
-                f"under [control], or {factor}."
-            )
-        return (
-            f"{where}, which does not fit: look for another projection or a wrong unit. If the "
-            f"control has this scale, set {factor} under [control]."
-        )
+        return self.statement.sentence(DATUM)
 
 
 def datum_differences(
@@ -415,11 +350,3 @@ def _extent(place):
     """RMS distance of places (n, 3) from their middle, in plan. Units: m."""
     local = place[:, :2] - place[:, :2].mean(axis=0)
     return float(np.sqrt(np.mean(np.sum(local**2, axis=1))))
-
-
-def _rounded(log_evidence):
-    """A Bayes factor in words: its power of ten where it is large."""
-    power = log_evidence / np.log(10)
-    if power < 3:
-        return f"{np.exp(log_evidence):.0f}"
-    return f"1e{power:.0f}"

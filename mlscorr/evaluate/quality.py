@@ -2,9 +2,12 @@
 
 import operator
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from difflib import get_close_matches
+
+from mlscorr.evaluate.wording import GATES
+from mlscorr.survey import Statement
 
 OPERATORS = {">=": operator.ge, "<=": operator.le, ">": operator.gt, "<": operator.lt}
 AXES = {"e": "easting", "n": "northing", "h": "height"}
@@ -113,17 +116,25 @@ def failures(gates: Iterable[Gate], report: dict) -> list[str]:
     report : dict
         The content of report.json.
     """
-    sentences = []
+    return [failure.sentence(GATES) for failure in failed(gates, report)]
+
+
+def failed(gates: Iterable[Gate], report: dict) -> Iterator[Statement]:
+    """The gates that a report fails, with the value of each, if it has one.
+
+    Parameters
+    ----------
+    gates : iterable of Gate
+    report : dict
+        The content of report.json.
+    """
     for gate in gates:
-        what = quantities()[gate.quantity]
         value = _value(gate.quantity, report)
+        values = {**vars(gate), "what": quantities()[gate.quantity]}
         if value is None:
-            sentences.append(f"{gate.quantity}: {what} was not determined.")
+            yield Statement("not determined", "fault", values)
         elif OPERATORS[gate.operator](value, gate.limit):
-            sentences.append(
-                f"{gate.quantity}: {what} is {value:.4g} {gate.operator} {gate.limit:g}."
-            )
-    return sentences
+            yield Statement("exceeded", "fault", {**values, "value": value})
 
 
 def _value(quantity, report):

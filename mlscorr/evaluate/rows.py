@@ -8,11 +8,15 @@ from typing import Any
 
 import numpy as np
 
+from mlscorr.evaluate.wording import reason_in_words
+from mlscorr.survey import Statement
+
 NAMES = ("rmse", "mean", "std", "min", "max")  # of statistics, as documents have them
 VECTORS = ("surveyed", "observed", "sigma", "before", "after", "left_out")  # of a TargetRow
-SINGLE = ("name", "gps_time", "role", "used", "reason")
-CHECK_REASON = "check point"  # why it took no part in the estimate
-SEEN_BY_OTHERS = "Another scanner saw it, this one did not."
+SINGLE = ("name", "gps_time", "role", "used")
+CHECK_POINT = Statement("check point")  # why it took no part in the estimate
+SEEN_BY_OTHERS = Statement("seen by others")  # and that this scanner had no part in
+Reason = tuple[str, Statement | None]  # name of a point, and why it took no part
 
 
 @dataclass(frozen=True)
@@ -61,9 +65,12 @@ class Statistics:
 
     def document(self) -> dict:
         """The statistics as documents have them, None where they are not determined."""
-        e, n, h, horizontal, spatial = (_numbers(values) or [None] * 5 for values in self.table)
+        east, north, height, horizontal, spatial = (
+            _numbers(values) or [None] * len(NAMES) for values in self.table
+        )
         document = {
-            name: None if e[k] is None else [e[k], n[k], h[k]] for k, name in enumerate(NAMES)
+            name: None if e is None else [e, n, h]
+            for name, e, n, h in zip(NAMES, east, north, height, strict=True)
         }
         for end, values in (("horizontal", horizontal), ("3d", spatial)):
             document |= {f"{name}_{end}": v for name, v in zip(NAMES, values, strict=True)}
@@ -120,8 +127,8 @@ class TargetRow:
         corrected, and corrected by the other points alone; NaN where not known. Units: m.
     used : bool
         Whether it took part in the estimate.
-    reason : str or None
-        Why it did not.
+    why : Statement or None
+        The reason why it did not; ``reason`` is its sentence.
     scanned : bool
         Whether points of the cloud lie about it, so that it should have been observed.
     """
@@ -137,7 +144,7 @@ class TargetRow:
     after: np.ndarray
     left_out: np.ndarray
     used: bool
-    reason: str | None
+    why: Statement | None
     scanned: bool = True
 
     @classmethod
@@ -147,15 +154,15 @@ class TargetRow:
         pass_number: int | None,
         role: str,
         surveyed: np.ndarray,
-        reason: str,
+        why: Statement,
         scanned: bool = True,
         gps_time: float | None = None,
     ) -> TargetRow:
         """The row of a surveyed point that was not observed, or has an observation refused then."""
         nan = np.full(3, np.nan)
-        vectors = {"observed": nan, "sigma": nan, "before": nan, "after": nan, "left_out": nan}
-        row: dict[str, Any] = {"surveyed": surveyed, **vectors, "used": False, "reason": reason}
-        return cls(name, pass_number, gps_time, role, **row, scanned=scanned)
+        unknown: dict[str, Any] = dict.fromkeys(VECTORS[1:], nan)
+        start = name, pass_number, gps_time, role, surveyed
+        return cls(*start, **unknown, used=False, why=why, scanned=scanned)
 
     @classmethod
     def read(cls, row: dict) -> TargetRow:
@@ -163,7 +170,17 @@ class TargetRow:
         fields: dict[str, Any] = {name: row[name] for name in SINGLE}
         for name in VECTORS:
             fields[name] = np.array(row.get(name) or [np.nan] * 3, dtype=float)
-        return cls(pass_number=row["pass"], **fields, scanned=row.get("scanned", True))
+        why = None
+        if row["reason"] is not None:
+            why = Statement("not matched", values={"why": row["reason"]})
+        return cls(pass_number=row["pass"], **fields, why=why, scanned=row.get("scanned", True))
+
+    @property
+    def reason(self) -> str | None:
+        """Why it took no part in the estimate, in words; None where it did."""
+        if self.why is None:
+            return None
+        return reason_in_words(self.why)
 
     @property
     def is_observed(self) -> bool:
@@ -174,17 +191,25 @@ class TargetRow:
     def group(self) -> str:
         """Where it belongs: ``control``, ``check`` or ``unused``.
 
-        No check point takes part in the estimate, so it counts as unused only when another
-        reason than its role is given.
+        No check point takes part in the estimate, so it counts as unused only where it was not
+        observed.
         """
-        if self.used or (self.role == "check" and self.reason in (None, "", CHECK_REASON)):
+        if self.used or (self.role == "check" and self.is_observed):
             return self.role
         return "unused"
 
     def document(self) -> dict:
         """The row of ``targets[]`` in report.json."""
-        row = vars(self) | {name: _numbers(getattr(self, name)) for name in VECTORS}
-        return {"pass" if name == "pass_number" else name: row[name] for name in row}
+        return {
+            "name": self.name,
+            "pass": self.pass_number,
+            "gps_time": self.gps_time,
+            "role": self.role,
+            **{name: _numbers(getattr(self, name)) for name in VECTORS},
+            "used": self.used,
+            "reason": self.reason,
+            "scanned": self.scanned,
+        }
 
 
 @dataclass(frozen=True)
@@ -196,25 +221,25 @@ class PointCounts:
     surveyed, observed, scored : int
         In the control file; observed under their names; used as control points, or tested by as
         check points.
-    missing : tuple of (str, str)
+    missing : tuple of (str, Statement or None)
         Name and reason of each that has points of the cloud about it and no observation.
-    refused, outside : tuple of (str, str)
+    refused, outside : tuple of (str, Statement or None)
         Name and reason of each that was observed and not used, and of each about which nothing was
         scanned, or by another scanner alone.
-    misplaced : tuple of (str, str)
+    misplaced : tuple of (str, Statement or None)
         Those of the missing of which something was found that does not fit: in place, kind or size.
     """
 
     surveyed: int
     observed: int
     scored: int
-    missing: tuple[tuple[str, str], ...] = ()
-    refused: tuple[tuple[str, str], ...] = ()
-    outside: tuple[tuple[str, str], ...] = ()
-    misplaced: tuple[tuple[str, str], ...] = ()
+    missing: tuple[Reason, ...] = ()
+    refused: tuple[Reason, ...] = ()
+    outside: tuple[Reason, ...] = ()
+    misplaced: tuple[Reason, ...] = ()
 
     @property
-    def hidden(self) -> tuple[tuple[str, str], ...]:
+    def hidden(self) -> tuple[Reason, ...]:
         """Those of the missing of which nothing was found."""
         return tuple(point for point in self.missing if point not in self.misplaced)
 
@@ -233,8 +258,8 @@ class PointCounts:
         scored = {row.name for row in rows if row.is_observed and row.group == role}
 
         def reasons(names):
-            first = {row.name: row.reason or "" for row in reversed(rows) if row.name in names}
-            return tuple(sorted(first.items()))
+            first = {row.name: row.why for row in reversed(rows) if row.name in names}
+            return tuple((name, first[name]) for name in sorted(first))
 
         missing = {row.name for row in rows if row.scanned} - observed
         everything = {row.name for row in rows}
@@ -250,7 +275,9 @@ class PointCounts:
             "n_seen": self.observed,
             "n_scored": self.scored,
             "n_unseen": len(self.missing),
-            "unseen": [{"name": name, "reason": reason} for name, reason in self.missing],
+            "unseen": [
+                {"name": name, "reason": reason_in_words(why)} for name, why in self.missing
+            ],
         }
 
 

@@ -28,7 +28,7 @@ from mlscorr.pipeline.finding import (
     read_into,
 )
 from mlscorr.pipeline.settings import SETTINGS
-from mlscorr.survey import Matched, Statement, Survey, SurveyFileError, TieFeatures, check_survey
+from mlscorr.survey import Matched, Survey, SurveyFileError, TieFeatures, check_survey
 from mlscorr.ties import TieCollector, tie_mounting
 
 NOTHING_CALIBRATES = (
@@ -195,8 +195,7 @@ def _parts(survey, control, check, finding, calibration):
         ]
         known = {*matched[0].name, *matched[1].name, *(refusal.name for refusal in refusals)}
         others = [point for point in survey.surveyed.name if point not in known]
-        why = Statement("not matched", values={"why": SEEN_BY_OTHERS})
-        refusals += [Refusal(point, None, why) for point in others]
+        refusals += [Refusal(point, None, SEEN_BY_OTHERS) for point in others]
         scanned = finding.scanned.difference(others)
         missing = unseen_rows(part, refusals, finding.candidates, scanned)
         view = calibration.of(number, control.scanner)

@@ -13,9 +13,8 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
         "correction_report": ["CorrectionReport", "Coverage", "FileRow"],
         "figures": ["correction_figures", "write_pictures"],
         "geometry": ["correction_lines", "misclosure_lines", "target_lines"],
-        "headline": ["RATINGS", "capped", "first_screen", "statements_section"],
+        "headline": ["RATINGS", "StatementRow", "capped", "first_screen", "statements_section"],
         "project_page": ["write_project"],
-        "_statement": ["StatementRow"],
         "stage_figures": [
             "misclosure_figure",
             "pos_error_figure",
@@ -24,6 +23,6 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
         ],
         "style": ["draw"],
         "target_figures": ["write_contact_sheet"],
-        "tie_words": ["tie_sentences"],
+        "tables": ["tie_sentences"],
     },
 )

@@ -15,7 +15,7 @@ from mlscorr.report.headline import (
     warning_statements,
 )
 from mlscorr.report.pages import Page
-from mlscorr.wording import length_in_words, millimetres
+from mlscorr.survey import Severity, Statement
 
 PARTS = ("lever_arm", "boresight")
 SECTIONS = {
@@ -37,13 +37,34 @@ def calibration_screen(content: dict[str, Any], rows: list[TargetRow]) -> dict[s
     rows : list of TargetRow
         One for each surveyed point and pass.
     """
+    return statements_section(calibration_statements(content, rows))
+
+
+def calibration_statements(content: dict[str, Any], rows: list[TargetRow]) -> list[StatementRow]:
+    """All that stands on the first screen of a calibration, in its order.
+
+    Parameters
+    ----------
+    content : dict
+        The other content of calibration.json, of one scanner.
+    rows : list of TargetRow
+        One for each surveyed point and pass.
+    """
     control = PointCounts.of(rows, "control")
-    facts = [_lack(content), _determined(content), _remainder(content)]
+    facts = [
+        StatementRow.of("Mounting", _lack(content)),
+        StatementRow.of("Determined", _determined(content)),
+        StatementRow.of("Result", _remainder(content)),
+    ]
     if control.surveyed:
         facts.append(control_statement(control))
     facts.append(check_statement(PointCounts.of(rows, "check")))
-    facts += [*_scanner(content), *_ties(content)]
-    return statements_section([*facts, *warning_statements(content["warnings"])])
+    return [
+        *facts,
+        *_scanner(content),
+        *_ties(content),
+        *warning_statements(content["warnings"]),
+    ]
 
 
 def scanners_screen(content: dict[str, Any]) -> dict[str, object]:
@@ -54,29 +75,30 @@ def scanners_screen(content: dict[str, Any]) -> dict[str, object]:
     content : dict
         The other content of calibration.json, of scanners that were calibrated together.
     """
-    facts = [*_relative(content), *_ties(content), *warning_statements(content["warnings"])]
-    return statements_section(facts)
+    return statements_section(scanners_statements(content))
+
+
+def scanners_statements(content: dict[str, Any]) -> list[StatementRow]:
+    """What is said of scanners that were calibrated together, in its order.
+
+    Parameters
+    ----------
+    content : dict
+        The other content of calibration.json.
+    """
+    return [*_relative(content), *_ties(content), *warning_statements(content["warnings"])]
 
 
 def _relative(content) -> Iterator[StatementRow]:
     """How well it is known how each further scanner stands beside the first."""
     for name, row in content["relative"].items():
-        first = row["beside"]
         fit = row["fit_sigma"]
-        arm, turn = (row[part]["sigma"] for part in PARTS)
-        both = f"No wall that scanners {first} and {name} both saw holds them."
-        if fit is not None:
-            both = (
-                f"Scanners {first} and {name} put a wall that both saw in one place to "
-                f"{millimetres(fit)} mm."
-            )
-        sentence = (
-            f"{both} Scanner {name} beside scanner {first}: lever arm to "
-            f"{'/'.join(map(millimetres, arm))} mm right/forward/up, boresight to "
-            f"{'/'.join(f'{sigma:.3f}' for sigma in turn)} deg about them (one sigma)."
-        )
-        is_held = fit is not None and fit < SETTINGS.determined_sigma[0]
-        yield StatementRow("Together", "green" if is_held else "amber", sentence)
+        sigmas = {part: row[part]["sigma"] for part in PARTS}
+        values = {"first": row["beside"], "name": name, "fit": fit, **sigmas}
+        severity: Severity = "warning"
+        if fit is not None and fit < SETTINGS.determined_sigma[0]:
+            severity = "note"
+        yield StatementRow.of("Together", Statement("scanners together", severity, values))
 
 
 def component_rows(content: dict[str, Any]) -> list[dict[str, Any]]:
@@ -108,11 +130,10 @@ def component_rows(content: dict[str, Any]) -> list[dict[str, Any]]:
     ]
 
 
-def _lacks(content):
-    """What the recorded mounting lacks beyond its sigma, in words of each part."""
+def _lacking(content):
+    """Parts of the recorded mounting that lack more than their sigma."""
     return [
-        f"{row['name']} {_size(row['lsc'], row['lsc_sigma'], row['unit'])}"
-        f"{'' if row['determined'] else ' (not determined)'}"
+        row
         for row in component_rows(content)
         if abs(row["lsc"]) > SETTINGS.setup_sigmas * row["lsc_sigma"]
     ]
@@ -120,64 +141,46 @@ def _lacks(content):
 
 def _lack(content):
     """Whether the recorded mounting holds."""
-    lacks = _lacks(content)
-    if not lacks and not any(content["determined"]):
-        sentence = "This geometry does not tell whether the recorded mounting holds."
-        return StatementRow("Mounting", "amber", sentence)
-    if not lacks:
-        sigmas = f"it lacks nothing beyond {SETTINGS.setup_sigmas:g} sigmas"
-        if all(content["determined"]):
-            return StatementRow("Mounting", "green", f"The recorded mounting holds: {sigmas}.")
-        sentence = f"The recorded mounting holds in the parts that are determined: {sigmas}."
-        return StatementRow("Mounting", "green", sentence)
-    return StatementRow("Mounting", "amber", f"The recorded mounting lacks {', '.join(lacks)}.")
-
-
-def _size(value, sigma, unit):
-    """A value with its sigma in mm or deg."""
-    if unit == "m":
-        return f"{millimetres(value)} ± {millimetres(sigma)} mm"
-    return f"{value:.3f} ± {sigma:.3f} deg"
+    lacking = _lacking(content)
+    if lacking:
+        return Statement("mounting lacks", "warning", {"components": lacking})
+    if not any(content["determined"]):
+        return Statement("mounting not told", "warning")
+    values = {"sigmas": SETTINGS.setup_sigmas}
+    if all(content["determined"]):
+        return Statement("mounting holds", values=values)
+    return Statement("determined parts hold", values=values)
 
 
 def _determined(content):
     """Which parts this geometry tells."""
-    open_parts = [
-        f"{row['name']} {_size(row['lsc'], row['lsc_sigma'], row['unit'])}"
-        for row in component_rows(content)
-        if not row["determined"]
-    ]
+    undetermined = [row for row in component_rows(content) if not row["determined"]]
     count = len(MOUNTING_COMPONENTS)
-    if not open_parts:
-        return StatementRow("Determined", "green", f"All {count} parts by this geometry.")
-    sentence = (
-        f"{count - len(open_parts)} of {count} parts by this geometry. Not determined, and changed "
-        "only as far as the accuracy of the POS tells it from what looks the same: "
-        f"{', '.join(open_parts)}."
-    )
-    return StatementRow("Determined", "amber", sentence)
+    if not undetermined:
+        return Statement("all parts determined", values={"count": count})
+    values = {"components": undetermined, "count": count}
+    return Statement("parts not determined", "warning", values)
 
 
 def _remainder(content):
     """How far targets were and are off, by check points where there are any."""
-    role = "check" if content["lsc"]["check"]["n"] else "control"
+    role = "control"
+    if content["lsc"]["check"]["n"]:
+        role = "check"
     group = content["lsc"][role]
     if group["n"] == 0:
-        return StatementRow("Result", "amber", "No target tells how good the calibration is.")
+        return Statement("no target", "warning")
     before, after = (group[state]["rmse_3d"] for state in ("before", "after"))
-    sentence = f"3D RMSE of {role} points {length_in_words(before)} → {length_in_words(after)}"
+    values = {"role": role, "before": before, "after": after}
     if role == "control":
-        return StatementRow("Result", "amber", f"{sentence}: the fit alone, which proves little.")
-    sentence = f"{sentence}; they took no part"
+        return Statement("fit of a calibration", "warning", values)
     if after <= before:
-        return StatementRow("Result", "green", f"{sentence}.")
+        return Statement("calibration tested", values=values)
     if _is_off(content["scanner_errors"]):
-        return StatementRow(
-            "Result", "amber", f"{sentence}, and keep what the scanner itself lacks."
-        )
-    if not _lacks(content):
-        return StatementRow("Result", "amber", f"{sentence}. No part changed significantly.")
-    return StatementRow("Result", "red", f"{sentence}.")
+        return Statement("worse by the scanner", "warning", values)
+    if not _lacking(content):
+        return Statement("worse by chance", "warning", values)
+    return Statement("calibration tested", "fault", values)
 
 
 def _is_off(errors):
@@ -190,43 +193,33 @@ def _scanner(content) -> Iterator[StatementRow]:
     errors = content["scanner_errors"]
     if errors is None:
         return
-    ranges = errors["range_offset"]
-    encoder = errors["encoder_scale"]
-    open_ranges, open_encoder = (
-        " (not determined)" if row["significant"] and not row["determined"] else ""
-        for row in (ranges, encoder)
-    )
-    sentence = (
-        f"Ranges lack {millimetres(ranges['correction'])} ± {millimetres(ranges['sigma'])} mm"
-        f"{open_ranges}, scan angles {1e3 * encoder['correction']:.2f} ± "
-        f"{1e3 * encoder['sigma']:.2f} mrad per rad{open_encoder}"
-    )
+    values = {part: errors[part] for part in ("range_offset", "encoder_scale")}
     if _is_off(errors):
-        yield StatementRow("Scanner", "amber", f"{sentence}; the mounting is free of it.")
+        said = Statement("scanner is off", "warning", values)
     elif all(row["determined"] for row in errors.values()):
-        yield StatementRow("Scanner", "green", f"{sentence}: nothing significant.")
+        said = Statement("scanner is right", values=values)
     else:
-        yield StatementRow("Scanner", "green", f"{sentence}; this geometry hardly tells it.")
+        said = Statement("scanner hardly told", values=values)
+    yield StatementRow.of("Scanner", said)
 
 
 def _ties(content) -> Iterator[StatementRow]:
     """How far apart the passes lie where both saw the same."""
     ties = content["ties"]
-    if ties is not None and ties["used"]:
-        before, after = (length_in_words(ties[state]["median"]) for state in ("before", "after"))
-        is_between = any(len(set(row["scanners"])) > 1 for row in ties["pairs"])
-        if is_between:
-            views = "two passes, or two scanners of one,"
-        else:
-            views = "two passes"
-        sentence = (
-            f"{ties['used']} of {ties['n']} places that {views} both saw are used: {before} "
-            f"apart before, {after} after (median)"
-        )
-        if "with_drift" in content:
-            median = content["with_drift"]["ties"]["after"]["median"]
-            sentence += f", {length_in_words(median)} without the drift"
-        yield StatementRow("Two passes", "green", f"{sentence}.")
+    if ties is None or not ties["used"]:
+        return
+    without_drift = None
+    if "with_drift" in content:
+        without_drift = content["with_drift"]["ties"]["after"]["median"]
+    values = {
+        "used": ties["used"],
+        "n": ties["n"],
+        "is_between_scanners": any(len(set(row["scanners"])) > 1 for row in ties["pairs"]),
+        "before": ties["before"]["median"],
+        "after": ties["after"]["median"],
+        "without_drift": without_drift,
+    }
+    yield StatementRow.of("Two passes", Statement("two passes", values=values))
 
 
 def calibration_page(content: dict[str, Any]) -> Page:

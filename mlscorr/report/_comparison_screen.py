@@ -4,16 +4,21 @@ from collections.abc import Iterator
 from typing import Any
 
 from mlscorr.evaluate import PointCounts, TargetRow
-from mlscorr.report import headline
+from mlscorr.report.headline import (
+    StatementRow,
+    check_statement,
+    control_statement,
+    statements_section,
+    warning_statements,
+)
 from mlscorr.report.settings import SETTINGS
-from mlscorr.wording import counted, joined, number
+from mlscorr.report.wording import in_words
+from mlscorr.survey import Severity, Statement
+from mlscorr.wording import joined
 
 OWN = "correct"  # the method that the command of this name uses
 UNTIED = "lsc"  # the same by control points alone
-OTHERS = {
-    "one move": "Best of those that move the whole cloud as one",
-    "over time": "Best of polynomials and interpolation over time",
-}
+KINDS = ("one move", "over time")  # of methods whose best are named beside the best of all
 
 
 def comparison_screen(document: dict[str, Any], rows: list[TargetRow]) -> dict[str, object]:
@@ -26,50 +31,95 @@ def comparison_screen(document: dict[str, Any], rows: list[TargetRow]) -> dict[s
     rows : list of TargetRow
         One for each surveyed point and pass.
     """
-    facts = [
-        _best(document),
-        _scored(document),
-        headline.check_statement(PointCounts.of(rows, "check")),
-        headline.control_statement(PointCounts.of(rows, "control")),
+    return statements_section(comparison_statements(document, rows))
+
+
+def comparison_statements(document: dict[str, Any], rows: list[TargetRow]) -> list[StatementRow]:
+    """All that stands on the first screen of a comparison, in its order.
+
+    Parameters
+    ----------
+    document : dict
+        The other content of compare.json.
+    rows : list of TargetRow
+        One for each surveyed point and pass.
+    """
+    first, *more = verdict(document)
+    return [
+        StatementRow.of("Result", first, items=[("", text) for text in in_words(more)]),
+        StatementRow.of("Scores", _basis(document)),
+        check_statement(PointCounts.of(rows, "check")),
+        control_statement(PointCounts.of(rows, "control")),
         *_ties(document),
         *_undetermined(document),
-        *headline.warning_statements(method_warnings(document["methods"])),
+        *warning_statements(method_warnings(document["methods"])),
     ]
-    return headline.statements_section(facts)
 
 
-def _best(document):
-    """Which method corrects best; the whole of the verdict."""
-    first, *more = verdict(document)
-    is_tested = document["scored_by"] != "control" and ranking(document)[0]["name"] != "raw"
-    items = tuple(("", sentence) for sentence in more)
-    return headline.StatementRow("Result", "green" if is_tested else "amber", first, items)
+def verdict(document: dict[str, Any]) -> list[Statement]:
+    """Which method corrects best, and what others of each kind and our own do.
 
-
-def _scored(document):
-    """What the scores rest on."""
-    if document["scored_by"] == "control":
-        rating = "amber"
+    Parameters
+    ----------
+    document : dict
+        The content of compare.json.
+    """
+    ranked = ranking(document)
+    by = document["scored_by"]
+    value = {row["name"]: row[by]["rmse_3d"] for row in ranked}
+    best = ranked[0]["name"]
+    severity: Severity = "warning"
+    if by != "control" and best != "raw":
+        severity = "note"
+    tied = [name for name in value if value[name] - value[best] < SETTINGS.difference]
+    raw = value["raw"]
+    if "raw" in tied:
+        values = {"least": SETTINGS.difference, "raw": raw}
+        return [Statement("no method improves", severity, values)]
+    values = {"rmse": value[best], "raw": raw}
+    if len(tied) == 1:
+        values |= {"name": best, "about": ranked[0]["about"]}
+        said = [Statement("best method", severity, values)]
     else:
-        rating = "green"
-    return headline.StatementRow("Scores", rating, basis(document))
+        values |= {"names": tied, "least": SETTINGS.difference}
+        said = [Statement("best methods", severity, values)]
+    for kind in KINDS:
+        rest = [row["name"] for row in ranked if row["kind"] == kind]
+        if rest and rest[0] not in tied:
+            values = {"kind": kind, "name": rest[0], "rmse": value[rest[0]]}
+            said.append(Statement("best of a kind", values=values))
+    if OWN in value and OWN not in tied:
+        own = value[OWN]
+        values = {"name": OWN, "rmse": own, "behind": own - value[best]}
+        said.append(Statement("behind the best", values=values))
+    return said
 
 
-def _ties(document) -> Iterator[headline.StatementRow]:
+def _basis(document):
+    """What the scores rest on."""
+    control = document["control_points"]
+    check = document["check_points"]
+    if document["scored_by"] == "check":
+        return Statement("scored by check points", values={"control": control, "check": check})
+    if document["scored_by"] == "control":
+        return Statement("scored by the fit", "warning", {"control": control})
+    groups = document["cross_validation_groups"]
+    values = {"control": control, "check": check, "groups": groups}
+    return Statement("cross-validated", values=values)
+
+
+def _ties(document) -> Iterator[StatementRow]:
     """Which methods use ties between passes, where there are any."""
     own = next((row for row in document["methods"] if row["name"] == OWN), None)
     if own is None or own["status"] != "determined":
         return
-    if count := own["details"]["ties"]:
-        sentence = (
-            f"{OWN} also uses {counted(count, 'tie')}: planes, poles and paint that two passes "
-            "both saw. All other methods use the control points alone."
-        )
+    count = own["details"]["ties"]
+    if count:
+        said = Statement("method with ties", values={"name": OWN, "count": count})
     else:
-        sentence = f"{OWN} equals {UNTIED} here, for no ties were used."
-        if own["details"]["untied"]:
-            sentence += f" {own['details']['untied']}"
-    yield headline.StatementRow("Ties", "green", sentence)
+        values = {"name": OWN, "other": UNTIED, "why": own["details"]["untied"]}
+        said = Statement("method without ties", values=values)
+    yield StatementRow.of("Ties", said)
 
 
 def method_warnings(rows: list[dict]) -> list[str]:
@@ -87,12 +137,13 @@ def method_warnings(rows: list[dict]) -> list[str]:
     return [f"{joined(of_one)}: {sentence}" for sentence, of_one in names.items()]
 
 
-def _undetermined(document) -> Iterator[headline.StatementRow]:
+def _undetermined(document) -> Iterator[StatementRow]:
     """Methods without a score."""
     absent = undetermined(document)
     if absent:
-        count = f"{len(absent)} of {len(document['methods'])} methods have no score."
-        yield headline.StatementRow("Not determined", "amber", count, tuple(absent))
+        values = {"count": len(absent), "methods": len(document["methods"])}
+        said = Statement("methods without a score", "warning", values)
+        yield StatementRow.of("Not determined", said, items=absent)
 
 
 def undetermined(document: dict) -> list[tuple[str, str]]:
@@ -123,79 +174,3 @@ def ranking(document: dict) -> list[dict]:
     by = document["scored_by"]
     scored = [row for row in document["methods"] if row[by]["rmse_3d"] is not None]
     return sorted(scored, key=lambda row: row[by]["rmse_3d"])
-
-
-def basis(document: dict) -> str:
-    """What the scores rest on, in one sentence.
-
-    Parameters
-    ----------
-    document : dict
-        The content of compare.json.
-    """
-    control = document["control_points"]
-    check = document["check_points"]
-    made = f"Every method was fitted to the same {counted(control, 'control point')}"
-    if document["scored_by"] == "check":
-        return f"{made} and scored by {counted(check, 'check point')} that took no part."
-    if document["scored_by"] == "control":
-        return f"{made}. Nothing independent is left to score them by: this is the mere fit."
-    if check:
-        too_few = f"only {counted(check, 'check point')}"
-    else:
-        too_few = "no check points"
-    groups = document["cross_validation_groups"]
-    if groups == control:
-        left = "each left out in turn"
-    else:
-        left = f"left out in {groups} groups in turn"
-    if check:
-        others = "; each check point from all control points"
-    else:
-        others = ""
-    return (
-        f"{made}. There {'is' if check == 1 else 'are'} {too_few}, so the scores are "
-        f"cross-validated over all points: control points, {left}, are predicted from the "
-        f"others{others}."
-    )
-
-
-def verdict(document: dict) -> list[str]:
-    """The result in sentences.
-
-    Parameters
-    ----------
-    document : dict
-        The content of compare.json.
-    """
-    ranked = ranking(document)
-    by = document["scored_by"]
-    value = {row["name"]: row[by]["rmse_3d"] for row in ranked}
-    best = ranked[0]["name"]
-    tied = [name for name in value if value[name] - value[best] < SETTINGS.difference]
-    raw = f"{number(value['raw'])} m without any correction"
-    if "raw" in tied:
-        text = f"The cloud as recorded, with {number(value['raw'])} m, is as good as any"
-        return [
-            f"No method improves this cloud by {1000 * SETTINGS.difference:.0f} mm or more. {text}."
-        ]
-    sentences = [_winner(ranked[0], tied, number(value[best]), raw)]
-    for kind, words in OTHERS.items():
-        rest = [row["name"] for row in ranked if row["kind"] == kind]
-        if rest and rest[0] not in tied:
-            sentences.append(f"{words}: {rest[0]}, with {number(value[rest[0]])} m.")
-    if OWN in value and OWN not in tied:
-        own = value[OWN]
-        behind = own - value[best]
-        sentences.append(f"{OWN}, with {number(own)} m, is {number(behind)} m behind.")
-    return sentences
-
-
-def _winner(row, tied, value, raw):
-    """The sentence on the best method, or on those that are too close to tell apart."""
-    if len(tied) == 1:
-        return f"Best is {row['name']}: 3D RMSE {value} m, against {raw}. {row['about']}"
-    return (
-        f"Best are {joined(tied)}: 3D RMSE {value} m, against {raw}. They differ by less than "
-        f"{1000 * SETTINGS.difference:.0f} mm, which can't be told apart."
-    )

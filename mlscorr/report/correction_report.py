@@ -107,7 +107,7 @@ class CorrectionReport:
     next_control : tuple of NextControl
         Where more control points would help most, the best first.
     ties : dict or None
-        As mlscorr.evaluate.ties.tie_section has it.
+        As mlscorr.evaluate.model.tie_section has it.
     position_sigma : dict or None
         3D sigma of the corrected position, in m: ``median``, ``largest``, and the ``time`` (s) of
         the latter.

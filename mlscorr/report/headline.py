@@ -1,19 +1,81 @@
-"""What a correction says first, wherever it is read: terminal, report.json and page."""
+"""What a correction says first, wherever it is read: terminal, report.json and page.
+
+Each row of that screen rests on statements, whose severity is its rating. Rows that a calibration,
+a comparison and a diagnosis have too are made here as well.
+"""
+
+from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import chdtri
 
-from mlscorr.evaluate import SEEN_BY_OTHERS, PointCounts
-from mlscorr.report._statement import RATINGS, StatementRow
-from mlscorr.report.assumed import assumed_statement
+from mlscorr.estimate import SETTINGS as ESTIMATE
+from mlscorr.evaluate import SEEN_BY_OTHERS, PointCounts, reason_in_words
 from mlscorr.report.correction_report import CorrectionReport
 from mlscorr.report.settings import SETTINGS
-from mlscorr.report.tables import verdict
-from mlscorr.wording import counted, length_in_words, percent
+from mlscorr.report.tables import AXES
+from mlscorr.report.wording import NAMED, assumed_in_words, in_words, stretch_in_words
+from mlscorr.survey import Severity, Statement
 
-NAMED = 6  # points or stretches that stand on the first screen; the tables have all of them
+RATINGS = ("green", "amber", "red")  # as it should be; mind it; not whole, or worse than before
+SEVERITIES: tuple[Severity, ...] = ("note", "warning", "fault")  # of statements, in this order
+SIGMAS = ("pos.position_sigma", "pos.attitude_sigma")
+
+
+@dataclass(frozen=True)
+class StatementRow:
+    """A fact on the first screen.
+
+    Parameters
+    ----------
+    what : str
+        What it is about.
+    rating : str
+        Of RATINGS.
+    sentence : str
+    items : tuple of (str, str)
+        What it names one by one, and what is said of each.
+    statements : tuple of Statement
+        What rating and sentence were made of, if they were.
+    """
+
+    what: str
+    rating: str
+    sentence: str
+    items: tuple[tuple[str, str], ...] = ()
+    statements: tuple[Statement, ...] = ()
+
+    @classmethod
+    def of(
+        cls, what: str, *statements: Statement, items: Iterable[tuple[str, str]] = ()
+    ) -> StatementRow:
+        """The row of some statements, rated as the worst of them.
+
+        Parameters
+        ----------
+        what : str
+            What they are about.
+        *statements : Statement
+            With sentences in mlscorr.report.wording.
+        items : iterable of (str, str)
+        """
+        worst = max(SEVERITIES.index(statement.severity) for statement in statements)
+        sentence = " ".join(in_words(statements))
+        return cls(what, RATINGS[worst], sentence, tuple(items), statements)
+
+    def document(self) -> dict[str, object]:
+        """The row of ``statements[]`` in report.json."""
+        items = [{"name": name, "text": text} for name, text in self.items]
+        return {
+            "what": self.what,
+            "rating": self.rating,
+            "sentence": self.sentence,
+            "items": items,
+        }
 
 
 def first_screen(report: CorrectionReport) -> dict[str, object]:
@@ -76,32 +138,91 @@ def headline(report: CorrectionReport) -> str:
 
 
 def _result(report):
-    """How far off the cloud was and is."""
-    sentences, is_worse = verdict(report)
+    """How far off the cloud was and is: its first sentence, and the others as items."""
+    first, *more = verdict(report)
+    return StatementRow.of("Result", first, items=[("", text) for text in in_words(more)])
+
+
+def verdict(report: CorrectionReport) -> list[Statement]:
+    """The result, and whether something speaks against it by the severity of the first.
+
+    That is a fault where it became worse on an axis, by more than the sigmas of targets and
+    correction allow, or where check points are missing that should have been seen. It is a note
+    where check points show that it became better, and nothing is said that they can't see.
+
+    Parameters
+    ----------
+    report : CorrectionReport
+    """
     before, after, kind = report.judgement
+    if before is None or after is None:
+        if report.targets:
+            return [Statement("no target to judge by", "fault")]
+        return [Statement("nothing to judge by", "fault")]
+    role = "control"
+    if kind == "check":
+        role = "check"
+    rises = _rises(before.rmse, after.rmse, after.n, getattr(report, role).sigma)
     is_tested = kind == "check" and after.rmse[4] <= before.rmse[4] + SETTINGS.difference
-    is_tested &= not report.datum  # which check points of the same survey share
-    if is_worse:
-        rating = "red"
-    else:
-        rating = "green" if is_tested else "amber"
-    return StatementRow("Result", rating, sentences[0], tuple(("", text) for text in sentences[1:]))
+    severity: Severity = "warning"
+    if rises or report.points("check").missing:
+        severity = "fault"
+    elif is_tested and not report.datum:  # which check points of the same survey share
+        severity = "note"
+    points, observations = report.count(role)
+    count = {"points": points, "observations": observations}
+    values = {"before": before.rmse[:3], "after": after.rmse[:3], **count}
+    rmse = {"check": "rmse of check points", "leave-one-out": "rmse left out"}
+    if kind == "leave-one-out":
+        values["has_checks"] = report.points("check").surveyed > 0
+    said = [
+        _change(report, before.rmse[4], after.rmse[4], kind, bool(rises), severity),
+        Statement(rmse.get(kind, "rmse of the fit"), values=values),
+    ]
+    if rises:
+        said.append(Statement("worse axes", "fault", {"rises": rises, **count}))
+    return said
+
+
+def _rises(before, after, n, sigma):
+    """By how much the RMSE of each axis rose, where that is beyond chance. Units: m."""
+    limit = np.inf
+    if sigma is not None:
+        # as large as this the RMS of n is by chance, as it is known no better there than by its
+        # sigma
+        limit = sigma * np.sqrt(chdtri(n, ESTIMATE.significance) / n)
+    rise = np.where(after[:3] > limit, (after - before)[:3], 0.0)
+    return {axis: by for axis, by in zip(AXES, rise, strict=True) if by > SETTINGS.difference}
+
+
+def _change(report, before, after, kind, is_worse, severity):
+    """What the correction did, by 3D RMSE in m."""
+    values = {"before": before, "after": after, "kind": kind}
+    if kind != "fit" and abs(before - after) <= SETTINGS.difference:
+        return Statement("hardly changed", severity, values)
+    if after > before and not is_worse:
+        return Statement("changed within sigma", severity, values)
+    if after > before:
+        return Statement("made worse", severity, values)
+    times = before / max(after, 1e-4)
+    if times < 1.5 or kind == "fit":
+        times = None
+    values |= {"times": times, "holds_everywhere": report.holds_everywhere}
+    return Statement("improved", severity, values)
 
 
 def _points_moved(report):
     """Which share of the points was corrected, and on which grounds."""
     coverage = report.coverage
-    left = coverage.points_outside_trajectory
-    total = max(coverage.points_corrected + left, 1)
-    held = coverage.points_corrected - coverage.points_extrapolated
-    sentence = (
-        f"{percent(held / total)} of the points corrected where control holds them, "
-        f"{percent(coverage.points_extrapolated / total)} by extrapolation, "
-        f"{percent(left / total)} left as they were."
-    )
-    if left:
-        sentence += f" {left} of {total} points lie outside the trajectory or in its gaps."
-    return StatementRow("Points", "red" if left or not held else "green", sentence)
+    values = {
+        "held": coverage.points_corrected - coverage.points_extrapolated,
+        "extrapolated": coverage.points_extrapolated,
+        "left": coverage.points_outside_trajectory,
+    }
+    severity = "note"
+    if values["left"] or not values["held"]:
+        severity = "fault"
+    return StatementRow.of("Points", Statement("points", severity, values))
 
 
 def check_statement(points: PointCounts) -> StatementRow:
@@ -113,33 +234,23 @@ def check_statement(points: PointCounts) -> StatementRow:
         Of the check points.
     """
     if points.surveyed == 0:
-        sentence = "No check point was surveyed, so nothing independent tests this result."
-        return StatementRow("Check points", "amber", sentence)
-    if points.missing:
-        rating = "red"
-    else:
-        rating = "green" if points.scored else "amber"
-    return StatementRow("Check points", rating, " ".join(_scored(points)), _named(points))
+        return StatementRow.of("Check points", Statement("no check point", "warning"))
+    severity: Severity = "warning"
+    if points.scored:
+        severity = "note"
+    values = {"scored": points.scored, "surveyed": points.surveyed}
+    said = [Statement("check points", severity, values)]
+    lost = {"hidden check points": points.hidden, "refused check points": points.misplaced}
+    said += [Statement(key, "fault", {"names": _names(some)}) for key, some in lost.items() if some]
+    for by_others, count in _elsewhere(points).items():
+        values = {"count": count, "by_others": by_others}
+        said.append(Statement("check points elsewhere", values=values))
+    return StatementRow.of("Check points", *said, items=_named(points))
 
 
-def _scored(points):
-    """Sentences on the check points that were seen, and on those that were not."""
-    scored = f"{points.scored} of {points.surveyed} surveyed check points"
-    yield f"{scored} {'was' if points.scored == 1 else 'were'} seen and scored."
-    hidden = "not seen although the cloud covers the surroundings"
-    unfit = "found, but refused, as place, kind or size does not fit"
-    for words, some in ((hidden, points.hidden), (unfit, points.misplaced)):
-        if n := len(some):
-            them = f"{n} check point{' was' if n == 1 else 's were'} {words} ({_names(some)})"
-            yield f"{them}: the error there is unknown, and counts against this result."
-    for where, number in _away(points):
-        yield f"{number} {'stands' if number == 1 else 'stand'} where {where}."
-
-
-def _away(points):
-    """What was scanned where points without points of the cloud stand, and their number."""
-    there = {SEEN_BY_OTHERS: "only another scanner saw the target"}
-    return Counter(there.get(why, "nothing was scanned") for _, why in points.outside).items()
+def _elsewhere(points):
+    """Number of points without points of the cloud, by whether another scanner saw them."""
+    return Counter(why == SEEN_BY_OTHERS for _, why in points.outside)
 
 
 def _control(report):
@@ -148,9 +259,12 @@ def _control(report):
     if points.surveyed:
         return control_statement(points)
     if report.is_held_by_others:
-        sentence = "No point of its own takes part: those of other drives hold it, through ties."
-        return StatementRow("Control points", "amber", sentence)
-    return StatementRow("Control points", "red", _uncontrolled(report))
+        return StatementRow.of("Control points", Statement("control of other drives", "warning"))
+    values = {
+        "is_tied": report.ties is not None and report.ties["used"] > 0,
+        "sigma": max((stretch.sigma for stretch in report.support.weak), default=0.0),
+    }
+    return StatementRow.of("Control points", Statement("no control point", "fault", values))
 
 
 def control_statement(points: PointCounts) -> StatementRow:
@@ -161,110 +275,131 @@ def control_statement(points: PointCounts) -> StatementRow:
     points : PointCounts
         Of the control points.
     """
-    parts = [f"{points.scored} of {points.surveyed} surveyed points used"]
-    lost = {"refused": points.refused + points.misplaced, "not seen": points.hidden}
-    parts += [f"{len(some)} {words} ({_names(some)})" for words, some in lost.items() if some]
-    parts += [f"{number} where {where}" for where, number in _away(points)]
+    values = {
+        "scored": points.scored,
+        "surveyed": points.surveyed,
+        "refused": _names(points.refused + points.misplaced),
+        "hidden": _names(points.hidden),
+        "elsewhere": _elsewhere(points),
+    }
+    severity: Severity = "note"
     if points.refused or points.missing:
-        rating = "amber"
-    else:
-        rating = "green"
-    return StatementRow("Control points", rating, ", ".join(parts) + ".", _named(points))
+        severity = "warning"
+    said = Statement("control points", severity, values)
+    return StatementRow.of("Control points", said, items=_named(points))
 
 
 def _datum(report) -> Iterator[StatementRow]:
     """What the control as a whole differs by from the cloud."""
     if report.datum:
-        terms = ", ".join(f"{each.term} {length_in_words(each.length)}" for each in report.datum)
-        sentence = (
-            f"Control and cloud differ by one linear term each ({terms}), which check points of "
-            "the same survey cannot show."
-        )
-        items = tuple((each.term, each.sentence) for each in report.datum)
-        yield StatementRow("Datum", "amber", sentence, items)
-
-
-def _uncontrolled(report):
-    """A sentence on a result without control points: what it is relative to."""
-    result = "No control point takes part: nothing but the POS says where the cloud lies."
-    if report.ties is not None and report.ties["used"]:
-        result += (
-            " Passes are fitted to one another by what two of them both saw: accuracy is relative "
-            "only, and an error that all of them share stays in the cloud."
-        )
-    sigma = max((stretch.sigma for stretch in report.support.weak), default=0.0)
-    if sigma > 0:
-        result += f" An error of up to {length_in_words(sigma)} is to be expected (one sigma)."
-    return result
+        lengths = {each.term: each.length for each in report.datum}
+        items = ((each.term, each.sentence) for each in report.datum)
+        said = Statement("datum", "warning", {"lengths": lengths})
+        yield StatementRow.of("Datum", said, items=items)
 
 
 def _extrapolated(report):
     """The parts that no control point holds: green where they are as good as what is judged."""
     weak = report.support.weak
     if not weak and report.is_held_by_others:
-        sentence = "Control points of other drives hold the whole drive, through ties."
-        return StatementRow("Extrapolated", "amber", sentence)
+        return StatementRow.of("Extrapolated", Statement("held by other drives", "warning"))
     if not weak:
-        return StatementRow("Extrapolated", "green", "Control points hold the whole drive.")
+        return StatementRow.of("Extrapolated", Statement("held"))
+    share = report.coverage.share_extrapolated
     largest = max(stretch.sigma for stretch in weak)
     after = report.judgement[1]
-    sentence = (
-        f"No control holds {report.seconds_extrapolated:.1f} s "
-        f"({report.metres_extrapolated:.0f} m) of the drive, "
-        f"{percent(report.coverage.share_extrapolated)} of the points: "
-        "the correction is extrapolated there, and an error of up to "
-        f"{length_in_words(largest)} is to be expected (one sigma)."
-    )
+    severity = "warning"
+    if after is not None and largest <= after.maximum[4] and share < 1:
+        severity = "note"
+    values = {
+        "seconds": report.seconds_extrapolated,
+        "metres": report.metres_extrapolated,
+        "share": share,
+        "sigma": largest,
+    }
+    said = [Statement("extrapolated", severity, values)]
     sigma = report.position_sigma
     if sigma is not None and not report.support.contains(np.array(sigma["time"])):
-        sentence += f" Between control points it is up to {length_in_words(sigma['largest'])}."
-    is_small = after is not None and largest <= after.maximum[4]
-    if is_small and report.coverage.share_extrapolated < 1:
-        rating = "green"
-    else:
-        rating = "amber"
-    return StatementRow("Extrapolated", rating, sentence, capped(_stretches(weak)))
-
-
-def _stretches(weak):
-    """Items of the weak stretches, the worst first."""
-    for stretch in sorted(weak, key=lambda stretch: -stretch.sigma):
-        yield (
-            f"{stretch.start:.1f} to {stretch.end:.1f} s, "
-            f"{stretch.chainage:.0f} to {stretch.chainage + stretch.length_m:.0f} m of the way",
-            f"{stretch.why}; sigma up to {length_in_words(stretch.sigma)}",
+        said.append(Statement("between control points", values={"sigma": sigma["largest"]}))
+    items = [
+        stretch_in_words(
+            stretch.start,
+            stretch.end,
+            stretch.chainage,
+            stretch.length_m,
+            stretch.why,
+            stretch.sigma,
         )
+        for stretch in sorted(weak, key=lambda stretch: -stretch.sigma)
+    ]
+    return StatementRow.of("Extrapolated", *said, items=capped(items))
 
 
 def _left_out(report) -> Iterator[StatementRow]:
     """What remains at control points that the others alone correct."""
     left_out = report.control.left_out
-    if left_out is not None and left_out.n and report.judgement[2] == "check":
-        axes = ", ".join(length_in_words(value) for value in left_out.rmse[:3])
-        sentence = (
-            f"RMSE {length_in_words(left_out.rmse[4])} in 3D ({axes} in E, N, H) at control points "
-            "that the others alone correct."
-        )
-        yield StatementRow("Left out in turn", "green", sentence)
-    elif left_out is not None and not left_out.n and report.points("control").scored == 1:
-        sentence = "A single control point has no others: the POS's own sigmas alone check it."
-        yield StatementRow("Left out in turn", "amber", sentence)
+    if left_out is None:
+        return
+    if left_out.n and report.judgement[2] == "check":
+        values = {"rmse": left_out.rmse[:3], "rmse_3d": left_out.rmse[4]}
+        yield StatementRow.of("Left out in turn", Statement("left out", values=values))
+    elif not left_out.n and report.points("control").scored == 1:
+        yield StatementRow.of("Left out in turn", Statement("single control point", "warning"))
 
 
 def _sigma(report) -> Iterator[StatementRow]:
     """What the estimate itself believes of its result."""
     sigma = report.position_sigma
-    if sigma is not None:
-        sentence = (
-            f"Up to {length_in_words(sigma['largest'])} (at {sigma['time']:.1f} s), "
-            f"{length_in_words(sigma['median'])} at half of the epochs: one sigma in 3D of the "
-            "corrected position."
-        )
-        stated = sigma.get("stated", np.inf)
-        is_larger = sigma["median"] > stated
-        if is_larger:
-            sentence += f" The POS states {length_in_words(stated)} of the recorded one."
-        yield StatementRow("Sigma", "amber" if is_larger else "green", sentence)
+    if sigma is None:
+        return
+    values = {name: sigma[name] for name in ("largest", "time", "median")}
+    said = [Statement("sigma", values=values)]
+    stated = sigma.get("stated", np.inf)
+    if sigma["median"] > stated:
+        said.append(Statement("stated sigma", "warning", {"sigma": stated}))
+    yield StatementRow.of("Sigma", *said)
+
+
+def has_assumed_sigma(rows: Iterable[dict]) -> bool:
+    """Return True if a sigma of the POS is a default.
+
+    Parameters
+    ----------
+    rows : iterable of dict
+        ``assumed`` of a document.
+    """
+    return any(row["key"] in SIGMAS for row in rows)
+
+
+def assumed_statement(
+    rows: list[dict], purpose: str, rating: str, uses: Mapping[str, str] | None = None
+) -> Iterator[StatementRow]:
+    """The accuracies that nobody stated, with the defaults that stand in; nothing without any.
+
+    Parameters
+    ----------
+    rows : list of dict
+        ``assumed`` of a document: key, value, unit and, where there is one, the estimate.
+    purpose : str
+        What becomes of them: the end of the sentence.
+    rating : str
+        Of RATINGS, where a sigma is among them; else it is green.
+    uses : mapping of str to str, optional
+        What a default without an estimate is used for, by its key.
+    """
+    if not rows:
+        return
+    severity: Severity = "note"
+    if has_assumed_sigma(rows):
+        severity = SEVERITIES[RATINGS.index(rating)]
+    values = {
+        "count": len(rows),
+        "purpose": purpose,
+        "sections": list(dict.fromkeys(f"[{row['key'].partition('.')[0]}]" for row in rows)),
+        "has_sigma": has_assumed_sigma(rows),
+    }
+    items = (assumed_in_words(row, (uses or {}).get(row["key"])) for row in rows)
+    yield StatementRow.of("Assumed", Statement("assumed", severity, values), items=items)
 
 
 def warning_statements(warnings: Iterable[str]) -> Iterator[StatementRow]:
@@ -276,13 +411,18 @@ def warning_statements(warnings: Iterable[str]) -> Iterator[StatementRow]:
     """
     doubts = dict.fromkeys(warnings)
     if doubts:
-        count = counted(len(doubts), "warning")
-        yield StatementRow("Warnings", "amber", f"{count}:", tuple(("", text) for text in doubts))
+        said = Statement("warnings", "warning", {"count": len(doubts)})
+        yield StatementRow.of("Warnings", said, items=[("", text) for text in doubts])
 
 
 def _named(points):
     """Items of the points that took no part although they were surveyed."""
-    return capped([*points.refused, *points.missing, *points.outside])
+    rows = (*points.refused, *points.missing, *points.outside)
+    return capped((name, reason_in_words(why)) for name, why in rows)
+
+
+def _names(points):
+    return [name for name, _ in points]
 
 
 def capped(items: Iterable[tuple[str, str]]) -> tuple[tuple[str, str], ...]:
@@ -298,10 +438,3 @@ def capped(items: Iterable[tuple[str, str]]) -> tuple[tuple[str, str], ...]:
     if more <= 0:
         return items
     return (*items[:NAMED], ("", f"and {more} more"))
-
-
-def _names(points):
-    """Names of points in a sentence."""
-    names = [name for name, _ in points[:NAMED]]
-    more = len(points) - len(names)
-    return ", ".join(names) + (f" and {more} more" if more else "")

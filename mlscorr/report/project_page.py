@@ -8,10 +8,9 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import FormatStrFormatter
 
-from mlscorr.report.map_frame import corners, frame
+from mlscorr.report.maps import corners, frame, write_names
 from mlscorr.report.pages import Page, data_uri
 from mlscorr.report.style import new_figure, nice, styled, svg
-from mlscorr.report.target_map import write_names
 from mlscorr.wording import counted
 
 SECTIONS = {"drives": "Drives", "map": "Map"}

@@ -1,16 +1,15 @@
-"""What the report says of a correction in words and in tables."""
+"""The tables of a correction's page, and what is said of its ties."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from scipy.special import chdtri
 
-from mlscorr.estimate import SETTINGS as ESTIMATE
 from mlscorr.evaluate import Statistics
 from mlscorr.report.correction_report import CorrectionReport
-from mlscorr.report.settings import SETTINGS
-from mlscorr.wording import counted, length_in_words, number
+from mlscorr.report.wording import in_words
+from mlscorr.survey import Statement
 
 AXES = ("E", "N", "H")
 QUANTITIES = ("Easting", "Northing", "Height (vertical)", "Horizontal distance", "3D distance")
@@ -105,116 +104,55 @@ def _columns(statistics: Statistics):
     return statistics.table[:, [1, 2, 0, 3, 4]]  # the mean first
 
 
-def count(report: CorrectionReport, role: str) -> str:
-    """How many points in words: '8 points', or '12 observations of 8 points'.
+def tie_statements(section: dict[str, Any] | None, control: int) -> list[Statement]:
+    """What ties between passes did: how far apart these are, and what control that spares.
 
     Parameters
     ----------
-    report : CorrectionReport
-    role : str
-        ``control`` or ``check``.
-    """
-    points, n = report.count(role)
-    words = counted(points, "point")
-    if points == n:
-        return words
-    return f"{n} observations of {words}"
-
-
-def verdict(report: CorrectionReport) -> tuple[list[str], bool]:
-    """The result in sentences, and whether something speaks against it.
-
-    Parameters
-    ----------
-    report : CorrectionReport
+    section : dict or None
+        ``ties`` of report.json.
+    control : int
+        Number of control points that took part.
 
     Returns
     -------
-    sentences : list of str
-    worse : bool
-        It became worse on an axis, by more than the sigmas of targets and correction allow, or
-        check points are missing where they should have been seen.
+    list of Statement
+        Why there are none in one of them; none where nobody looked for any.
     """
-    before, after, kind = report.judgement
-    if before is None or after is None:
-        if report.targets:
-            none = "No target was found"
-        else:
-            none = "There is no surveyed point"
-        return [f"{none} that could tell how good the correction is."], True
-    sigma = (report.check if kind == "check" else report.control).sigma
-    # as large as this the RMS of n is by chance, as it is known no better there than by its sigma
-    ratio = np.sqrt(chdtri(after.n, ESTIMATE.significance) / after.n)
-    limit = np.inf if sigma is None else sigma * ratio
-    rise = np.where(after.rmse[:3] > limit, (after.rmse - before.rmse)[:3], 0.0)
-    axes = dict(zip(AXES, rise, strict=True))
-    worse = [f"{a} by {number(by)} m" for a, by in axes.items() if by > SETTINGS.difference]
-    sentences = [
-        _plainly(before.rmse[4], after.rmse[4], kind, report.holds_everywhere, bool(worse)),
-        _result(report, before.rmse[:3], after.rmse[:3], kind),
-    ]
-    if worse:
-        points = count(report, "check" if kind == "check" else "control")
-        axes = ", ".join(worse)
-        sentences.append(f"After the correction it is worse than before: {axes} (RMS of {points}).")
-    return sentences, bool(worse or report.points("check").missing)
+    if section is None:
+        return []
+    if section["n"] == 0:
+        return [Statement("no ties", values={"reason": section["reason"]})]
+    if section["used"] == 0:
+        values = {"n": section["n"], "has_control": control > 0}
+        return [Statement("unused ties", "warning", values)]
+    apart = {state: section[state]["median"] for state in ("before", "after")}
+    said = [Statement("ties", values={"n": section["n"], **apart})]
+    wrong = section["n"] - section["used"]
+    if wrong:
+        said.append(Statement("contradicting ties", values={"wrong": wrong}))
+    if control == 0:
+        return [*said, Statement("relative ties", "warning")]
+    if "share" not in section:  # an area's, of which the drive is a piece
+        return said
+    said.append(Statement("share of control", values={"control": section["share"]["control"]}))
+    sufficient = section["sufficient_control"]
+    if sufficient is None or control < 2:
+        return said
+    if sufficient < control:
+        values = {"control": control, "sufficient": sufficient}
+        return [*said, Statement("sufficient control", values=values)]
+    return [*said, Statement("all control needed", values={"control": control})]
 
 
-def _plainly(before, after, kind, holds_everywhere, is_worse):
-    """What the correction did, in plain words; lengths are 3D RMSE in m.
+def tie_sentences(section: dict[str, Any] | None, control: int) -> list[str]:
+    """What ties between passes did, in sentences for a reader who never heard of them.
 
-    It boasts of no factor where a part of the cloud may be as far off as it was.
+    Parameters
+    ----------
+    section : dict or None
+        ``ties`` of report.json.
+    control : int
+        Number of control points that took part.
     """
-    by = {
-        "check": "as independent check points tell",
-        "leave-one-out": "as control points tell that were left out in turn",
-        "fit": "but only at the points that it was made from: nothing independent can judge it",
-    }[kind]
-    pair = f"from {length_in_words(before)} to {length_in_words(after)} off the surveyed places"
-    if kind != "fit" and abs(before - after) <= SETTINGS.difference:
-        return f"The correction changed next to nothing, {by}: {pair}."
-    if after > before and not is_worse:
-        return f"The correction changed less than these targets tell, {by}: {pair}."
-    if after > before:
-        return f"The correction made the cloud worse, {by}: {pair}. Don't use it."
-    closer = before / max(after, 1e-4)
-    if not holds_everywhere:
-        if kind == "check":
-            where = "at the points that were seen"
-        else:
-            where = "where control holds it"
-        return f"The correction brought the cloud {pair} {where}, {by}."
-    if closer >= 1.5 and kind != "fit":
-        times = f" ({closer:.0f} times closer)"
-    else:
-        times = ""
-    return f"The correction brought the cloud {pair}{times}, {by}."
-
-
-def _result(report, before, after, kind):
-    """RMSE before and after in one sentence that says what it rests on."""
-    low = min(*before, *after)
-    if low >= 0.03:
-        decimals = 2
-    else:
-        decimals = 3 if low >= 0.003 else 4
-    pair = ["/".join(number(value, decimals) for value in values) for values in (before, after)]
-    figures = f"RMSE {pair[0]} m before, {pair[1]} m after (E/N/H)"
-    if kind == "check":
-        points = count(report, "check")
-        return f"Check points: {figures}, {points} that took no part in the estimate."
-    points = count(report, "control")
-    if kind == "leave-one-out":
-        is_surveyed = report.points("check").surveyed > 0
-        if is_surveyed:
-            none = "No check point was seen."
-        else:
-            none = "There are no check points."
-        return (
-            f"{none} Control points, each left out in turn and predicted from "
-            f"the others: {figures}, {points}."
-        )
-    return (
-        f"There is no independent check: every target used ({points}) made the correction. The "
-        f"fit, {figures}, does not tell how good the correction is elsewhere."
-    )
+    return in_words(tie_statements(section, control))

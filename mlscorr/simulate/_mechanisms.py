@@ -6,22 +6,22 @@ anything takes one half, what grades a diagnosis takes the other, and no pair is
 """
 
 import hashlib
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, fields, replace
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from mlscorr.effects import run_file
-from mlscorr.simulate.displacement import RecordedPoints
 from mlscorr.simulate.scene import UP
+from mlscorr.simulate.survey import PulseBlock, SimulatedSurvey
+from mlscorr.survey import Mounting, Trajectory
 
 Described = dict[str, tuple[Callable, tuple[str, float], tuple[str, str]]]
-
 MOMENT = 0.3  # s to each side, over which speed, turns and acceleration are taken
 EPOCH = 0.1  # s between the times at which the motion is worked out
-
 DIRECTIONS = {  # words of which a right lead has one; unit; largest size
     "beam": ("range error", "m", 0.5),
     "scan": ("scan angle error|across|roll error|range error", "rad", 0.02),
@@ -54,9 +54,71 @@ COVARIATES = {  # words of which a right lead has one
     "way": "place|time",
     "place": "place|time|map",
 }
+SHAPES = (
+    "linear",
+    "square",
+    "absolute",
+    "threshold",
+    "wave",
+    "saturating",
+    "bump",
+    "sawtooth",
+)
 
 
-SHAPES = (*("linear", "square", "absolute", "threshold", "wave", "saturating", "bump", "sawtooth"),)
+@dataclass(frozen=True)
+class RecordedPoints:
+    """Points as recorded, and what they were georeferenced with.
+
+    Parameters
+    ----------
+    gps_time : (n,) array
+        Units: s.
+    xyz : (n, 3) array
+        On the map. Units: m.
+    scanner_xyz : (n, 3) array
+        In the scanner's frame. Units: m.
+    trajectory : Trajectory
+        Of all passes.
+    mounting : Mounting
+    """
+
+    gps_time: np.ndarray
+    xyz: np.ndarray
+    scanner_xyz: np.ndarray
+    trajectory: Trajectory
+    mounting: Mounting
+
+
+@dataclass(frozen=True)
+class DisplacedSurvey(SimulatedSurvey):
+    """A SimulatedSurvey with one scanner whose points are recorded elsewhere.
+
+    ``move`` is a function of RecordedPoints that returns by how much, (n, 3) in m on the map.
+    """
+
+    move: Any = None
+
+    @classmethod
+    def of(cls, survey: SimulatedSurvey, move: Callable) -> "DisplacedSurvey":
+        """The same survey, moved.
+
+        Parameters
+        ----------
+        survey : SimulatedSurvey
+        move : function
+            Of RecordedPoints: by how much they are moved, (n, 3) in m on the map.
+        """
+        known = {field.name: getattr(survey, field.name) for field in fields(survey)}
+        return cls(**known, move=move)
+
+    def blocks(self, **size: int) -> Iterator[PulseBlock]:
+        """Blocks as of the survey, their points moved."""
+        for block in super().blocks(**size):
+            cloud = block.cloud
+            poses = (self.trajectory, self.mounting)
+            points = RecordedPoints(cloud.gps_time, cloud.xyz, block.pulses.scanner_xyz, *poses)
+            yield replace(block, cloud=replace(cloud, xyz=cloud.xyz + self.move(points)))
 
 
 @dataclass(frozen=True)

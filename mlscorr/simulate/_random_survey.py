@@ -111,13 +111,18 @@ def random_scenario(rng: Generator, name: str = "survey") -> Scenario:
     check = int(np.clip(rng.integers(4, 9), 4, max(4, room - 12)))
     control = int(np.clip(rng.integers(12, 25), 12, max(12, room - check)))
     end = 2 * duration + 30.0 if two else duration
+    kind = "street"
+    bends = 5.0, 40.0
+    if river:
+        kind = "river"
+        bends = 3.0, 8.0
     place = rng.uniform([400e3, 3.2e6], [600e3, 3.5e6])
     parts = {
         "name": name,
         "origin": (*place.round(), round(rng.uniform(5, 300))),
         "start_time": round(rng.uniform(2e4, 5.8e5)),
         "scene": {
-            "kind": "river" if river else "street",
+            "kind": kind,
             "reference": bool(rng.random() < MIX.references),
             "gaps": rng.uniform(0.2, 0.6),
             "trees": rng.uniform(0.0, 6.0),
@@ -127,7 +132,7 @@ def random_scenario(rng: Generator, name: str = "survey") -> Scenario:
         "drive": {
             "duration": duration,
             "speed": speed,
-            "turns": rng.uniform(3.0, 8.0) if river else rng.uniform(5.0, 40.0),
+            "turns": rng.uniform(*bends),
             "passes": _passes(rng, river, two),
         },
         "scanner": [scanner],

@@ -1,4 +1,4 @@
-"""What a simulated survey should be, as one frozen value; in files, scenario.toml.
+"""What a simulated survey should be, as one frozen value, and scenario.toml, which states it.
 
 Lengths in m, times in s, angles in deg. Every default says where it comes from.
 """
@@ -9,6 +9,8 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from mlscorr.effects import Effect, in_order, make_effect
+from mlscorr.io.store import read_toml
+from mlscorr.io.trajectories import check_crs
 from mlscorr.survey import WEEK
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -178,3 +180,41 @@ DEMO = Scenario(  # slow and coarse, so that a million points are enough
     # in real time, not smoothed afterwards, so that the drift is easy to see
     pos=PosScenario(processing="filtered", outages=((25.0, 25.0),), canyons=((4.0, 12.0),)),
 )
+FILES = (("scene", "file"), ("drive", "file"), ("pos", "error_file"))  # that a scenario may name
+
+
+def read_scenario(path: Path | str) -> Scenario:
+    """Scenario of a TOML file; the files it names stand relative to it.
+
+    Raises ValueError for bad TOML, unknown keys (with the nearest known one) and values that no
+    survey can have; FileNotFoundError for files that aren't there.
+
+    Parameters
+    ----------
+    path : path
+    """
+    path = Path(path)
+    scenario = read_toml(path, Scenario, "a scenario")
+    check_crs(scenario.crs)
+    for part, key in FILES:
+        section = getattr(scenario, part)
+        if (name := getattr(section, key)) is None:
+            continue
+        file = path.parent / name
+        if not file.is_file():
+            raise FileNotFoundError(f"{part}.{key} of {path} names {file}, which does not exist.")
+        scenario = scenario.model_copy(
+            update={part: section.model_copy(update={key: file.absolute()})}
+        )
+    return scenario
+
+
+def scenario_files(scenario: Scenario) -> list[Path]:
+    """Paths of the files that a scenario names, which a simulation must not overwrite.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    """
+    named = (getattr(getattr(scenario, part), key) for part, key in FILES)
+    return [file for file in named if file is not None]

@@ -158,7 +158,9 @@ def _degrees(radians):
     """The number in deg that is these radians when it is read: rounded where that is the same."""
     degrees = np.degrees(radians)
     rounded = np.round(degrees, DECIMALS)
-    return float(rounded if np.radians(rounded) == radians else degrees)
+    if np.radians(rounded) == radians:
+        return float(rounded)
+    return float(degrees)
 
 
 def _angles(boresight):
@@ -168,5 +170,6 @@ def _angles(boresight):
         angles = boresight.as_euler("xyz", degrees=True)
     rounded = np.round(angles, DECIMALS) + 0.0
     repeated = Rotation.from_euler("xyz", rounded, degrees=True)
-    same = np.array_equal(repeated.as_quat(), boresight.as_quat())
-    return (rounded if same else angles).tolist()
+    if np.array_equal(repeated.as_quat(), boresight.as_quat()):
+        return rounded.tolist()
+    return angles.tolist()

@@ -13,7 +13,7 @@ from mlscorr.evaluate import Score, Statistics, TargetRow
 from mlscorr.frames import attitude_from_angles
 from mlscorr.report import CorrectionReport, Coverage, FileRow, write_report
 from mlscorr.report.correction_report import array
-from mlscorr.survey import CloudFile, ControlPoints, Survey, Trajectory
+from mlscorr.survey import CloudFile, ControlPoints, Statement, Survey, Trajectory
 
 START = 357881.0  # s, GPS week seconds
 SPEED = 6.0  # m/s
@@ -78,10 +78,15 @@ def fabricate(trajectory, count=8, checks=True, rng=None, names=None):
                 after=after,
                 left_out=np.array([0.06, 0.04, 0.038]) * (1.0 if role == "control" else np.nan),
                 used=role == "control",
-                reason=None if role == "control" else "check point",
+                why=None if role == "control" else Statement("check point"),
             )
         )
     return survey_of(trajectory), correction, report_of(trajectory, rows)
+
+
+def because(text):
+    "A reason in words that no room has a key for, as that of a report which was read"
+    return Statement("not matched", values={"why": text})
 
 
 def survey_of(trajectory):

@@ -102,7 +102,7 @@ def test_heights_of_another_datum_are_found():
 
 
 def test_a_default_sigma_is_called_assumed():
-    "Where nobody stated the sigma of the POS, the sentence says so, and the way out"
+    "Where nobody stated the sigma of the POS, it is among the values of the statement"
 
     def lower(place):
         return place - [0.0, 0.0, 0.5]
@@ -113,9 +113,7 @@ def test_a_default_sigma_is_called_assumed():
     (assumed,) = datum_differences(points, bare, Pos(assumed=("position_sigma",)))
     assert stated.assumed_sigma is None
     assert assumed.assumed_sigma == pytest.approx(0.02)  # m
-    assert assumed.sentence.startswith(stated.sentence)
-    assert "0.02 m is assumed" in assumed.sentence
-    assert "[pos]" in assumed.sentence
+    assert assumed.statement.values["assumed_sigma"] == assumed.assumed_sigma
 
 
 @pytest.mark.parametrize("rows", [slice(0, 40), slice(None)])
@@ -159,37 +157,34 @@ def test_the_origin_of_coordinates_changes_nothing():
     assert there.log_evidence == pytest.approx(here.log_evidence, abs=0.01)
 
 
-WORDS = {  # catalogue of the sentences
-    "shift": ([0.8, 0.4], "0.89 m beside the cloud as the POS puts it (E +0.80, N +0.40 m"),
-    "height": ([-0.3], "0.30 m below the cloud"),
-    "scale": ([4e-4], "larger than in the cloud by +400 +/- 10 ppm (0.040 m at 100 m"),
-    "turn": ([TURN], "turned to the left against the cloud by +0.0300 +/- 0.0006 deg"),
-    "tilt": ([4e-4, -1e-4], "rises by +0.40 +/- 0.01 mm/m towards east and -0.10 +/- 0.01 mm/m"),
+ALONE = {  # values that no other term has
+    "shift": {"length", "assumed_sigma"},
+    "height": {"assumed_sigma"},
+    "scale": {"sigma", "extent", "length", "ground", "is_ground"},
+    "turn": {"sigma", "extent", "length", "ground"},
+    "tilt": {"sigma", "extent", "length"},
 }
 
 
 @pytest.mark.parametrize("term", TERMS)
-def test_each_term_has_its_sentence_and_row(term):
-    "What, how large, how sure, the likely cause and the way out; and the same as numbers"
-    size, words = WORDS[term]
+def test_each_term_is_a_statement_and_a_row(term):
+    "What, how large, how sure, and beside what of the map; and the same as numbers"
+    count = {"shift": 2, "tilt": 2}.get(term, 1)
     ground = map_factors(CENTRAL, DRIVE.position[0])
-    sigma = np.full(len(size), 1e-5)
-    found = DatumDifference(term, np.array(size), sigma, np.log(5e7), 12, 100.0, ground)
-    assert words in found.sentence
-    assert "12 observations, Bayes factor 1e8 against an error of the POS" in found.sentence
-    assert "corrected cloud follows the control" in found.sentence
+    size = np.full(count, 4e-4)
+    found = DatumDifference(term, size, np.full(count, 1e-5), 17.7, 12, 100.0, ground)
+    assert found.statement.key == term
+    assert found.statement.values.keys() == {"size", "log_evidence", "observations"} | ALONE[term]
     row = found.document()
-    assert (row["term"], row["unit"], row["size"]) == (term, UNITS[term], size)
+    assert (row["term"], row["unit"], row["size"]) == (term, UNITS[term], size.tolist())
+    assert row["sentence"] == found.sentence
     assert row["map_factor"]["projection"] == pytest.approx(0.9996065, abs=1e-6)
 
 
-def test_a_scale_stands_beside_that_of_the_map():
-    "The factor of the projection, what ground distances would be larger by, and what to set"
+@pytest.mark.parametrize(("size", "is_ground"), [(4e-4, True), (5e-3, False)])
+def test_a_scale_stands_beside_that_of_the_map(size, is_ground):
+    "400 ppm are ground distances where the map shortens by 394 ppm, 5000 ppm are not"
     ground = map_factors(CENTRAL, DRIVE.position[0])
-    found = DatumDifference("scale", np.array([4e-4]), np.array([1e-5]), 20.0, 12, 100.0, ground)
-    assert "larger by +394 ppm there (scale factor of the projection 0.999607)" in found.sentence
-    assert 'which fits: if the control is in them, set scale_factor = "ground"' in found.sentence
-    assert "scale_factor = 0.999600" in found.sentence
-    other = replace(found, size=np.array([5e-3]))
-    assert "which does not fit" in other.sentence and '"ground"' not in other.sentence
-    assert "scale_factor = 0.995025" in other.sentence
+    found = DatumDifference("scale", np.array([size]), np.array([1e-5]), 20.0, 12, 100.0, ground)
+    assert found.statement.values["is_ground"] == is_ground
+    assert not replace(found, ground=None).statement.values["is_ground"]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mlscorr.evaluate import Statistics, failures, read_gate
-from mlscorr.evaluate.quality import quantities
+from mlscorr.evaluate.quality import failed, quantities
 
 RESIDUALS = np.array([[0.03, 0.00, -0.05], [-0.03, 0.04, 0.05]])
 COUNTS = {"n_surveyed": 9, "n_seen": 7, "n_scored": 6, "n_unseen": 1}
@@ -64,17 +64,18 @@ def test_a_gate_compares_the_quantity_that_it_names(quantity, value):
     assert len(failures([read_gate(f"{quantity} < {value + 1e-6}")], REPORT)) == 1
 
 
-def test_the_sentence_names_the_axis_in_full_with_its_value():
+def test_a_failure_names_the_axis_in_full_with_its_value():
     "Who meant the horizontal error by h sees that it is the height"
-    (sentence,) = failures([read_gate("check.rmse_h > 0.03")], REPORT)
-    assert sentence == "check.rmse_h: rmse of check points in height (m) is 0.05 > 0.03."
+    (failure,) = failed([read_gate("check.rmse_h > 0.03")], REPORT)
+    assert failure.key == "exceeded"
+    assert failure.values["what"] == "rmse of check points in height (m)"
+    assert failure.values["value"] == pytest.approx(0.05)
 
 
 def test_what_was_not_determined_is_not_good_enough():
     "Without any value neither > nor < lets a survey pass"
     for text in ("control.rmse_e > 1", "control.rmse_e < 0", "leave_one_out.max_3d > 1"):
-        (sentence,) = failures([read_gate(text)], REPORT)
-        assert sentence.endswith("was not determined.")
+        assert [failure.key for failure in failed([read_gate(text)], REPORT)] == ["not determined"]
 
 
 def test_without_a_weak_stretch_no_limit_on_it_is_exceeded():

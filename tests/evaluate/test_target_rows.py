@@ -9,7 +9,7 @@ import pytest
 from mlscorr.correction import Correction
 from mlscorr.estimate import TargetTest
 from mlscorr.evaluate import PointCounts, surveyed_rows, unseen_rows
-from mlscorr.evaluate.target_rows import target_rows
+from mlscorr.evaluate.scores import target_rows
 from mlscorr.matching import Refusal
 from mlscorr.survey import PointCloud, Statement, Survey
 from mlscorr.targets import NO_POINTS, Candidates
@@ -39,7 +39,7 @@ def test_control_stands_before_check(matched, correction):
     assert [row.name for row in rows] == list(matched.name)
     assert [row.role for row in rows] == ["control"] * 10 + ["check"] * 6
     assert [row.used for row in rows] == [True] * 10 + [False] * 6
-    assert {row.reason for row in rows[10:]} == {"check point"}
+    assert {row.why.key for row in rows[10:]} == {"check point"}
 
 
 def test_outliers_give_their_statistic(matched, correction):
@@ -49,7 +49,8 @@ def test_outliers_give_their_statistic(matched, correction):
     rows = surveyed_rows(twice, matched[:0], correction, [test])
     wrong = [row for row in rows if not row.used]
     assert [row.name for row in wrong] == ["T04", "T04"]
-    assert {row.reason for row in wrong} == {"outlier: statistic 41.3 against 16.3"}
+    assert {row.why.key for row in wrong} == {"outlier"}
+    assert wrong[0].why.values == {"statistic": 41.26, "critical": 16.27}
 
 
 def test_rows_hold_misclosures_and_their_sigma(matched, correction):
@@ -118,6 +119,6 @@ def test_points_without_a_pose_are_the_better_reason(matched):
         Refusal("T09", None, reason("not there")),
     ]
     lost, other = unseen_rows(survey, refusals, candidates(both), ())
-    begin = f"25 points near it, at {TIME + 41:.1f} to {TIME + 43.5:.1f} s, were measured in a gap"
-    assert lost.reason.startswith(begin) and lost.scanned
+    assert lost.why.key == "no pose" and lost.scanned
+    assert lost.why.values == {"points": 25, "start": TIME + 41.0, "end": TIME + 43.5}
     assert other.reason == "not there" and not other.scanned

@@ -11,7 +11,7 @@ from mlscorr.io.store import FileIdentity, TaskStore, digest
 from mlscorr.pipeline.project.document import _reason, older_results
 from mlscorr.pipeline.project.tasks import Written
 from mlscorr.report import first_screen
-from tests.beds.reports import drive, fabricate
+from tests.beds.reports import because, drive, fabricate
 
 CHANGES = {  # what a drive lacks, and what of its first screen says so
     "hidden check point": "1 check point was not seen although the cloud covers the surroundings",
@@ -27,7 +27,7 @@ def test_a_doubt_is_told_by_its_reason(lack):
     checks = lack != "no check point"
     report = replace(fabricate(drive(), checks=checks)[2], support=Support())
     if lack == "hidden check point":
-        lost = TargetRow.unobserved("C9", None, "check", np.zeros(3), "C9 is hidden.")
+        lost = TargetRow.unobserved("C9", None, "check", np.zeros(3), because("C9 is hidden."))
         report = replace(report, targets=[*report.targets, lost])
     if lack == "worse axis":
         report.check.after.rmse[1] = report.check.before.rmse[1] + 0.012

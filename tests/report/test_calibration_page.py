@@ -4,9 +4,13 @@ from dataclasses import replace
 
 import pytest
 
-from mlscorr.evaluate import SEEN_BY_OTHERS, TargetRow
+from mlscorr.evaluate import SEEN_BY_OTHERS, TargetRow, reason_in_words
 from mlscorr.report import calibration_page, calibration_screen, scanners_screen
-from mlscorr.report._calibration_page import component_rows
+from mlscorr.report._calibration_page import (
+    calibration_statements,
+    component_rows,
+    scanners_statements,
+)
 from tests.beds.reports import drive, fabricate, score_of, words
 
 MOUNTING = {"lever_arm": [0.1, -0.6, 0.4], "boresight": [90.0, 0.0, 35.0]}
@@ -42,43 +46,44 @@ def calibrated(determined=True, worse=False, significant=False, unseen=()):
     return content | calibration_screen(content, rows)
 
 
+def said(rows, what):
+    "Statements of the rows on something"
+    return [statement for row in rows if row.what == what for statement in row.statements]
+
+
 def test_the_page_says_first_what_the_mounting_lacks_and_what_the_site_does_not_tell():
-    "Only what exceeds its sigma threefold is named, with sigma, in one unit each"
+    "Only what exceeds its sigma threefold is named; each sentence stands before the tables"
     content = calibrated(determined=False)
-    text = words(calibration_page({"name": "site", **content}).html())
-    lacks = "lacks lever arm right -91 ± 3.0 mm, boresight about forward 0.300 ± 0.010 deg."
-    assert lacks in text
-    assert "5 of 6 parts by this geometry. Not determined, and changed only as far as the" in text
-    assert "tells it from what looks the same: lever arm up 2.0 ± 5.0 mm." in text
+    rows = calibration_statements(content, [])
+    (lacks,) = said(rows, "Mounting")
+    names = [row["name"] for row in lacks.values["components"]]
+    assert names == ["lever arm right", "boresight about forward"]
+    (undetermined,) = said(rows, "Determined")
+    assert [row["name"] for row in undetermined.values["components"]] == ["lever arm up"]
     assert content["rating"] == "amber"
-    assert text.index(lacks) < text.index("How far the cloud is")
-    assert all(row["sentence"] in text for row in content["statements"])
+    text = words(calibration_page({"name": "site", **content}).html())
+    first = text[: text.index("How far the cloud is")]
+    assert all(row["sentence"] in first for row in content["statements"])
 
 
 @pytest.mark.parametrize(
-    ("determined", "lack", "rating", "sentence"),
+    ("determined", "lack", "severity", "key"),
     [
-        (5, 0.424, "amber", "mounting lacks lever arm up 424 ± 41 mm (not determined)."),
-        (
-            5,
-            0.024,
-            "green",
-            "holds in the parts that are determined: it lacks nothing beyond 3 sigmas.",
-        ),
-        (6, 0.024, "green", "mounting holds: it lacks nothing beyond 3 sigmas."),
-        (0, 0.024, "amber", "This geometry does not tell whether the recorded mounting holds."),
+        (5, 0.424, "warning", "mounting lacks"),
+        (5, 0.024, "note", "determined parts hold"),
+        (6, 0.024, "note", "mounting holds"),
+        (0, 0.024, "warning", "mounting not told"),
     ],
 )
-def test_a_mounting_holds_where_nothing_else_is_seen(determined, lack, rating, sentence):
+def test_a_mounting_holds_where_nothing_else_is_seen(determined, lack, severity, key):
     "Ten sigmas of an undetermined part are named as such; where no part is told, none is cleared"
     content = calibrated()
     zero = {"correction": [0.0, 0.0, 0.0], "sigma": [0.01, 0.01, 0.041]}
     arm = zero | {"correction": [0.0, 0.0, lack]}
     content["lsc"] = content["lsc"] | {"lever_arm": arm, "boresight": zero}
     content["determined"] = [bool(determined)] * 2 + [determined == 6] + [bool(determined)] * 3
-    mounting = calibration_screen(content, [])["statements"][0]
-    assert mounting["rating"] == rating
-    assert mounting["sentence"].endswith(sentence)
+    (mounting,) = said(calibration_statements(content, []), "Mounting")
+    assert (mounting.key, mounting.severity) == (key, severity)
 
 
 def test_the_page_says_next_what_fits_its_clouds():
@@ -107,11 +112,12 @@ def test_points_that_another_scanner_alone_saw_are_called_so():
         TargetRow.unobserved(name, None, role, rows[0].surveyed, SEEN_BY_OTHERS, False)
         for name, role in (("T90", "control"), ("T91", "control"), ("C90", "check"))
     ]
-    said = {row["what"]: row for row in calibrated(unseen=unseen)["statements"]}
-    assert "2 where only another scanner saw the target" in said["Control points"]["sentence"]
-    assert "1 stands where only another scanner saw the target." in said["Check points"]["sentence"]
-    assert {"name": "T90", "text": SEEN_BY_OTHERS} in said["Control points"]["items"]
-    assert "nothing was scanned" not in said["Control points"]["sentence"]
+    screen = calibration_statements(calibrated(), [*rows, *unseen])
+    (control,) = said(screen, "Control points")
+    assert control.values["elsewhere"] == {True: 2}
+    assert said(screen, "Check points")[-1].values == {"count": 1, "by_others": True}
+    (row,) = (row for row in screen if row.what == "Control points")
+    assert ("T90", reason_in_words(SEEN_BY_OTHERS)) in row.items
 
 
 def test_a_calibration_that_makes_check_points_worse_is_red():
@@ -124,35 +130,23 @@ def test_check_points_that_chance_or_the_scanner_makes_worse_are_amber():
     content = calibrated(worse=True)
     none = {"correction": [0.0] * 3, "sigma": [0.01] * 3}
     right = content["lsc"] | {"lever_arm": none, "boresight": none}
-    screens = [
-        calibration_screen(content | {"lsc": right}, []),
-        calibrated(worse=True, significant=True),
-    ]
-    ends = "No part changed significantly.", "and keep what the scanner itself lacks."
-    for screen, end in zip(screens, ends, strict=True):
-        (result,) = (row for row in screen["statements"] if row["what"] == "Result")
-        assert result["rating"] == "amber"
-        assert result["sentence"].endswith(end)
+    by_chance = content | {"lsc": right}
+    by_scanner = calibrated(worse=True, significant=True)
+    for each, key in ((by_chance, "worse by chance"), (by_scanner, "worse by the scanner")):
+        (result,) = said(calibration_statements(each, []), "Result")
+        assert (result.key, result.severity) == (key, "warning")
 
 
-def test_a_scanner_that_is_off_is_amber():
-    "Ranges that lack 12 mm, and an encoder that lacks nothing, are said with their sigmas"
-    sentence = "Ranges lack 12 ± 1.0 mm, scan angles 0.10 ± 0.20 mrad per rad"
-    for significant, rating, end in (
-        (False, "green", ": nothing significant."),
-        (True, "amber", "; the mounting is free of it."),
-    ):
-        rows = calibrated(significant=significant)["statements"]
-        (row,) = (row for row in rows if row["what"] == "Scanner")
-        assert (row["rating"], row["sentence"]) == (rating, sentence + end)
-
-
-def test_a_scanner_error_that_is_not_determined_is_called_so():
-    "Significant, but with a sigma that no site should leave"
-    off = RANGES | {"significant": True, "determined": False}
-    content = calibrated() | {"scanner_errors": SCANNER | {"range_offset": off}}
-    (row,) = (r for r in calibration_screen(content, [])["statements"] if r["what"] == "Scanner")
-    assert row["sentence"].startswith("Ranges lack 12 ± 1.0 mm (not determined), scan angles 0.10")
+@pytest.mark.parametrize(
+    ("significant", "key", "severity"),
+    [(False, "scanner is right", "note"), (True, "scanner is off", "warning")],
+)
+def test_a_scanner_that_is_off_is_a_warning(significant, key, severity):
+    "Ranges that lack 12 mm, beyond their sigma or not, and an encoder that lacks nothing"
+    content = calibrated(significant=significant)
+    (scanner,) = said(calibration_statements(content, []), "Scanner")
+    assert (scanner.key, scanner.severity) == (key, severity)
+    assert scanner.values == content["scanner_errors"]
 
 
 def test_what_the_drift_explains_between_passes_is_said_apart():
@@ -160,12 +154,17 @@ def test_what_the_drift_explains_between_passes_is_said_apart():
     away = {state: {"median": size} for state, size in (("before", 0.015), ("after", 0.016))}
     ties = {"n": 90, "used": 80, "pairs": [], **away}
     content = calibrated() | {"ties": ties}
-    sentences = []
-    for more in ({}, {"with_drift": {"ties": {"after": {"median": 0.002}}}}):
-        rows = calibration_screen(content | more, [])["statements"]
-        sentences += [row["sentence"] for row in rows if row["what"] == "Two passes"]
-    assert sentences[0].endswith("are used: 1.5 cm apart before, 1.6 cm after (median).")
-    assert sentences[1] == sentences[0][:-1] + ", 2 mm without the drift."
+    drift = {"with_drift": {"ties": {"after": {"median": 0.002}}}}
+    for more, without_drift in (({}, None), (drift, 0.002)):
+        (passes,) = said(calibration_statements(content | more, []), "Two passes")
+        assert passes.values == {
+            "used": 80,
+            "n": 90,
+            "is_between_scanners": False,
+            "before": 0.015,
+            "after": 0.016,
+            "without_drift": without_drift,
+        }
 
 
 def calibrated_together(fit=0.0018):
@@ -202,14 +201,11 @@ def test_each_scanner_has_its_part():
 
 def test_how_well_scanners_fit_each_other_comes_first():
     "Double walls in mm, then sigmas; amber where nothing that both saw holds them, or not to 2 cm"
-    content = calibrated_together()
-    sentence = (
-        "Scanners left and right put a wall that both saw in one place to 1.8 mm. Scanner right "
-        "beside scanner left: lever arm to 0.3/1.3/0.4 mm right/forward/up, boresight to "
-        "0.016/0.008/0.033 deg about them (one sigma)."
-    )
-    assert content["statements"][0]["sentence"] == sentence
-    assert [content["rating"], calibrated_together(0.03)["rating"]] == ["green", "amber"]
-    lonely = calibrated_together(None)["statements"][0]
-    assert lonely["rating"] == "amber"
-    assert lonely["sentence"].startswith("No wall that scanners left and right both saw holds them")
+    for fit, severity in ((0.0018, "note"), (0.03, "warning"), (None, "warning")):
+        content = calibrated_together(fit)
+        row = scanners_statements(content)[0]
+        (fact,) = row.statements
+        assert (row.what, fact.key, fact.severity) == ("Together", "scanners together", severity)
+        assert (fact.values["first"], fact.values["name"]) == ("left", "right")
+        assert fact.values["fit"] == fit
+        assert fact.values["lever_arm"] == content["relative"]["right"]["lever_arm"]["sigma"]

@@ -5,12 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.report._viewer import viewer_data
-from mlscorr.report.cloud import CloudViews, close_ups
+from mlscorr.report.cloud import CloudViews, close_ups, viewer_data
 from mlscorr.report.correction_page import write_report
 from mlscorr.report.render import Picture
-from mlscorr.report.render._camera import Camera
 from mlscorr.report.render._views import View
+from mlscorr.report.render.view import Camera
 from mlscorr.report.settings import SETTINGS
 from tests.beds.reports import drive, fabricate, words
 from tests.beds.street_of_points import ORIGIN, street, target

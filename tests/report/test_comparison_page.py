@@ -5,10 +5,11 @@ import pytest
 
 from mlscorr.evaluate import TargetRow
 from mlscorr.report import comparison_figure, comparison_screen, method_warnings, write_comparison
-from mlscorr.report._comparison_screen import basis, ranking, verdict
+from mlscorr.report._comparison_screen import comparison_statements, ranking, verdict
+from tests.beds.reports import because
 
 PLACE = np.array([532_000.0, 3_374_000.0, 42.0])
-UNSEEN = [TargetRow.unobserved("T9", 1, "check", PLACE, "No disc there.", True)]
+UNSEEN = [TargetRow.unobserved("T9", 1, "check", PLACE, because("No disc there."), True)]
 
 
 def fake(scores, **changes):
@@ -40,18 +41,35 @@ def fake(scores, **changes):
 
 
 @pytest.mark.parametrize(
-    ("scores", "words"),
+    ("scores", "keys", "values"),
     [
-        ({"raw": 0.5, "shift": 0.2, "lsc": 0.02}, "Best is lsc: 3D RMSE 0.020 m"),
-        ({"raw": 0.5, "shift": 0.0215, "lsc": 0.02}, "Best are lsc and shift: 3D RMSE 0.020 m"),
-        ({"raw": 0.5, "ls-2": 0.02, "correct": 0.03}, "correct, with 0.030 m, is 0.010 m behind."),
-        ({"raw": 0.021, "shift": 0.02, "lsc": 0.03}, "No method improves this cloud by 2 mm"),
-        ({"raw": 0.5, "affine": None, "lsc": 0.02}, "against 0.500 m without any correction."),
+        (
+            {"raw": 0.5, "shift": 0.2, "lsc": 0.02},
+            ["best method", "best of a kind"],
+            {"name": "lsc", "about": "About lsc <&>.", "rmse": 0.02, "raw": 0.5},
+        ),
+        (
+            {"raw": 0.5, "shift": 0.0215, "lsc": 0.02},
+            ["best methods"],
+            {"names": ["lsc", "shift"], "rmse": 0.02, "raw": 0.5, "least": 0.002},
+        ),
+        (
+            {"raw": 0.5, "ls-2": 0.02, "correct": 0.03},
+            ["best method", "behind the best"],
+            {"name": "ls-2", "about": "About ls-2 <&>.", "rmse": 0.02, "raw": 0.5},
+        ),
+        (
+            {"raw": 0.021, "shift": 0.02, "lsc": 0.03},
+            ["no method improves"],
+            {"least": 0.002, "raw": 0.021},
+        ),
     ],
 )
-def test_the_verdict_says_what_the_numbers_say(scores, words):
-    "Best, tie, our own method behind, nothing gained: each in plain words"
-    assert words in " ".join(verdict(fake(scores)))
+def test_the_verdict_says_what_the_numbers_say(scores, keys, values):
+    "Best, tie, our own method behind, nothing gained"
+    said = verdict(fake(scores))
+    assert [statement.key for statement in said] == keys
+    assert said[0].values == values
 
 
 def test_the_page_is_one_file_that_sorts_and_tells_what_is_missing(tmp_path):
@@ -74,21 +92,28 @@ def test_methods_are_ranked_and_those_without_a_score_are_not():
     assert [row["name"] for row in ranking(document)] == ["lsc", "shift", "raw"]
 
 
+def said_of(document, what):
+    "Statements of a row of the first screen"
+    rows = comparison_statements(document, UNSEEN)
+    return [statement for row in rows if row.what == what for statement in row.statements]
+
+
 @pytest.mark.parametrize(
-    ("changes", "words"),
+    ("changes", "key", "values"),
     [
-        ({}, "scored by 8 check points that took no part"),
-        ({"scored_by": "control"}, "this is the mere fit"),
+        ({}, "scored by check points", {"control": 9, "check": 8}),
+        ({"scored_by": "control"}, "scored by the fit", {"control": 9}),
         (
             {"scored_by": "cross_validated", "check_points": 1, "cross_validation_groups": 9},
-            "There is only 1 check point, so the scores are cross-validated over all points: "
-            "control points, each left out in turn",
+            "cross-validated",
+            {"control": 9, "check": 1, "groups": 9},
         ),
     ],
 )
-def test_what_the_scores_rest_on_is_one_sentence(changes, words):
+def test_what_the_scores_rest_on_is_one_statement(changes, key, values):
     "Check points, cross-validation, or the fit alone"
-    assert words in basis(fake({"raw": 0.5, "lsc": 0.02}, **changes))
+    (said,) = said_of(fake({"raw": 0.5, "lsc": 0.02}, **changes), "Scores")
+    assert (said.key, said.values) == (key, values)
 
 
 def test_what_failed_stands_on_the_first_screen():
@@ -97,7 +122,8 @@ def test_what_failed_stands_on_the_first_screen():
     facts = {row["what"]: row for row in document["statements"]}
     assert document["rating"] == facts["Check points"]["rating"] == "red"
     assert facts["Check points"]["items"] == [{"name": "T9", "text": "No disc there."}]
-    assert facts["Not determined"]["sentence"] == "1 of 3 methods have no score."
+    (said,) = said_of(document, "Not determined")
+    assert said.values == {"count": 1, "methods": 3}
     assert facts["Not determined"]["items"][0]["name"] == "affine"
     assert facts["Result"]["rating"] == "green"
     nothing = fake({"raw": 0.5, "lsc": 0.02}, scored_by="control")["statements"]
@@ -105,22 +131,24 @@ def test_what_failed_stands_on_the_first_screen():
 
 
 @pytest.mark.parametrize(
-    ("details", "words"),
+    ("details", "key", "values"),
     [
-        ({"ties": 375, "untied": None}, "375 ties"),
-        ({"ties": 375, "untied": None}, "All other methods use the control points alone."),
-        ({"ties": 0, "untied": "One pass."}, "equals lsc here, for no ties were used. One pass."),
-        ({"ties": 0, "untied": None}, "correct equals lsc here, for no ties were used."),
+        ({"ties": 375, "untied": None}, "method with ties", {"count": 375}),
+        (
+            {"ties": 0, "untied": "One pass."},
+            "method without ties",
+            {"other": "lsc", "why": "One pass."},
+        ),
+        ({"ties": 0, "untied": None}, "method without ties", {"other": "lsc", "why": None}),
     ],
 )
-def test_what_other_methods_leave_out_is_stated(details, words):
+def test_what_other_methods_leave_out_is_stated(details, key, values):
     "How many ties correct used, or why none; a document without that method says nothing of ties"
     document = fake({"raw": 0.5, "lsc": 0.03, "correct": 0.02})
     document["methods"][-1]["details"] = details
-    facts = {row["what"]: row for row in comparison_screen(document, UNSEEN)["statements"]}
-    assert words in facts["Ties"]["sentence"]
-    without = fake({"raw": 0.5, "lsc": 0.03})["statements"]
-    assert "Ties" not in [row["what"] for row in without]
+    (said,) = said_of(document, "Ties")
+    assert (said.key, said.values) == (key, {"name": "correct", **values})
+    assert said_of(fake({"raw": 0.5, "lsc": 0.03}), "Ties") == []
 
 
 def test_a_warning_of_two_methods_stands_once():

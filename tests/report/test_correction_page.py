@@ -11,7 +11,7 @@ from mlscorr.evaluate import TargetRow
 from mlscorr.report import tables
 from mlscorr.report.correction_page import write_report
 from mlscorr.wording import millimetres, number
-from tests.beds.reports import Links, drive, fabricate, page, report_of, words
+from tests.beds.reports import Links, because, drive, fabricate, page, report_of, words
 from tests.beds.tied_reports import tied_report
 
 
@@ -121,7 +121,9 @@ def test_a_target_that_was_not_seen_is_listed_with_its_reason(tmp_path):
     survey, correction, report = fabricate(drive())
     surveyed = report.targets[0].surveyed
     reason = "no returns within 0.5 m"
-    report.targets.insert(0, TargetRow.unobserved("LOST", None, "control", surveyed, reason))
+    report.targets.insert(
+        0, TargetRow.unobserved("LOST", None, "control", surveyed, because(reason))
+    )
     text = words(page(tmp_path, survey, correction, report))
     table = text[text.index("Sigma is 1 sigma") :]
     assert "LOST – – control – – –" in table and "no returns within 0.5 m" in table

@@ -10,7 +10,7 @@ from mlscorr.evaluate import TargetRow
 from mlscorr.io.store import document
 from mlscorr.report import FileRow
 from mlscorr.report.correction_report import ordered, recomputed
-from tests.beds.reports import drive, fabricate
+from tests.beds.reports import because, drive, fabricate
 from tests.beds.street_of_points import ORIGIN, shifted, target
 
 
@@ -43,7 +43,9 @@ def test_report_json_tells_the_accuracy_and_the_files(commanded):
 def test_rows_come_back_from_the_document():
     "What report.json says of a target is read as the same row, unknown numbers too"
     rows = fabricate(drive())[2].targets
-    rows.append(TargetRow.unobserved("LOST", 2, "check", ORIGIN, "no returns within 0.5 m"))
+    rows.append(
+        TargetRow.unobserved("LOST", 2, "check", ORIGIN, because("no returns within 0.5 m"))
+    )
     for row in rows:
         content = json.loads(json.dumps(document("row", row.document())))
         again = TargetRow.read(content)
@@ -92,7 +94,7 @@ def test_a_verdict_rests_on_the_most_independent_points(changes, kind):
 def test_rows_are_ordered_by_group_and_time():
     "Control, then check, then unused, each in time"
     rows = fabricate(drive())[2].targets
-    rows.append(TargetRow.unobserved("LOST", None, "control", ORIGIN, "hidden"))
+    rows.append(TargetRow.unobserved("LOST", None, "control", ORIGIN, because("hidden")))
     groups = [row.group for row in ordered(rows[::-1])]
     assert groups == sorted(groups, key=("control", "check", "unused").index)
     times = [row.gps_time for row in ordered(rows[::-1], "control")]
@@ -101,7 +103,7 @@ def test_rows_are_ordered_by_group_and_time():
 
 def test_misclosures_are_made_anew_by_another_correction():
     "A correction by 0.2 m east leaves 0.1 of 0.3 m, to 1e-6 m; unseen rows stay as they are"
-    lost = TargetRow.unobserved("T2", None, "check", ORIGIN, "hidden")
+    lost = TargetRow.unobserved("T2", None, "check", ORIGIN, because("hidden"))
     row, other = recomputed([lost, target("T1", ORIGIN)], shifted(np.array([0.2, 0.0, 0.0])))
     np.testing.assert_allclose(row.before, [0.3, 0.0, 0.0], atol=1e-6)
     np.testing.assert_allclose(row.after, [0.1, 0.0, 0.0], atol=1e-6)

@@ -12,12 +12,20 @@ from mlscorr.evaluate import DatumDifference, TargetRow
 from mlscorr.report import first_screen
 from mlscorr.report.headline import headline, statements
 from mlscorr.survey import Assumption
-from tests.beds.reports import START, drive, fabricate, page, report_of, words
+from tests.beds.reports import START, because, drive, fabricate, page, report_of, words
 
 
 def lost(name, role="check", scanned=True, number=None):
     "A surveyed point that was not observed"
-    return TargetRow.unobserved(name, number, role, np.zeros(3), f"{name} is hidden.", scanned)
+    return TargetRow.unobserved(
+        name, number, role, np.zeros(3), because(f"{name} is hidden."), scanned
+    )
+
+
+def said(report, what):
+    "Statements of a row of the first screen, by their keys"
+    rows = [row for row in statements(report) if row.what == what]
+    return {statement.key: statement for row in rows for statement in row.statements}
 
 
 def test_all_that_was_seen_and_held_is_said_plainly():
@@ -35,10 +43,10 @@ def test_a_check_point_that_should_have_been_seen_counts_against_the_result():
     observed = next(row.name for row in report.targets if row.role == "check")
     rows = [lost("C7"), lost("C8", scanned=False), lost(observed, number=2)]
     report = replace(report, targets=[*report.targets, *rows])
-    text = headline(report)
-    assert text.startswith("2 of 4 surveyed check points were seen and scored. 1 check point was")
-    assert "(C7)" in text and "counts against this result" in text
-    assert "1 stands where nothing was scanned." in text
+    points = said(report, "Check points")
+    assert points["check points"].values == {"scored": 2, "surveyed": 4}
+    assert points["hidden check points"].values == {"names": ["C7"]}
+    assert points["check points elsewhere"].values == {"count": 1, "by_others": False}
     check = report.document()["check"]
     assert (check["n_surveyed"], check["n_seen"], check["n_unseen"]) == (4, 2, 1)
     assert check["unseen"] == [{"name": "C7", "reason": "C7 is hidden."}]
@@ -47,10 +55,11 @@ def test_a_check_point_that_should_have_been_seen_counts_against_the_result():
 def test_refused_and_missing_control_points_are_counted():
     "A rejected one, and one that was not seen"
     report = fabricate(drive())[2]
-    out = {"used": False, "reason": "outlier"}
+    out = {"used": False, "why": because("outlier")}
     rows = [replace(report.targets[0], **out), *report.targets[1:], lost("T40", "control")]
-    text = headline(replace(report, targets=rows))
-    assert "Control: 5 of 7 surveyed points used, 1 refused (T01), 1 not seen (T40)." in text
+    values = said(replace(report, targets=rows), "Control points")["control points"].values
+    assert (values["scored"], values["surveyed"]) == (5, 7)
+    assert (values["refused"], values["hidden"]) == (["T01"], ["T40"])
 
 
 def test_control_in_another_scale_is_not_green(tmp_path):
@@ -64,7 +73,7 @@ def test_control_in_another_scale_is_not_green(tmp_path):
     screen = first_screen(report)
     (fact,) = [fact for fact in screen["statements"] if fact["what"] == "Datum"]
     assert (fact["rating"], screen["rating"]) == ("amber", "amber")
-    assert "scale 10.0 cm" in fact["sentence"]
+    assert said(report, "Datum")["datum"].values["lengths"] == pytest.approx({"scale": 0.1})
     assert fact["items"] == [{"name": "scale", "text": scale.sentence}]
     assert [fact["rating"] for fact in screen["statements"] if fact["what"] == "Result"] == [
         "amber"
@@ -77,10 +86,10 @@ def test_a_single_control_point_is_corrected_by_no_others(checks):
     "It is said that the POS alone checks it, and no number of what the others make of it"
     rows = [row for row in fabricate(drive(), count=3)[2].targets if row.name != "T02"]
     report = report_of(drive(), rows if checks else rows[:1])
-    (fact,) = [fact for fact in statements(report) if fact.what == "Left out in turn"]
-    assert fact.rating == "amber" and fact.sentence.startswith("A single control point has no oth")
-    said = " ".join(f"{fact.sentence} {fact.items}" for fact in statements(report))
-    assert "the others" not in said and "were left out in turn" not in said
+    (fact,) = said(report, "Left out in turn").values()
+    assert (fact.key, fact.severity) == ("single control point", "warning")
+    words = " ".join(f"{row.sentence} {row.items}" for row in statements(report))
+    assert "the others" not in words and "were left out in turn" not in words
 
 
 def test_what_was_found_half_a_metre_off_is_not_said_to_be_unseen():
@@ -89,16 +98,17 @@ def test_what_was_found_half_a_metre_off_is_not_said_to_be_unseen():
     seen = {"scanned": True, "gps_time": 413_200.0}
     reason = "T40 lies 0.50 m from where the observation says."
     rows = [
-        TargetRow.unobserved(name, 1, role, np.zeros(3), reason, **seen)
+        TargetRow.unobserved(name, 1, role, np.zeros(3), because(reason), **seen)
         for name, role in (("T40", "control"), ("C40", "check"))
     ]
     report = replace(report, targets=[*report.targets, *rows])
-    said = {row.what: row for row in statements(report)}
-    assert said["Control points"].sentence == "6 of 7 surveyed points used, 1 refused (T40)."
-    assert said["Control points"].items == (("T40", reason),)
-    words = "1 check point was found, but refused, as place, kind or size does not fit (C40)"
-    assert words in said["Check points"].sentence and said["Check points"].rating == "red"
-    assert "not seen" not in headline(report)
+    control = said(report, "Control points")["control points"].values
+    assert (control["refused"], control["hidden"]) == (["T40"], [])
+    rows = {row.what: row for row in statements(report)}
+    assert rows["Control points"].items == (("T40", reason),)
+    check = said(report, "Check points")
+    assert check["refused check points"].values == {"names": ["C40"]}
+    assert "hidden check points" not in check and rows["Check points"].rating == "red"
     assert report.document()["check"]["n_unseen"] == 1
 
 
@@ -106,15 +116,15 @@ def test_an_extrapolated_part_is_told_with_its_length_and_the_error_to_expect():
     "Seconds, metres, share of the points, and the largest sigma"
     weak = WeakStretch(0.0, 20.0, 100.0, 0.4, "a"), WeakStretch(50.0, 61.5, 60.0, 1.25, "b")
     report = replace(fabricate(drive())[2], support=Support(weak))
-    text = headline(report)
-    assert "31.5 s (160 m) of the drive, 3 % of the points" in text
-    assert "up to 1.25 m is to be expected" in text
+    values = said(report, "Extrapolated")["extrapolated"].values
+    assert (values["seconds"], values["metres"], values["sigma"]) == (31.5, 160.0, 1.25)
+    assert values["share"] == report.coverage.share_extrapolated
 
 
 def test_nothing_independent_is_said_where_no_check_point_was_surveyed():
     "A fit proves little"
     report = fabricate(drive(), checks=False)[2]
-    assert headline(report).startswith("No check point was surveyed, so nothing independent")
+    assert list(said(report, "Check points")) == ["no check point"]
 
 
 @pytest.mark.parametrize("ties", [None, {"n": 700, "used": 700}, {"n": 700, "used": 0}])
@@ -122,19 +132,22 @@ def test_without_control_the_first_words_are_that_only_the_pos_says_where_the_cl
     "Check points follow, relative accuracy is named where ties were used, no count of 0 of 0"
     report = fabricate(drive())[2]
     rows = [row for row in report.targets if row.role == "check"]
-    text = headline(replace(report, targets=rows, ties=ties))
-    assert text.startswith("No control point takes part: nothing but the POS says where the cloud")
-    assert "up to 9.0 cm is to be expected" in text
-    assert text.endswith("2 of 2 surveyed check points were seen and scored.")
-    assert ("accuracy is relative only" in text) == (ties is not None and ties["used"] > 0)
-    assert "0 of 0" not in text
+    report = replace(report, targets=rows, ties=ties)
+    fact = said(report, "Control points")["no control point"]
+    assert fact.values == {"sigma": 0.09, "is_tied": ties is not None and ties["used"] > 0}
+    control, check = (
+        next(row.sentence for row in statements(report) if row.what == what)
+        for what in ("Control points", "Check points")
+    )
+    assert headline(report) == f"{control} {check}"
 
 
 def test_page_report_and_terminal_begin_with_the_same_statements(tmp_path, capsys):
     "Each sentence and each named point stands in all three before any table, the worst is red"
     survey, correction, report = fabricate(drive())
     report.model["warnings"] = ["The clock may be wrong."]
-    rows = [replace(report.targets[0], used=False, reason="outlier"), *report.targets[1:]]
+    outlier = because("outlier")
+    rows = [replace(report.targets[0], used=False, why=outlier), *report.targets[1:]]
     report = replace(report, targets=[*rows, lost("C7")])
     content = {**first_screen(report), **report.document()}
     html = page(tmp_path, survey, correction, report)
@@ -157,7 +170,7 @@ def test_a_good_result_is_green_and_a_part_that_was_left_is_red():
     assert {row.rating for row in statements(report)} == {"green"}
     left = replace(report, coverage=replace(report.coverage, points_outside_trajectory=7))
     points = next(row for row in statements(left) if row.what == "Points")
-    assert points.rating == "red" and "7 of 1234574 points lie outside" in points.sentence
+    assert points.rating == "red" and points.statements[0].values["left"] == 7
     assert first_screen(left)["rating"] == "red"
 
 
@@ -185,7 +198,7 @@ def test_a_correction_that_is_extrapolated_everywhere_is_never_green():
     weak = Support((WeakStretch(0.0, 60.0, 300.0, 0.0001, "a"),))
     rows = statements(replace(report, coverage=everywhere, support=weak))
     (row,) = (row for row in rows if row.what == "Extrapolated")
-    assert row.rating == "amber" and "100 % of the points" in row.sentence
+    assert row.rating == "amber" and row.statements[0].values["share"] == 1.0
 
 
 def test_a_sigma_beyond_what_the_pos_states_is_amber():
@@ -196,7 +209,8 @@ def test_a_sigma_beyond_what_the_pos_states_is_amber():
         rows = statements(replace(report, position_sigma=sigma))
         (row,) = (row for row in rows if row.what == "Sigma")
         assert row.rating == rating
-        assert ("The POS states 3.0 cm" in row.sentence) == (rating == "amber")
+        keys = [statement.key for statement in row.statements]
+        assert ("stated sigma" in keys) == (rating == "amber")
 
 
 def test_a_sigma_that_nobody_stated_is_called_assumed():
@@ -207,7 +221,8 @@ def test_a_sigma_that_nobody_stated_is_called_assumed():
     rows = {row.what: row for row in statements(replace(report, assumed=assumed))}
     assert rows["Assumed"].rating == "green"
     assert rows["Assumed"].items == (("Position of the POS", "2.0 cm assumed"),)
-    assert "1 accuracy that nobody stated is assumed" in rows["Assumed"].sentence
+    values = rows["Assumed"].statements[0].values
+    assert (values["count"], values["sections"], values["has_sigma"]) == (1, ["[pos]"], True)
     assert replace(report, assumed=assumed).document()["assumed"][0]["value"] == 0.02
 
 
@@ -216,8 +231,8 @@ def test_a_drive_without_control_of_its_own_is_not_held_by_it():
     report = fabricate(drive())[2]
     rows = [row for row in report.targets if row.role == "check"]
     report = replace(report, targets=rows, support=Support())
-    (row,) = (row for row in statements(report) if row.what == "Extrapolated")
-    assert row.rating == "amber" and "of other drives" in row.sentence
+    (fact,) = said(report, "Extrapolated").values()
+    assert (fact.key, fact.severity) == ("held by other drives", "warning")
 
 
 @pytest.mark.parametrize("weak", [(), (WeakStretch(0.0, 9.0, 45.0, 0.02, REASONS[DRIFT]),)])
@@ -226,12 +241,11 @@ def test_a_drive_that_others_hold_is_nowhere_said_to_stand_on_the_pos_alone(weak
     report = fabricate(drive())[2]
     rows = [row for row in report.targets if row.role == "check"]
     report = replace(report, targets=rows, support=Support(weak))
-    (row,) = (row for row in statements(report) if row.what == "Control points")
-    assert row.rating == "amber" and "those of other drives hold it" in row.sentence
+    (fact,) = said(report, "Control points").values()
+    assert (fact.key, fact.severity) == ("control of other drives", "warning")
     assert headline(report).startswith("2 of 2 surveyed check points were seen and scored.")
-    assert "nothing but the POS" not in " ".join(row.sentence for row in statements(report))
-    alone = (WeakStretch(0.0, 9.0, 45.0, 0.02, REASONS[NO_CONTROL]),)
-    assert headline(replace(report, support=Support(alone))).startswith("No control point takes")
+    alone = Support((WeakStretch(0.0, 9.0, 45.0, 0.02, REASONS[NO_CONTROL]),))
+    assert list(said(replace(report, support=alone), "Control points")) == ["no control point"]
 
 
 def test_what_became_no_better_is_not_green():
@@ -249,10 +263,8 @@ def test_a_sigma_between_control_points_that_is_larger_than_any_extrapolated_is_
     "9.5 cm in the middle of a drive that control holds, 9 cm at its ends; 9 cm there alone is not"
     report = fabricate(drive())[2]
     middle = {"median": 0.02, "largest": 0.095, "time": START + 30.0}
-    sentences = [
-        next(row.sentence for row in statements(other) if row.what == "Extrapolated")
-        for other in (report, replace(report, position_sigma=middle))
-    ]
-    assert sentences[1] == f"{sentences[0]} Between control points it is up to 9.5 cm."
+    assert list(said(report, "Extrapolated")) == ["extrapolated"]
+    both = said(replace(report, position_sigma=middle), "Extrapolated")
+    assert both["between control points"].values == {"sigma": 0.095}
     edge = replace(report, position_sigma=middle | {"time": START, "largest": 0.09})
-    assert sentences[0] in [row.sentence for row in statements(edge)]
+    assert list(said(edge, "Extrapolated")) == ["extrapolated"]

@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from mlscorr.report.map_frame import frame, track
+from mlscorr.report.maps import frame, track
 from tests.beds.reports import drive
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from mlscorr.report import FileRow
-from mlscorr.report._provenance import coverage, files, systems
+from mlscorr.report.correction_page import coverage, files, systems
 from mlscorr.survey import MountedScanner, Mounting, Scanner
 from tests.beds.reports import START, drive, fabricate
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mlscorr.report._residuals import residual_figure
+from mlscorr.report.figures import residual_figure
 from tests.beds.reports import drive, fabricate
 
 

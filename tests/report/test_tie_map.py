@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.report._tie_map import tie_figure
+from mlscorr.report.maps import tie_figure
 from mlscorr.report.style import svg
 from tests.beds.tied_reports import tied_report
 

@@ -8,8 +8,8 @@ import pytest
 from mlscorr.correction import Correction
 from mlscorr.estimate import Support
 from mlscorr.frames import attitude_from_angles
-from mlscorr.report._timeline import correction_figure
-from tests.beds.reports import START, drive, fabricate, page, words
+from mlscorr.report.figures import correction_figure
+from tests.beds.reports import START, because, drive, fabricate, page, words
 
 
 @pytest.mark.long
@@ -59,7 +59,7 @@ def test_the_attitude_panel_shows_the_smaller_turn_through_north():
 def test_an_outlier_does_not_squash_the_curve():
     "A rejected misclosure of 80 m is marked at the panel's edge; the axis stays in decimetres"
     _, correction, report = fabricate(drive())
-    far = {"used": False, "reason": "outlier", "before": np.array([80.0, -80.0, 0.1])}
+    far = {"used": False, "why": because("outlier"), "before": np.array([80.0, -80.0, 0.1])}
     report.targets[1] = replace(report.targets[1], **far)
     figure = correction_figure(correction, report)
     assert all(np.ptp(panel.get_ylim()) < 3.0 for panel in figure.axes)

@@ -5,7 +5,8 @@ import json
 import numpy as np
 
 from mlscorr.evaluate import TargetRow
-from mlscorr.report._viewer import thin_evenly, viewer_data
+from mlscorr.report.cloud import thin_evenly, viewer_data
+from tests.beds.reports import because
 from tests.beds.street_of_points import ORIGIN, shifted, street, target, unpacked
 
 
@@ -25,7 +26,7 @@ def test_the_scene_holds_the_cloud_before_and_after():
     cloud = street(20_000, np.random.default_rng(4))
     shift = np.array([0.31, -0.12, 0.07])
     row = target("T1", np.add(ORIGIN, [100.0, 0.0, 2.0]), shift)
-    lost = TargetRow.unobserved("T2", None, "control", ORIGIN, "not seen")
+    lost = TargetRow.unobserved("T2", None, "control", ORIGIN, because("not seen"))
     scene = viewer_data(shifted(shift), cloud, [row, lost], [row])
     assert len(json.dumps(scene)) < 3e6
     before, after = (unpacked(scene[key]).reshape(-1, 3) for key in ("before", "after"))

@@ -7,13 +7,13 @@ from scipy.stats import chi2
 
 from mlscorr.frames import angles_from_attitude, attitude_from_angles
 from mlscorr.io.trajectories import PosErrorSeries, read_pos_error_series
-from mlscorr.simulate.pos import _alignment as alignment
 from mlscorr.simulate.pos import _gnss as gnss
 from mlscorr.simulate.pos import _inertial as inertial
 from mlscorr.simulate.pos import _kalman as kalman
 from mlscorr.simulate.pos import given_error, navigation, pos_error, record
 from mlscorr.simulate.pos._inertial import GRADES, GRAVITY, MEMS, TACTICAL
 from mlscorr.simulate.pos._kalman import Measurement
+from mlscorr.simulate.pos.navigation import aligned_poses
 from mlscorr.simulate.scenario import PosScenario
 from mlscorr.survey import Trajectory
 from tests.beds.shared import shared
@@ -314,7 +314,7 @@ def test_the_sky_between_walls_is_used():
 def test_the_alignment_joins_the_pass_smoothly():
     "Before and after a pass a vehicle moves on without a jump, below 4 m/s^2"
     times = np.arange(START - 120.0, START + 90.0, 0.1)
-    position, attitude = alignment.poses(SHORT, times)
+    position, attitude = aligned_poses(SHORT, times)
     acceleration = np.diff(position, 2, axis=0) / 0.01
     assert np.abs(acceleration).max() < 4.0  # m/s^2
     turn = (attitude[:-1].inv() * attitude[1:]).magnitude() / 0.1

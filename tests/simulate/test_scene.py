@@ -18,9 +18,8 @@ from mlscorr.simulate.scene import (
     section,
     sky_elevation,
 )
-from mlscorr.simulate.scene._bank import Bank
-from mlscorr.simulate.scene._section import StreetSection
-from mlscorr.simulate.scene._street import Street
+from mlscorr.simulate.scene._river import Bank
+from mlscorr.simulate.scene._street import Street, StreetSection
 from mlscorr.simulate.scene._things import leaves
 from mlscorr.simulate.scene.shapes import ray_caster
 from mlscorr.survey import Trajectory

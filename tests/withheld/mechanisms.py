@@ -1,7 +1,7 @@
 """Mechanisms that exist here alone and in no library: how well does a diagnosis know that it
 doesn't know?
 
-Each is a function of RecordedPoints (mlscorr.simulate.displacement), a size in its unit and a
+Each is a function of RecordedPoints (mlscorr.simulate._mechanisms), a size in its unit and a
 generator, and returns by how much the points are recorded elsewhere, (n, 3) in m on the map. It is
 linear in the size. Where a source is called an estimate, the sentence is its derivation.
 """

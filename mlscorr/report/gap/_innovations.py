@@ -11,9 +11,17 @@ from matplotlib.patches import Patch
 from mlscorr.report import style
 from mlscorr.report.gap._rows import numbers
 from mlscorr.report.gap._settings import SETTINGS
-from mlscorr.report.map_frame import corners, frame, map_panels
+from mlscorr.report.maps import (
+    NEXT,
+    NEXT_WORDS,
+    WORDS,
+    corners,
+    frame,
+    map_panels,
+    mark_places,
+    write_names,
+)
 from mlscorr.report.style import GREY, MARKS, TRACK, legend_above, mark_handle, styled
-from mlscorr.report.target_map import NEXT, NEXT_WORDS, WORDS, mark_places, write_names
 from mlscorr.wording import percent
 
 WINDOW = "#f3d9e6"

@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 from mlscorr.effects import family, lowered, meaning, title
 from mlscorr.gap import no_cause
-from mlscorr.report.assumed import has_assumed_sigma
 from mlscorr.report.gap._labels import place_of, sentences_of
+from mlscorr.report.headline import has_assumed_sigma
 from mlscorr.wording import DASH, joined, known, percent, signed, size, thousands
 
 GAPS = {  # by the kind of gap that a closure measures

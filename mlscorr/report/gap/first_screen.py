@@ -5,10 +5,15 @@ from itertools import groupby
 
 from mlscorr.effects import lowered, title
 from mlscorr.gap.evidence import SETTINGS
-from mlscorr.report.assumed import assumed_statement, has_assumed_sigma
 from mlscorr.report.gap._channels import channel_statements
 from mlscorr.report.gap._verdict import facts, is_named, verdict
-from mlscorr.report.headline import StatementRow, statements_section, warning_statements
+from mlscorr.report.headline import (
+    StatementRow,
+    assumed_statement,
+    has_assumed_sigma,
+    statements_section,
+    warning_statements,
+)
 from mlscorr.wording import joined, length_in_words
 
 RATINGS = {"good": "green", "open": "amber", "bad": "red"}  # by the tone of a verdict

@@ -1,17 +1,25 @@
-"""A sheet: one view that is drawn, before and after, while the cloud goes by."""
+"""A sheet: one view that is drawn, before and after, while the cloud goes by.
+
+Open3D is another way to draw it: in a child process, which cannot take this one down with it.
+"""
 
 from __future__ import annotations
 
+import subprocess
+import sys
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from mlscorr.report.render._open3d_engine import draw_pair
 from mlscorr.report.render._zbuffer import Canvas
 from mlscorr.report.render.picture import Picture
 from mlscorr.report.render.quantities import GHOST, PAIRS, CloudPair, limits, paint, rgb
 from mlscorr.report.render.view import View
+from mlscorr.report.settings import SETTINGS
+
+CHILD = Path(__file__).with_name("_open3d_child.py")
 
 
 @dataclass(frozen=True)
@@ -24,7 +32,10 @@ class Sheet:
     @classmethod
     def blank(cls, view: View) -> Sheet:
         """Nothing drawn yet. Before a cut its points may lie anywhere."""
-        before = Canvas.blank(view.camera, np.inf if view.is_cut else view.half_depth)
+        depth = view.half_depth
+        if view.is_cut:
+            depth = np.inf
+        before = Canvas.blank(view.camera, depth)
         return cls(view, (before, Canvas.blank(view.camera, view.half_depth)))
 
     def add(self, pair: CloudPair, values: tuple[np.ndarray, np.ndarray]) -> None:
@@ -76,3 +87,61 @@ def _side(view, canvas, other, ends):
         colours = np.round(colours * canvas.light[..., None]).astype(np.uint8)  # points are noise
     pixels[canvas.drawn] = colours[canvas.drawn]
     return pixels
+
+
+def draw_pair(
+    canvases: tuple[Canvas, Canvas],
+    colours: list[np.ndarray],
+    point_size: float,
+    reference: str | Path | None = None,
+    timeout: float = SETTINGS.open3d_timeout,
+) -> tuple[np.ndarray, ...]:
+    """Draw what two canvases show: two RGB arrays (h, w, 3) uint8.
+
+    Only points that are nearest to the eye are sent, one for each pixel at most, so that time
+    and memory don't grow with the cloud.
+
+    Parameters
+    ----------
+    canvases : pair of Canvas
+        Not grown.
+    colours : pair of (h, w, 3) uint8 arrays
+    point_size : float
+        Diameter in pixels.
+    reference : path, optional
+        A mesh that is drawn behind the points.
+    timeout : float
+        Units: s.
+
+    Raises
+    ------
+    RuntimeError
+        With what happened, when the child fails.
+    """
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        np.savez(
+            folder / "job.npz",
+            before_xyz=canvases[0].points,
+            after_xyz=canvases[1].points,
+            before_rgb=colours[0][canvases[0].drawn],
+            after_rgb=colours[1][canvases[1].drawn],
+            point_size=point_size,
+            reference=str(reference or ""),
+            **vars(canvases[0].camera),
+        )
+        _run(folder, timeout)
+        return tuple(np.load(folder / f"{side}.npy")[..., :3] for side in ("before", "after"))
+
+
+def _run(folder, timeout):
+    command = [sys.executable, str(CHILD), str(folder)]
+    try:
+        child = subprocess.run(command, capture_output=True, timeout=timeout, check=False)
+    except subprocess.TimeoutExpired:
+        raise RuntimeError(f"Open3D drew no picture within {timeout:.0f} s") from None
+    if child.returncode:
+        last = child.stderr.decode(errors="replace").strip().splitlines()[-1:] or ["no message"]
+        raise RuntimeError(f"Open3D failed with exit code {child.returncode} ({last[0]})")
+    if not (folder / "after.npy").exists():
+        raise RuntimeError("Open3D ended without a picture")

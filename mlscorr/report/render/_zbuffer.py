@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from mlscorr.report.render._camera import Camera
+from mlscorr.report.render.view import Camera
 
 DEEPEST = 20_000.0  # m before and behind the focus
 DEPTH_STEP = 1e-5  # m: 2 * DEEPEST / DEPTH_STEP fits 32 bits

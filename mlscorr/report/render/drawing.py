@@ -13,8 +13,7 @@ from mlscorr.io.clouds import read_chunks
 from mlscorr.report.correction_report import recomputed
 from mlscorr.report.render._scout import scout
 from mlscorr.report.render._sheet import Sheet
-from mlscorr.report.render._target_view import target_view
-from mlscorr.report.render._views import VIEWS, overview, section
+from mlscorr.report.render._views import VIEWS, overview, section, target_view
 from mlscorr.report.render.picture import Picture
 from mlscorr.report.render.quantities import COLOURS, CloudPair, point_sigma
 from mlscorr.report.render.view import PictureOptions
@@ -110,7 +109,7 @@ def check_pictures(
     choices = (
         ("view", views, VIEWS),
         ("engine", [engine], ENGINES),
-        ("colour", [options.colour] if options.colour else [], COLOURS),
+        ("colour", filter(None, [options.colour]), COLOURS),
     )
     for what, names, known in choices:
         for name in names:
@@ -129,8 +128,14 @@ def _stream(survey, chunks, progress):
     total = sum(file.points for file in survey.clouds)
 
     def stream(title):
-        done = progress(title, total) if progress else (lambda _points: None)
-        for cloud in chunks() if chunks else chain.from_iterable(map(read_chunks, survey.clouds)):
+        clouds = chain.from_iterable(map(read_chunks, survey.clouds))
+        if chunks:
+            clouds = chunks()
+        if progress is None:
+            yield from clouds
+            return
+        done = progress(title, total)
+        for cloud in clouds:
             yield cloud
             done(len(cloud))
 

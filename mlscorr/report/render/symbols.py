@@ -11,8 +11,8 @@ from matplotlib.patches import Rectangle
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
-from mlscorr.report.render._camera import Camera
 from mlscorr.report.render.quantities import LABELS, colour_table, swatches
+from mlscorr.report.render.view import Camera
 from mlscorr.report.style import mark_handle, nice
 
 MARK = "#E6007E"  # what was surveyed: a colour that no scale has
@@ -120,15 +120,15 @@ def legend(
         Beside the panels and below them, over width and height of the page.
     """
     gap, foot = margins
-    has_scale = view.colour in LABELS
-    if has_scale:
+    place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (gap, 0.01)}
+    if view.colour in LABELS:
+        place = {"loc": "center left", "bbox_to_anchor": (0.5, foot / 2 + 0.012)}
         _colour_bar(figure, view.colour, limits, (1.5 * gap, foot * 0.50, 0.40, foot * 0.14))
     handles = list(_handles(view))
     if handles:
         figure.legend(
             handles=handles,
-            loc="center left" if has_scale else "lower left",
-            bbox_to_anchor=(0.5, foot / 2 + 0.012) if has_scale else (gap, 0.01),
+            **place,
             ncols=len(handles),
             frameon=False,
             fontsize=letter(figure, 0.85),
@@ -145,7 +145,9 @@ def _colour_bar(figure, colour, limits, place):
     size = letter(figure, 0.85)
     axes.tick_params(labelsize=size, length=3)
     axes.xaxis.set_major_locator(MaxNLocator(6))
-    axes.set_title(f"{words} ({unit})" if unit else words, fontsize=size, loc="left", pad=4)
+    if unit:
+        words = f"{words} ({unit})"
+    axes.set_title(words, fontsize=size, loc="left", pad=4)
 
 
 def _handles(view) -> Iterator[Line2D]:

@@ -1,10 +1,87 @@
-"""What a pair of pictures shows, from where, with which marks; what the user asked of it."""
+"""What a pair of pictures shows: from where, with which marks, and what the user asked of it."""
+
+from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from mlscorr.report.render._camera import Camera
+
+@dataclass(frozen=True)
+class Camera:
+    """A camera that looks at a focus, in parallel projection or from a finite distance.
+
+    Parameters
+    ----------
+    focus : (3,) array
+        The point in the middle of the picture. Units: m.
+    axes : (3, 3) array
+        Unit vectors to the picture's right, up, and away from the eye, as rows.
+    scale : float
+        Pixels per metre at the focus.
+    size : (int, int)
+        Width and height in pixels.
+    distance : float
+        From the eye to the focus; infinite for parallel projection. Units: m.
+
+    >>> camera = Camera.towards([500000.0, 3e6, 20.0], 0.0, 90.0, 10.0, (800, 600))
+    >>> pixel, depth = camera.project(np.array([[500002.0, 3e6 + 1.0, 23.0]]))
+    >>> pixel, depth  # 2 m east, 1 m north and 3 m above the focus
+    (array([[420., 290.]]), array([-3.]))
+    """
+
+    focus: np.ndarray
+    axes: np.ndarray
+    scale: float
+    size: tuple[int, int]
+    distance: float = np.inf
+
+    @classmethod
+    def towards(
+        cls,
+        focus: np.ndarray,
+        azimuth: float,
+        elevation: float,
+        scale: float,
+        size: tuple[int, int],
+        view_angle: float = 0.0,
+    ) -> Camera:
+        """A camera that looks towards an azimuth from an elevation above the horizon.
+
+        Parameters
+        ----------
+        focus, scale, size
+            As in Camera.
+        azimuth : float
+            Clockwise from grid north; seen from straight above it is what is up. Units: deg.
+        elevation : float
+            90 looks straight down. Units: deg.
+        view_angle : float
+            The picture's whole width seen from the eye, 0 for parallel projection. Units: deg.
+        """
+        a, e = np.radians([azimuth, elevation])
+        right = np.array([np.cos(a), -np.sin(a), 0.0])
+        away = np.array([np.sin(a) * np.cos(e), np.cos(a) * np.cos(e), -np.sin(e)])
+        axes = np.stack([right, np.cross(right, away), away])
+        distance = np.inf
+        if view_angle:
+            distance = size[0] / scale / 2 / np.tan(np.radians(view_angle) / 2)
+        return cls(
+            np.asarray(focus, float), axes, float(scale), (size[0], size[1]), float(distance)
+        )
+
+    def project(self, xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Pixel coordinates (n, 2), column and row, and depth (n,) behind the focus in m.
+
+        Column 0 begins at the left edge, row 0 at the upper one: a point whose coordinates lie
+        in [k, k + 1) lands on pixel k.
+        """
+        x, y, depth = self.axes @ (np.asarray(xyz, float) - self.focus).T
+        scale = self.scale
+        if np.isfinite(self.distance):
+            scale = scale * self.distance / (self.distance + depth)
+        width, height = self.size
+        return np.column_stack([width / 2 + x * scale, height / 2 - y * scale]), depth
 
 
 @dataclass(frozen=True)

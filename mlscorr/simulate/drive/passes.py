@@ -9,8 +9,7 @@ from scipy.optimize import brentq
 
 from mlscorr.frames import attitude_from_angles
 from mlscorr.simulate.drive._pace import Pace
-from mlscorr.simulate.drive._path import draw
-from mlscorr.simulate.drive._recorded_path import course, read_path
+from mlscorr.simulate.drive._path import course, draw, read_path
 from mlscorr.simulate.scenario import Scenario
 from mlscorr.simulate.scene import CentreLine, line_along, line_on_mesh, section, winding_line
 from mlscorr.simulate.settings import SETTINGS
@@ -96,7 +95,10 @@ def _paces(drive, rng):
         duration = drive.duration * drive.speed / cruise
         phase = own.uniform(0.0, 2 * np.pi)
         slow_at = own.uniform(0.3, 0.7) * duration
-        paces.append(Pace(cruise, phase, slow_at, drive.stops if i == 0 else ()))
+        stops = ()
+        if i == 0:
+            stops = drive.stops
+        paces.append(Pace(cruise, phase, slow_at, stops))
         phases.append(own.uniform(0.0, 2 * np.pi))
     return paces, phases
 
@@ -126,10 +128,12 @@ def _length(scenario, line, pace, phase):
     least = _path(scenario, line, shortest, first, phase)
     distance = _with_turn(scenario, pace, _epochs(drive)).distance(_epochs(drive))[-1]
     if distance <= least.length:
+        purpose = ""
+        if drive.u_turn:
+            purpose = " for a U-turn"
         raise ValueError(
             f"A drive of {distance:.1f} m in {drive.duration} s is too short: {least.length:.0f} m "
-            f"are needed{' for a U-turn' if drive.u_turn else ''}. Drive longer or faster, or stop "
-            "less."
+            f"are needed{purpose}. Drive longer or faster, or stop less."
         )
     longest = line.curve.x[-1] - 2 * SETTINGS.margin
     return brentq(
@@ -203,7 +207,9 @@ def _follow(scenario, rng):
     pieces = read_path(scenario)
     offset = pieces[0][1][0]
     whole = np.vstack([position for _, position, _ in pieces]) - offset
-    line, length = line_along(whole * [1.0, 1.0, 0.0 if kind == "river" else 1.0])
+    if kind == "river":
+        whole[:, 2] *= 0.0  # the water is level
+    line, length = line_along(whole)
     if kind == "mesh":
         line = line_on_mesh(scenario, line, length)
     height = _ground(scenario, length, np.zeros(1), np.zeros(1))[0][0]

@@ -1,4 +1,14 @@
-"""Free inertial navigation, its aid by GNSS and odometer, and what filter and smoother leave."""
+"""Free inertial navigation, its aid by GNSS and odometer, and what filter and smoother leave.
+
+A wheel odometer and the software's belief that a car neither slips sideways nor flies together are
+a velocity in the body, (0, v, 0). It bounds the drift without GNSS: positions then go wrong in
+proportion to the distance, by what the wheel's radius and the direction in which the car rolls are
+wrong.
+
+Heading shows in a GNSS/INS only where the vehicle accelerates, so crews drive curves and vary the
+speed before and after a survey. The alignment that is added to a pass does that: speed and heading
+swing smoothly, and meet those of the pass at its ends.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -6,15 +16,16 @@ from functools import cached_property
 
 import numpy as np
 from numpy.random import Generator
-from scipy.spatial.transform import Rotation
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation, Slerp
 
-from mlscorr.frames import angles_from_attitude
-from mlscorr.simulate.pos import _alignment as alignment
+from mlscorr.frames import angles_from_attitude, skew
 from mlscorr.simulate.pos._gnss import RECEIVER, Fixes, gnss_fixes
 from mlscorr.simulate.pos._inertial import (
     ATTITUDE,
     POSITION,
     STATES,
+    VELOCITY,
     Imu,
     motion,
     propagate,
@@ -23,7 +34,6 @@ from mlscorr.simulate.pos._inertial import (
     transitions,
 )
 from mlscorr.simulate.pos._kalman import Measurement, StateEstimate, kalman_filter, smooth
-from mlscorr.simulate.pos._odometer import odometer
 from mlscorr.simulate.scenario import PosScenario
 from mlscorr.simulate.settings import SETTINGS
 from mlscorr.survey import Trajectory
@@ -119,7 +129,7 @@ def navigate(
     sensor_rng, gnss_rng, belief_rng, odometer_rng = rng.spawn(4)
     start = trajectory.gps_time[0] if start is None else start
     gps_time, every = filter_epochs(trajectory, scenario.gnss_rate)
-    position, attitude = alignment.poses(trajectory, gps_time)
+    position, attitude = aligned_poses(trajectory, gps_time)
     moved = motion(gps_time[1] - gps_time[0], position, attitude)
     transition = transitions(moved)
     error = propagate(transition, *sensor_errors(imu, moved, sensor_rng))
@@ -234,3 +244,107 @@ def interpolate(gps_time: np.ndarray, epochs: np.ndarray, values: np.ndarray) ->
         At the epochs.
     """
     return np.column_stack([np.interp(gps_time, epochs, column) for column in values.T])
+
+
+@dataclass(frozen=True)
+class Odometer:
+    """One sigma of a wheel odometer's errors.
+
+    Parameters
+    ----------
+    noise : float
+        Each component once a second: i2Nav-WHU/OB_GINS dataset/ob_gins.yaml. Units: m/s.
+    wheel : float
+        0.6 mm of a radius of 0.3 m by load, pressure, temperature. Units: ratio.
+    direction : float
+        How IMU and axle are mounted, by load and side slip. Units: rad.
+    """
+
+    noise: float = 0.05
+    wheel: float = 0.002
+    direction: float = np.radians(0.1)
+
+
+SENSOR = Odometer()
+
+
+def odometer(
+    error: np.ndarray, velocity: np.ndarray, attitude: Rotation, rng: Generator
+) -> list[Measurement]:
+    """Measurements of the error state, one at each of n epochs: a list.
+
+    Parameters
+    ----------
+    error : (n, 15) array
+        True error state.
+    velocity : (n, 3) array
+        True, in map axes. Units: m/s.
+    attitude : Rotation
+        n true rotations R_P^G.
+    rng : Generator
+    """
+    direction = SENSOR.direction * rng.standard_normal(2)
+    wheel = 1 + SENSOR.wheel * rng.standard_normal()
+    body = attitude.inv().apply(velocity)
+    forward = body[:, 1]
+    measured = np.column_stack([0 * forward, wheel * forward, 0 * forward])
+    measured[:, [0, 2]] += forward[:, None] * direction
+    measured += SENSOR.noise * rng.standard_normal(measured.shape)
+
+    # v_body = R^T v, so that its error is R^T (velocity error + v x attitude error).
+    to_body = attitude.inv().as_matrix()
+    design = np.zeros((len(forward), 3, STATES))
+    design[:, :, VELOCITY] = to_body
+    design[:, :, ATTITUDE] = to_body @ skew(velocity)
+    noise = SENSOR.noise**2 * np.eye(3)
+    misclosure = np.einsum("nij,nj->ni", design, error) + body - measured
+    return [Measurement(*row, noise) for row in zip(design, misclosure, strict=True)]
+
+
+def aligned_poses(trajectory: Trajectory, gps_time: np.ndarray) -> tuple[np.ndarray, Rotation]:
+    """Position (n, 3) about the pass' first epoch and attitude at rising times (n,) in s.
+
+    Within the trajectory's time its own poses, before and after it the way of an alignment.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    gps_time : (n,) array
+        Rising. Units: s.
+    """
+    spline = CubicSpline(trajectory.gps_time, trajectory.position - trajectory.position[0])
+    start, end = trajectory.gps_time[[0, -1]]
+    inside = np.clip(gps_time, start, end)
+    position = spline(inside)
+    attitude = Slerp(trajectory.gps_time, trajectory.attitude)(inside)
+    for outside, edge in ((gps_time < start, start), (gps_time > end, end)):
+        if outside.any():
+            elapsed = gps_time[outside] - edge
+            nose = attitude[np.argmax(outside)].apply([0.0, 1.0, 0.0])
+            position[outside] += _way(elapsed, spline(edge, 1), nose)
+            attitude[outside] = _turned(elapsed) * attitude[outside]
+    return position, attitude
+
+
+def _way(elapsed, velocity, nose):
+    """Displacement (n, 3) from the edge of a pass with a velocity (3,) there. Units: m."""
+    speed = np.linalg.norm(velocity)
+    course = nose
+    if speed > 0.5:  # a standing vehicle has no course
+        course = velocity / speed
+    fine = np.linspace(0.0, elapsed[np.argmax(np.abs(elapsed))], 4001)
+    faster = (
+        speed + SETTINGS.aligning_speed * np.sin(np.pi * fine / SETTINGS.aligning_speed_period) ** 2
+    )
+    moving = faster[:, None] * _turned(fine).apply(course)
+    steps = (moving[1:] + moving[:-1]) / 2 * np.diff(fine)[:, None]
+    way = np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
+    if fine[-1] > 0:
+        return CubicSpline(fine, way)(elapsed)
+    return CubicSpline(fine[::-1], way[::-1])(elapsed)
+
+
+def _turned(elapsed):
+    """Rotations of the vehicle about the vertical since (or before) the edge of the pass."""
+    heading = SETTINGS.aligning_turn * np.sin(np.pi * elapsed / SETTINGS.aligning_turn_period) ** 2
+    return Rotation.from_euler("z", -heading[:, None])

@@ -1,4 +1,4 @@
-"""A street: carriageway with crown, kerbs and pavements, houses with gaps, lamps, trees, cars."""
+"""A street: its cross-section, with crown and kerbs; houses with gaps, lamps, trees, cars."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.random import Generator
 
-from mlscorr.simulate.scenario import Scenario
+from mlscorr.simulate.scenario import DriveScenario, Scenario
 from mlscorr.simulate.scene._dimensions import (
     CAR,
     HOUSE,
@@ -19,12 +19,135 @@ from mlscorr.simulate.scene._dimensions import (
     HouseRow,
     TargetHeight,
 )
-from mlscorr.simulate.scene._section import section
 from mlscorr.simulate.scene._things import car, house, lamp, tree
 from mlscorr.simulate.scene.centre_line import CentreLine
 from mlscorr.simulate.scene.placing import Placed, TargetSpot, eyes, scatter
 from mlscorr.simulate.scene.shapes import UP, Mesh, four_corners, sees, unit
 from mlscorr.simulate.settings import SETTINGS
+from mlscorr.simulate.vehicle import VEHICLES
+
+
+@dataclass(frozen=True)
+class StreetSection:
+    """The cross-section of a street along its length.
+
+    Parameters
+    ----------
+    road : float
+        Half width of the carriageway. Units: m.
+    turns : tuple of float
+        Lengths about which it widens to `widened`, for a U-turn. Units: m.
+    widened : float
+        A van's full lock, and room. Units: m.
+    turn_reach, turn_taper : float
+        From the middle of a U-turn to where the widening ends, and over which it narrows. Units: m.
+    pavement, garden : float
+        Width from the kerb to the house fronts, and of the ground behind them. Units: m.
+    kerb : float
+        Height. Units: m.
+    cross_fall : float
+        Of the carriageway, usual for drainage. Units: ratio.
+    clearance : float
+        By which other parts of the way may come nearer than a thing's own. Units: m.
+    line, line_from_kerb, paint : float
+        Width of a painted line, way from its middle to the kerb beside it, thickness of
+        thermoplastic paint. Units: m.
+    dash : tuple of float
+        Length of a dash of the middle line, and of the gap after it, usual in towns. Units: m.
+    asphalt, kerbstone, paving, lawn, white_line : float
+        Reflectance of the carriageway, of the kerb, of the pavement, of the gardens, of paint.
+    """
+
+    road: float = 3.0
+    turns: tuple[float, ...] = ()
+    widened: float = VEHICLES["street"].turning_radius + 2.0
+    turn_reach: float = 20.0
+    turn_taper: float = 8.0
+    pavement: float = 1.8
+    garden: float = 9.0
+    kerb: float = 0.12
+    cross_fall: float = 0.025
+    clearance: float = 0.7
+    line: float = 0.12
+    line_from_kerb: float = 0.3
+    paint: float = 0.003
+    dash: tuple[float, float] = (3.0, 6.0)
+    asphalt: float = 0.18
+    kerbstone: float = 0.35
+    paving: float = 0.25
+    lawn: float = 0.3
+    white_line: float = 0.6
+
+    def half_width(self, s: float | np.ndarray) -> np.ndarray:
+        """Half width (...) at lengths s (...). Units: m.
+
+        Parameters
+        ----------
+        s : (...) array
+            Length along the line. Units: m.
+        """
+        width = np.full(np.shape(s), self.road)
+        for middle in self.turns:
+            inside = self.turn_reach - np.abs(s - middle)
+            depth = np.clip(inside / self.turn_taper, 0.0, 1.0)
+            widened = self.road + max(0.0, self.widened - self.road) * depth**2 * (3 - 2 * depth)
+            width = np.maximum(width, widened)
+        return width
+
+    def height(self, s: float | np.ndarray, lateral: float | np.ndarray) -> np.ndarray:
+        """Height (...) of the carriageway above its edge. Units: m.
+
+        Parameters
+        ----------
+        s : (...) array
+            Length along the line. Units: m.
+        lateral : (...) array
+            To the right of the line. Units: m.
+        """
+        return self.cross_fall * self.road * (1.0 - np.abs(lateral) / self.half_width(s))
+
+    def under_wheels(
+        self, s: float | np.ndarray, lateral: float | np.ndarray, wheels: float = 0.5
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Height of a vehicle's middle over the edge (m) and its fall to the right (rad), (...).
+
+        Its wheels (m) smooth the crown.
+
+        Parameters
+        ----------
+        s : (...) array
+            Length along the line. Units: m.
+        lateral : (...) array
+            To the right of the line. Units: m.
+        wheels : float
+            Over which the crown is smoothed. Units: m.
+        """
+        fall = self.cross_fall * self.road / self.half_width(s)
+        smooth = np.hypot(lateral, wheels)
+        return self.cross_fall * self.road - fall * smooth, fall * np.asarray(lateral) / smooth
+
+
+LANE_EDGE = 2.4  # m, from the middle of a lane to the kerb, as cars are parked half on it
+TURN_PLACE = 6.0  # m, from the end of the drive to the middle of a U-turn
+
+
+def section(scenario: DriveScenario, length: float) -> StreetSection:
+    """StreetSection of a street wide enough for the lanes of a DriveScenario's passes.
+
+    Parameters
+    ----------
+    scenario : DriveScenario
+    length : float
+        Of the drive along the line. Units: m.
+    """
+    lateral = max(abs(lane.lateral) for lane in scenario.passes)
+    ends = {"forward": length + TURN_PLACE, "back": -TURN_PLACE}
+    if scenario.u_turn:
+        turns = {ends[lane.direction] for lane in scenario.passes}
+    else:
+        turns = ()
+    return StreetSection(max(StreetSection.road, lateral + LANE_EDGE), tuple(sorted(turns)))
+
 
 FRONTS = HouseRow(width=(8.0, 14.0), gap=(2.0, 5.0), setback=(0.0, 0.4))  # m
 CARS = Furniture(across=-0.05, extent=2.3)  # m; half on the pavement
@@ -72,8 +195,11 @@ class Street:
                 front = self._front(side, s, s + width, rng.uniform(*FRONTS.setback))
                 if self._is_clear(front):
                     houses.append(front)
+                step = width
                 gap = rng.uniform(*FRONTS.gap)
-                s += width + (gap if rng.random() < self.scenario.gaps else 0.0)
+                if rng.random() < self.scenario.gaps:
+                    step += gap
+                s += step
         return houses
 
     def _front(self, side, start, end, setback):
@@ -103,7 +229,9 @@ class Street:
         """Ground and houses."""
         rng = self._house_rng
         low_high = self.scenario.house_height
-        pieces = [self._ground(), *(self._markings() if self.scenario.markings else ())]
+        pieces = [self._ground()]
+        if self.scenario.markings:
+            pieces += self._markings()
         for front in self.houses:
             inward = unit(front.side * np.cross(front.far - front.near, UP))
             height = rng.uniform(*low_high)

@@ -125,7 +125,10 @@ def house(
     along = (far - near) * [1.0, 1.0, 0.0]
     height = height + HOUSE.base
     is_house = height - HOUSE.base >= HOUSE.lowest
-    back = (HOUSE.depth if is_house else HOUSE.wall_depth) * inward
+    depth = HOUSE.wall_depth
+    if is_house:
+        depth = HOUSE.depth
+    back = depth * inward
     ends = quads(np.array([base, base + along]), back, height * UP, reflectance)
     if not is_house:
         top = quads(base + height * UP, along, back, reflectance)

@@ -15,6 +15,7 @@ from mlscorr.simulate.scene.centre_line import CentreLine
 from mlscorr.simulate.scene.mesh import MeshSite
 from mlscorr.simulate.scene.placing import Targets, place_targets
 from mlscorr.simulate.scene.shapes import UP, Mesh
+from mlscorr.simulate.settings import SETTINGS
 from mlscorr.survey import Trajectory
 
 SITES: dict[str, Any] = {"street": Street, "river": River, "mesh": MeshSite}
@@ -77,8 +78,10 @@ def _yaw(scanners):
     turns = []
     for scanner in scanners:
         across = Rotation.from_euler("xyz", scanner.boresight, degrees=True).apply(UP)
-        level = np.hypot(across[0], across[1]) < 0.5
-        turns.append(0.0 if level else np.arctan(-across[0] / across[1]) if across[1] else 0.0)
+        turn = 0.0
+        if np.hypot(across[0], across[1]) >= 0.5 and across[1]:
+            turn = np.arctan(-across[0] / across[1])
+        turns.append(turn)
     return float(np.mean(turns))
 
 
@@ -109,3 +112,22 @@ def sky_elevation(scene: Scene, trajectory: Trajectory, origin: np.ndarray) -> n
     highest = np.where(hit, elevation + np.radians(0.5), 0.0).max(axis=-1)
     sky = np.median(highest, axis=-1)
     return np.column_stack([np.interp(trajectory.gps_time, times, column) for column in sky.T])
+
+
+def static_scan(scene: Scene, rng: Generator) -> Mesh:
+    """Mesh of a Scene's ground and walls; cars, trees, posts and targets are not in it.
+
+    Corners are off by a millimetre, those at one place alike.
+
+    Parameters
+    ----------
+    scene : Scene
+    rng : Generator
+    """
+    triangles = scene.mesh.triangles[: scene.fixed]
+    near = scene.centre_line.distance(triangles.mean(axis=1)) <= SETTINGS.static_range
+    corners = triangles[near].reshape(-1, 3)
+    _, first, number = np.unique(corners.round(6), axis=0, return_index=True, return_inverse=True)
+    moved = corners[first] + SETTINGS.static_sigma * rng.standard_normal((len(first), 3))
+    reflectance = scene.mesh.reflectance[: scene.fixed][near]
+    return Mesh(moved[number.ravel()].reshape(-1, 3, 3), reflectance)

@@ -152,7 +152,9 @@ def _placed(kinds, spots, size, hidden, posts):
 
 def _half(kind, size):
     """Half the edge of a target with its board. Units: m."""
-    return size / 2 * (SETTINGS.board_edge if kind == "circle" else 1.0)
+    if kind == "circle":
+        return size / 2 * SETTINGS.board_edge
+    return size / 2
 
 
 def _along(scenario, count, length, rng):

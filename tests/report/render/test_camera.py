@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mlscorr.report.render._camera import Camera
 from mlscorr.report.render._zbuffer import Canvas
+from mlscorr.report.render.view import Camera
 from tests.beds.street_of_points import ORIGIN, SIZE
 
 

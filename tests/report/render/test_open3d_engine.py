@@ -7,7 +7,6 @@ import pytest
 
 from mlscorr.pipeline import doctor
 from mlscorr.report.render import PictureOptions, draw
-from mlscorr.report.render import _open3d_engine as open3d_engine
 from mlscorr.report.render import _sheet as sheet
 from tests.beds.street_of_points import SIZE
 
@@ -27,8 +26,8 @@ def test_a_broken_driver_costs_a_warning_and_no_picture(
     "Where the child aborts, hangs or lacks a library the z-buffer draws the same picture"
     child = tmp_path / "child.py"
     child.write_text(program)
-    monkeypatch.setattr(open3d_engine, "CHILD", child)
-    hurried = partial(open3d_engine.draw_pair, timeout=limit)
+    monkeypatch.setattr(sheet, "CHILD", child)
+    hurried = partial(sheet.draw_pair, timeout=limit)
     monkeypatch.setattr(sheet, "draw_pair", hurried)
     with pytest.warns(UserWarning, match=words):
         (picture,) = draw(survey, *estimated, PictureOptions(SIZE), ["overview"], "open3d")

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from mlscorr.report.render._camera import Camera
 from mlscorr.report.render._sheet import Sheet
 from mlscorr.report.render._views import View
 from mlscorr.report.render.quantities import CloudPair
+from mlscorr.report.render.view import Camera
 from mlscorr.survey import PointCloud
 from tests.beds.street_of_points import ORIGIN, SIZE, START
 

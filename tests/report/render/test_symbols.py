@@ -3,9 +3,9 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from mlscorr.report.render._camera import Camera
 from mlscorr.report.render._views import Mark, View
 from mlscorr.report.render.symbols import compass, free_corner, legend, letter, scale_bar
+from mlscorr.report.render.view import Camera
 from tests.beds.street_of_points import ORIGIN, SIZE
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mlscorr.frames import attitude_from_angles
-from mlscorr.simulate.pos._alignment import poses
+from mlscorr.simulate.pos.navigation import aligned_poses
 from mlscorr.survey import Trajectory
 
 START = 413_200.0  # s
@@ -23,7 +23,7 @@ def drive(speed=8.0):
 def test_within_the_pass_its_own_poses_are_kept():
     "At its epochs to 1 um and 1e-9 rad"
     trajectory = drive()
-    position, attitude = poses(trajectory, TIME)
+    position, attitude = aligned_poses(trajectory, TIME)
     np.testing.assert_allclose(position + trajectory.position[0], trajectory.position, atol=1e-6)
     assert (attitude * trajectory.attitude.inv()).magnitude().max() < 1e-9
 
@@ -31,7 +31,7 @@ def test_within_the_pass_its_own_poses_are_kept():
 @pytest.mark.parametrize("speed", [0.0, 3.0, 15.0])
 def test_position_speed_and_attitude_meet_at_the_ends(speed):
     "No step beyond what the speed makes of 0.05 s, no jump of velocity or heading"
-    position, attitude = poses(drive(speed), OUTSIDE)
+    position, attitude = aligned_poses(drive(speed), OUTSIDE)
     velocity = np.diff(position, axis=0) / 0.05
     assert np.abs(np.diff(velocity, axis=0)).max() < 0.05 * 5.0  # m/s: 5 m/s^2
     turn = (attitude[1:] * attitude[:-1].inv()).magnitude()
@@ -40,7 +40,7 @@ def test_position_speed_and_attitude_meet_at_the_ends(speed):
 
 def test_the_way_swings_in_speed_and_heading():
     "Before and after the pass the vehicle goes faster and turns, within it does neither"
-    position, attitude = poses(drive(), OUTSIDE)
+    position, attitude = aligned_poses(drive(), OUTSIDE)
     speed = np.linalg.norm(np.diff(position, axis=0), axis=1) / 0.05
     heading = attitude.apply([0.0, 1.0, 0.0])
     within = (TIME[0] <= OUTSIDE) & (TIME[-1] >= OUTSIDE)
@@ -53,7 +53,7 @@ def test_the_way_swings_in_speed_and_heading():
 
 def test_the_vehicle_goes_where_its_nose_points():
     "On the way of the alignment velocity and nose agree to 1 deg"
-    position, attitude = poses(drive(), OUTSIDE)
+    position, attitude = aligned_poses(drive(), OUTSIDE)
     course = np.diff(position, axis=0)
     course /= np.linalg.norm(course, axis=1, keepdims=True)
     nose = attitude[:-1].apply([0.0, 1.0, 0.0])

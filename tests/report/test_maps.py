@@ -7,8 +7,8 @@ import numpy as np
 
 from mlscorr.estimate import NextControl
 from mlscorr.evaluate import TargetRow
-from mlscorr.report.target_map import map_figure
-from tests.beds.reports import drive, fabricate
+from mlscorr.report.maps import map_figure
+from tests.beds.reports import because, drive, fabricate
 
 
 def test_the_map_has_equal_scales_and_states_its_arrows():
@@ -54,7 +54,9 @@ def test_names_on_the_map_go_to_the_other_side_of_a_star():
 def test_a_point_far_away_does_not_shrink_the_drive():
     "A control point of another town, or at 0/0, is counted in the title and left out of the map"
     _, correction, report = fabricate(drive())
-    far = TargetRow.unobserved("far", None, "control", np.zeros(3), "No target is left for it.")
+    far = TargetRow.unobserved(
+        "far", None, "control", np.zeros(3), because("No target is left for it.")
+    )
     figure = map_figure(correction, replace(report, targets=[*report.targets, far]))
     (axes,) = figure.axes
     assert "(far outside: 1)" in axes.get_title(loc="left")

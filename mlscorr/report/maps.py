@@ -1,18 +1,95 @@
-"""The map: trajectory, targets and their horizontal residuals as arrows."""
+"""Maps: trajectory, targets and their horizontal residuals as arrows, and what was seen twice.
+
+Both have panels in equal scales, with whole meters as tick labels.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from mlscorr.correction import Correction
-from mlscorr.report import style
+from mlscorr.estimate import TieResiduals
 from mlscorr.report.correction_report import GROUPS, CorrectionReport, array, ordered
-from mlscorr.report.map_frame import frame, track
+from mlscorr.report.render import colour_table
 from mlscorr.report.settings import SETTINGS
+from mlscorr.report.style import (
+    AFTER,
+    BEFORE,
+    MARKS,
+    TRACK,
+    break_at_gaps,
+    label,
+    legend_above,
+    mark_handles,
+    new_figure,
+    nice,
+    styled,
+    thin,
+)
+from mlscorr.survey import Trajectory
+from mlscorr.wording import thousands
+
+STATES = ("Before the correction", "After the correction")
+
+
+@styled
+def tie_figure(correction: Correction, residuals: TieResiduals) -> Figure:
+    """Plan of the ties, before and after: side by side, or one above the other on a long street.
+
+    Parameters
+    ----------
+    correction : Correction
+    residuals : TieResiduals
+        What the correction leaves of the ties.
+    """
+    way = track(correction.corrected)
+    used = residuals.used
+    places = residuals.ties.place.mean(axis=1)[:, :2]
+    misfits = [1000 * np.abs(v) for v in (residuals.ties.misclosure, residuals.after)]  # mm
+    low, high = corners(np.vstack([way, places]), 0.1)
+    figure, panels = map_panels(2, (high - low)[1] / (high - low)[0])
+    figure.set_dpi(SETTINGS.dots_per_inch)
+    largest = max(np.max(misfit[used], initial=10.0) for misfit in misfits)
+    scale = {"norm": LogNorm(1.0, largest), "cmap": ListedColormap(colour_table("sigma") / 255)}
+    for panel, misfit, title in zip(panels, misfits, STATES, strict=True):
+        panel.plot(*way.T, **TRACK, zorder=1)
+        panel.plot(*places[~used].T, linestyle="none", zorder=2, rasterized=True, **MARKS["unused"])
+        front = np.flatnonzero(used)[np.argsort(misfit[used], kind="stable")]  # the worst on top
+        dots = panel.scatter(
+            *places[front].T,
+            9,
+            np.maximum(misfit[front], 1.0),
+            linewidths=0,
+            zorder=3,
+            rasterized=True,
+            **scale,
+        )
+        frame(panel, low, high, 4)
+        panel.set_title(title)
+        panel.label_outer()
+    bar = figure.colorbar(dots, ax=panels, pad=0.01, extend="min", format="%g")
+    bar.set_label("How far apart both views lie (mm)")
+    legend_above(figure, _kinds_legend(used))
+    return figure
+
+
+def _kinds_legend(used):
+    """Legend entries of what is drawn."""
+    handles = [Line2D([], [], label="Trajectory (corrected)", **TRACK)]
+    dot = {"linestyle": "none", "marker": "o", "markersize": 3, "color": "#5b2a86"}
+    if used.any():
+        handles.append(Line2D([], [], label="Seen twice", **dot))
+    if not used.all():
+        words = "Not used: contradicts the others"
+        handles.append(Line2D([], [], linestyle="none", label=words, **MARKS["unused"]))
+    return handles
+
 
 WORDS = {"control": "Control point", "check": "Check point", "unused": "Not used"}
 NEXT: dict[str, Any] = {"color": "#009e73", "marker": "*", "markersize": 11.0}
@@ -20,7 +97,7 @@ NEXT |= {"linestyle": "none", "zorder": 6}
 NEXT_WORDS = "Where another control point helps most"
 
 
-@style.styled
+@styled
 def map_figure(correction: Correction, report: CorrectionReport) -> Figure:
     """Plan of the trajectory and the targets with residual arrows before and after.
 
@@ -47,9 +124,9 @@ def map_figure(correction: Correction, report: CorrectionReport) -> Figure:
     tips = array(arrows, "surveyed")[:, :2] + times * array(arrows, "before")[:, :2]
     low, high, strip = _bounds(np.vstack([points, tips]), extent)
     width, height = high - low
-    figure = style.new_figure(1.25 + (SETTINGS.figure_width - 1.1) * height / width)
+    figure = new_figure(1.25 + (SETTINGS.figure_width - 1.1) * height / width)
     axes = figure.add_subplot()
-    axes.plot(*way.T, **style.TRACK)
+    axes.plot(*way.T, **TRACK)
     # hides under its mark
     if times:
         short = _arrows(axes, arrows, times, 0.008 * width)
@@ -57,7 +134,7 @@ def map_figure(correction: Correction, report: CorrectionReport) -> Figure:
         short = 0
     for group in GROUPS[::-1]:
         places = array(ordered(rows, group), "surveyed")
-        axes.plot(*places[:, :2].T, linestyle="none", **style.MARKS[group])
+        axes.plot(*places[:, :2].T, linestyle="none", **MARKS[group])
     names = {row.name: (row.surveyed[:2], -1 if row.before[0] > 0 else 1) for row in rows[::-1]}
     mark_places(axes, [(place.easting, place.northing) for place in report.next_control])
     write_names(axes, names, width)
@@ -71,7 +148,7 @@ def map_figure(correction: Correction, report: CorrectionReport) -> Figure:
     _key(axes, low, high, strip, times)
     handles = _legend(rows, len(arrows), times, short)
     handles += [Line2D([], [], label=NEXT_WORDS, **NEXT)] * bool(report.next_control)
-    style.legend_above(figure, handles, columns=2)
+    legend_above(figure, handles, columns=2)
     return figure
 
 
@@ -103,7 +180,7 @@ def _enlargement(residuals, extent):
     """How many times the arrows are larger than the map: 1, 2, 5, 10, ...; 0 without arrows."""
     longest = np.hypot(*residuals.T).max(initial=0.0)
     if longest > 0:
-        return style.nice(SETTINGS.longest_arrow * extent / longest)
+        return nice(SETTINGS.longest_arrow * extent / longest)
     return 0.0
 
 
@@ -128,7 +205,7 @@ def _arrows(axes, rows, times, shortest):
     Returns how many after the correction are too short to draw.
     """
     place = array(rows, "surveyed")[:, :2]
-    for name, color, width in (("before", style.BEFORE, 0.026), ("after", style.AFTER, 0.018)):
+    for name, color, width in (("before", BEFORE, 0.026), ("after", AFTER, 0.018)):
         residual = times * array(rows, name)[:, :2]
         long = np.hypot(*residual.T) > shortest
         _quiver(axes, place[long], residual[long], color, width)
@@ -159,7 +236,7 @@ def write_names(axes: Axes, names: Mapping[str, tuple[Any, int]], width: float) 
     places = [line.get_xydata() for line in axes.lines if line.get_marker() == NEXT["marker"]]
     stars = [[*np.ravel(place) + letter[1] / 4, *letter[[1, 1]]] for place in places]
     for name, (place, side) in names.items():
-        text = style.label(name)
+        text = label(name)
         half = letter * [len(text) / 2, 0.5]
         boxes = {
             s: [*np.add(place, [s * (half[0] + letter[0]), 0.0]), *half] for s in (side, -side)
@@ -195,13 +272,13 @@ def _key(axes, low, high, strip, times):
     middle = low[1] + 0.35 * strip
     top = low[1] + 0.62 * strip
     text = {"horizontalalignment": "left", "verticalalignment": "center", "fontsize": 8.5}
-    bar = style.nice(0.22 * width)
+    bar = nice(0.22 * width)
     west = low[0] + 0.03 * width
     axes.plot([west, west + bar], [middle] * 2, color="black", linewidth=3, zorder=3)
     axes.text(west, top, f"{bar:g} m on the map", **text)
     if times:
         west = low[0] + 0.36 * width
-        length = style.nice(SETTINGS.longest_arrow * width / times)
+        length = nice(SETTINGS.longest_arrow * width / times)
         _quiver(axes, np.array([[west, middle]]), np.array([[times * length, 0]]), "black", 0.02)
         axes.text(
             west, top, f"Residual of {length:g} m (arrows enlarged {times:,.0f} times)", **text
@@ -221,14 +298,85 @@ def _key(axes, low, high, strip, times):
 
 def _legend(rows, arrows, times, short):
     """Legend entries of what is really drawn."""
-    handles = [Line2D([], [], label="Trajectory (corrected)", **style.TRACK)]
-    handles += style.mark_handles(WORDS, {row.group for row in rows})
+    handles = [Line2D([], [], label="Trajectory (corrected)", **TRACK)]
+    handles += mark_handles(WORDS, {row.group for row in rows})
     if times:
         if short:
             hidden = f" ({short} of {arrows} too short to show)"
         else:
             hidden = ""
-        colours = {"Residual before": style.BEFORE, f"Residual after{hidden}": style.AFTER}
+        colours = {"Residual before": BEFORE, f"Residual after{hidden}": AFTER}
         for text, color in colours.items():
             handles.append(Line2D([], [], color=color, linewidth=2.5, label=text))
     return handles
+
+
+def map_panels(count: int, share: float) -> tuple[Figure, np.ndarray]:
+    """A figure and its panels (count,): side by side, or one above the other for a long street.
+
+    Parameters
+    ----------
+    count : int
+        Maps of the same place: one or two.
+    share : float
+        Of its height in its width.
+    """
+    columns = 2 if share > 0.7 and count > 1 else 1
+    # inch: labels and colours
+    lines = count // columns
+    beside = 1.8
+    width = SETTINGS.figure_width / columns - beside
+    figure = new_figure(0.8 + lines * (0.35 + width * share))
+    return figure, figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False).ravel()
+
+
+def track(trajectory: Trajectory) -> np.ndarray:
+    """Thinned plan positions (m, 2) of a trajectory, with NaN at its gaps. Units: m.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    """
+    plan = trajectory.position[:, :2]
+    rows = thin(plan, trajectory.gps_time, trajectory.gaps)
+    return break_at_gaps(trajectory.gps_time[rows], trajectory.gaps, plan[rows])[1]
+
+
+def corners(points: np.ndarray, thinnest: float) -> tuple[np.ndarray, np.ndarray]:
+    """Lower left and upper right corner (2,) of a map of points, with a margin. Units: m.
+
+    Parameters
+    ----------
+    points : (n, 2) array
+        NaN where none is known. Units: m.
+    thinnest : float
+        Least half width of the map over its length: none is a thin line.
+    """
+    low = np.nanmin(points, axis=0)
+    high = np.nanmax(points, axis=0)
+    extent = max(float((high - low).max()), 1.0)
+    middle = (low + high) / 2
+    half = np.maximum((high - low) / 2, thinnest * extent) + 0.04 * extent
+    return middle - half, middle + half
+
+
+def frame(axes: Axes, low: np.ndarray, high: np.ndarray, ticks: int = 5) -> None:
+    """Limits, equal scale on both axes, and whole metres as tick labels.
+
+    Parameters
+    ----------
+    axes : Axes
+    low, high : (2,) array
+        Corners. Units: m.
+    ticks : int
+        Intervals of an axis, at most.
+    """
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
+    axes.set_aspect("equal")
+    for axis, name in ((axes.xaxis, "Easting (m)"), (axes.yaxis, "Northing (m)")):
+        axis.set_major_locator(MaxNLocator(ticks, steps=[1, 2, 5, 10], min_n_ticks=2))
+        decimals = 0 if np.ptp(axis.get_view_interval()) > 5 else 1
+        metres = FuncFormatter(lambda v, _, d=decimals: thousands(v, d))
+        axis.set_major_formatter(metres)
+        axis.set_label_text(name)

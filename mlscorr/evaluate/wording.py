@@ -1,0 +1,229 @@
+"""The sentences of an evaluation: why points took no part, what is doubtful, how accurate it is."""
+
+import numpy as np
+
+from mlscorr.matching import REASONS as MATCHING
+from mlscorr.survey import Statement, Wording
+
+FOLLOWS = "The corrected cloud follows the control; find out which of the two is right."
+
+
+def _bayes_factor(log_evidence):
+    """A Bayes factor in words: its power of ten where it is large."""
+    power = log_evidence / np.log(10)
+    if power < 3:
+        return f"{np.exp(log_evidence):.0f}"
+    return f"1e{power:.0f}"
+
+
+def _evidence(observations, log_evidence):
+    return (
+        f"{observations} observations, Bayes factor {_bayes_factor(log_evidence)} against an error "
+        "of the POS"
+    )
+
+
+def _assumed(sigma):
+    """The end of a sentence that rests on a sigma which nobody stated."""
+    if sigma is None:
+        return ""
+    return (
+        f" Nobody stated the sigma of the POS: {sigma:g} m is assumed, and a worse POS could "
+        "differ as much. State it under [pos] in survey.toml."
+    )
+
+
+def _shift(size, length, observations, log_evidence, assumed_sigma):
+    return (
+        f"The control points lie {length:.2f} m beside the cloud as the POS puts it "
+        f"(E {size[0]:+.2f}, N {size[1]:+.2f} m; {_evidence(observations, log_evidence)}). It "
+        f"looks like another horizontal datum, realization or epoch. {FOLLOWS}"
+        f"{_assumed(assumed_sigma)}"
+    )
+
+
+def _height(size, observations, log_evidence, assumed_sigma):
+    where = "above"
+    if size[0] < 0:
+        where = "below"
+    return (
+        f"The control points lie {abs(size[0]):.2f} m {where} the cloud as the POS puts it "
+        f"({_evidence(observations, log_evidence)}). It looks like heights of another vertical "
+        "datum or geoid, or a wrong height of an antenna, an instrument or a post. "
+        f"{FOLLOWS}{_assumed(assumed_sigma)}"
+    )
+
+
+def _net(words, length, extent, observations, log_evidence):
+    """What all control points together are beside the cloud."""
+    return (
+        f"The net of control points is {words} ({length:.3f} m at {extent:.0f} m from its middle; "
+        f"{_evidence(observations, log_evidence)})."
+    )
+
+
+def _scale(size, sigma, ground, is_ground, **net):
+    """The scale beside that of ground distances, and how to declare it."""
+    words = f"larger than in the cloud by {1e6 * size[0]:+.0f} +/- {1e6 * sigma[0]:.0f} ppm"
+    factor = f"scale_factor = {1 / (1 + size[0]):.6f}"
+    if ground is None:
+        cause = (
+            "It looks like ground distances without the scale of the map: if they are, set "
+            f"{factor} under [control]."
+        )
+    else:
+        expected = 1 / ground.combined - 1
+        cause = f"Ground distances would be larger by {1e6 * expected:+.0f} ppm there ({ground}), "
+        if is_ground:
+            cause += (
+                'which fits: if the control is in them, set scale_factor = "ground" under '
+                f"[control], or {factor}."
+            )
+        else:
+            cause += (
+                "which does not fit: look for another projection or a wrong unit. If the control "
+                f"has this scale, set {factor} under [control]."
+            )
+    return f"{_net(words, **net)} {cause} {FOLLOWS}"
+
+
+def _turn(size, sigma, ground, **net):
+    turn, uncertainty = np.degrees([size[0], sigma[0]])
+    words = f"turned to the left against the cloud by {turn:+.4f} +/- {uncertainty:.4f} deg"
+    beside = ""
+    if ground is not None:
+        angle = -np.degrees(ground.convergence)
+        beside = f" (one to true north would be turned by {angle:+.4f} deg)"
+    return (
+        f"{_net(words, **net)} It looks like another projection or zone, or a local net oriented "
+        f"to another north{beside}: export the control in the crs of the cloud. {FOLLOWS}"
+    )
+
+
+def _tilt(size, sigma, **net):
+    rise = 1e3 * size
+    uncertainty = 1e3 * sigma
+    words = (
+        f"tilted against the cloud: it rises by {rise[0]:+.2f} +/- {uncertainty[0]:.2f} mm/m "
+        f"towards east and {rise[1]:+.2f} +/- {uncertainty[1]:.2f} mm/m towards north"
+    )
+    return (
+        f"{_net(words, **net)} It looks like heights of another geoid model, or like a network "
+        "whose vertical was never levelled: export the control with the geoid of the cloud. "
+        f"{FOLLOWS}"
+    )
+
+
+def _other_clock(file, lag, later, beside, shifted, samples):
+    """Points lie about the vehicle `later` s after their times; beside it at these."""
+    order = "earlier"
+    side = "after"
+    clocks = "cloud seems to be in UTC, the trajectory in GPS time"
+    if later < 0:
+        order = "later"
+        side = "before"
+        clocks = "trajectory seems to be in UTC, the cloud in GPS time"
+    return (
+        f"The times of {file} are {lag} s {order} than the trajectory's: its points lie "
+        f"{beside:.0f} m beside the vehicle, and {shifted:.0f} m beside where it is {lag} s {side} "
+        f"(horizontal medians of {samples} samples). The {clocks}: export both in GPS time, or add "
+        f"{-later} to trajectory.time_constant (s) in survey.toml."
+    )
+
+
+def _classes(axis, size, is_conformant, rmse, fit, survey):
+    tested = "It would meet"
+    if is_conformant:
+        tested = "It meets"
+    return (
+        f"{tested} the {size}-cm {axis} accuracy class: RMSE_{axis[0].upper()} is "
+        f"{100 * rmse:.1f} cm ({100 * fit:.1f} cm fit to the points, {100 * survey:.1f} cm survey "
+        "of the points)."
+    )
+
+
+def _were(points):
+    if points == 1:
+        return "point was"
+    return "points were"
+
+
+def _left_out(points):
+    return (
+        f"No check point was scored. {points} control {_were(points)} left out in turn and "
+        "predicted from the others: an estimate of the accuracy, and not a conformant test, as "
+        "these points took part in the correction."
+    )
+
+
+def _too_few(points, least):
+    return (
+        f"The standard calls for at least {least} check points and {points} {_were(points)} used: "
+        f"fewer than {least} check points are not a conformant test."
+    )
+
+
+def _inaccurate(axis, survey):
+    return (
+        f"The {axis} survey error of the points, {100 * survey:.1f} cm, is more than half of what "
+        "they found: points for a test should be twice as accurate as the product."
+    )
+
+
+REASONS: dict[str, Wording] = {  # why a surveyed point took no part in the estimate
+    **MATCHING,
+    "check point": "check point",
+    "outlier": "outlier: statistic {statistic:.1f} against {critical:.1f}",
+    "no pose": "{points} points near it, at {start:.1f} to {end:.1f} s, were measured in a gap of "
+    "the trajectory or outside it, and nothing is interpolated there.",
+    "seen by others": "Another scanner saw it, this one did not.",
+}
+DATUM: dict[str, Wording] = {  # by what control and cloud differ as a whole
+    "shift": _shift,
+    "height": _height,
+    "scale": _scale,
+    "turn": _turn,
+    "tilt": _tilt,
+}
+BEAMS: dict[str, Wording] = {  # points of another survey, times that are wrong
+    "no time": "{count} of {samples} points sampled from {file} have gps_time {values}: they were "
+    "written without times, and stay as they are (exit code 4). Export them with gps_time, or "
+    "remove them.",
+    "outside": "{count} of {samples} points sampled from {file} lie outside the trajectory "
+    "[{start:.3f}, {end:.3f}] s or in its gaps ({gaps}), up to {away:.3f} s from it: they stay as "
+    "they are (exit code 4). Export the whole trajectory.",
+    "backwards": "The times of {file} run backwards: none of {steps} sampled points is later than "
+    "the one before. Unless the file was sorted so, its gps_time is wrong, and points get the "
+    "correction of another time.",
+    "other survey": "The points of {file} lie {beside:.0f} m beside the trajectory and {off:.0f} "
+    "deg off the scan plane (median of {samples} samples; limits {near:.0f} m and {off_plane:.0f} "
+    "deg): the file may be of another survey with the same times, its gps_time wrong (UTC is 18 s "
+    "late), or [mounting] another scanner's or not in m and deg. Take out what doesn't fit.",
+    "other clock": _other_clock,
+}
+ACCURACY: dict[str, Wording] = {  # by the standard
+    "not determined": "Not determined: no check point was scored, and too few control points to "
+    "leave one out in turn.",
+    "left out": _left_out,
+    "too few": _too_few,
+    "tested": "This data set was tested with {points} independent check points.",
+    "class": _classes,
+    "inaccurate points": _inaccurate,
+}
+GATES: dict[str, Wording] = {  # that a report fails
+    "not determined": "{quantity}: {what} was not determined.",
+    "exceeded": "{quantity}: {what} is {value:.4g} {operator} {limit:g}.",
+}
+
+
+def reason_in_words(why: Statement | None) -> str:
+    """Why a surveyed point took no part; empty where nothing is known of it.
+
+    Parameters
+    ----------
+    why : Statement or None
+        Of a key of REASONS.
+    """
+    if why is None:
+        return ""
+    return why.sentence(REASONS)

@@ -1,0 +1,595 @@
+"""The sentences of reports: what a correction, a calibration and a comparison say of a survey."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+from mlscorr.survey import Statement, Wording
+from mlscorr.wording import (
+    counted,
+    joined,
+    known,
+    length_in_words,
+    millimetres,
+    number,
+    percent,
+    thousands,
+)
+
+NAMED = 6  # points or stretches that stand on the first screen; the tables have all of them
+ASSUMED_NAMES = {  # of a key of survey.toml
+    "pos.position_sigma": "Position of the POS",
+    "pos.attitude_sigma": "Attitude of the POS",
+    "pos.correlation_time": "Correlation time of the POS",
+    "scanner.range_noise": "Range noise",
+    "scanner.angle_noise": "Angle noise",
+}
+JUDGES = {  # what a verdict on a correction rests on
+    "check": "as independent check points tell",
+    "leave-one-out": "as control points tell that were left out in turn",
+    "fit": "but only at the points that it was made from: nothing independent can judge it",
+}
+PLACES = {True: "only another scanner saw the target", False: "nothing was scanned"}
+OTHERS = {  # kinds of methods beside our own
+    "one move": "Best of those that move the whole cloud as one",
+    "over time": "Best of polynomials and interpolation over time",
+}
+
+
+def names_in_words(names: Sequence[str]) -> str:
+    """Names of points in a sentence; of many the first, and how many more there are.
+
+    Parameters
+    ----------
+    names : sequence of str
+    """
+    words = ", ".join(names[:NAMED])
+    if len(names) > NAMED:
+        words += f" and {len(names) - NAMED} more"
+    return words
+
+
+def stretch_in_words(
+    start: float, end: float, chainage: float, length: float, why: str, sigma: float
+) -> tuple[str, str]:
+    """Where a part lies that no control point holds, and why, with its sigma.
+
+    Parameters
+    ----------
+    start, end : float
+        Units: s.
+    chainage, length : float
+        Units: m.
+    why : str
+    sigma : float
+        Units: m.
+    """
+    return (
+        f"{start:.1f} to {end:.1f} s, {chainage:.0f} to {chainage + length:.0f} m of the way",
+        f"{why}; sigma up to {length_in_words(sigma)}",
+    )
+
+
+def assumed_in_words(row: Mapping[str, Any], use: str | None = None) -> tuple[str, str]:
+    """An accuracy that nobody stated: its name, and its default with its size by this survey.
+
+    Parameters
+    ----------
+    row : dict
+        Of ``assumed`` of a document.
+    use : str, optional
+        What a default without an estimate is used for.
+    """
+    text = f"{_assumed_size(row['value'], row['unit'])} assumed"
+    if row.get("estimate") is not None:
+        text += f"; about {_assumed_size(row['estimate'], row['unit'])} by this survey"
+    elif use is not None:
+        text += f"; {use}"
+    return ASSUMED_NAMES.get(row["key"], row["key"]), text
+
+
+def _assumed_size(value, unit):
+    """A size, or several, in words."""
+    values = [value]
+    if isinstance(value, list | tuple):
+        values = value
+    if not all(map(known, values)):
+        return "–"
+    if unit == "m":
+        return length_in_words(values[0])
+    sign = f" {unit}"
+    if unit == "deg":
+        sign = "°"
+    return ", ".join(f"{each:.2g}{sign}" for each in values)
+
+
+def _verb(count, singular, plural):
+    if count == 1:
+        return singular
+    return plural
+
+
+# A correction: its result
+
+
+def _off(before, after):
+    return f"from {length_in_words(before)} to {length_in_words(after)} off the surveyed places"
+
+
+def _improved(before, after, kind, times, holds_everywhere):
+    """It boasts of no factor where a part of the cloud may be as far off as it was."""
+    where = ""
+    if not holds_everywhere and kind == "check":
+        where = " at the points that were seen"
+    elif not holds_everywhere:
+        where = " where control holds it"
+    elif times is not None:
+        where = f" ({times:.0f} times closer)"
+    return f"The correction brought the cloud {_off(before, after)}{where}, {JUDGES[kind]}."
+
+
+def points_in_words(points: int, observations: int) -> str:
+    """How many points: '8 points', or '12 observations of 8 points'.
+
+    Parameters
+    ----------
+    points, observations : int
+    """
+    words = counted(points, "point")
+    if points == observations:
+        return words
+    return f"{observations} observations of {words}"
+
+
+def _rmse(before, after):
+    """RMSE (3,) before and after, with as many decimals as the smallest needs."""
+    low = min(*before, *after)
+    decimals = 4
+    if low >= 0.03:
+        decimals = 2
+    elif low >= 0.003:
+        decimals = 3
+    pair = ["/".join(number(value, decimals) for value in values) for values in (before, after)]
+    return f"RMSE {pair[0]} m before, {pair[1]} m after (E/N/H)"
+
+
+def _rmse_of_checks(before, after, points, observations):
+    return (
+        f"Check points: {_rmse(before, after)}, {points_in_words(points, observations)} that took "
+        "no part in the estimate."
+    )
+
+
+def _rmse_left_out(before, after, points, observations, has_checks):
+    none = "There are no check points."
+    if has_checks:
+        none = "No check point was seen."
+    return (
+        f"{none} Control points, each left out in turn and predicted from the others: "
+        f"{_rmse(before, after)}, {points_in_words(points, observations)}."
+    )
+
+
+def _rmse_of_fit(before, after, points, observations):
+    return (
+        "There is no independent check: every target used "
+        f"({points_in_words(points, observations)}) made the correction. The fit, "
+        f"{_rmse(before, after)}, does not tell how good the correction is elsewhere."
+    )
+
+
+def _worse_axes(rises, points, observations):
+    axes = ", ".join(f"{axis} by {number(rise)} m" for axis, rise in rises.items())
+    return (
+        f"After the correction it is worse than before: {axes} (RMS of "
+        f"{points_in_words(points, observations)})."
+    )
+
+
+# A correction: its points
+
+
+def _scored(scored, surveyed):
+    were = _verb(scored, "was", "were")
+    return f"{scored} of {surveyed} surveyed check points {were} seen and scored."
+
+
+def _lost(names, words):
+    points = _verb(len(names), "check point was", "check points were")
+    return (
+        f"{len(names)} {points} {words} ({names_in_words(names)}): the error there is unknown, and "
+        "counts against this result."
+    )
+
+
+def _elsewhere(count, by_others):
+    return f"{count} {_verb(count, 'stands', 'stand')} where {PLACES[by_others]}."
+
+
+def _control(scored, surveyed, refused, hidden, elsewhere):
+    parts = [f"{scored} of {surveyed} surveyed points used"]
+    for names, words in ((refused, "refused"), (hidden, "not seen")):
+        if names:
+            parts.append(f"{len(names)} {words} ({names_in_words(names)})")
+    parts += [f"{count} where {PLACES[by_others]}" for by_others, count in elsewhere.items()]
+    return f"{', '.join(parts)}."
+
+
+def _uncontrolled(is_tied, sigma):
+    """What a result without control points is relative to."""
+    result = "No control point takes part: nothing but the POS says where the cloud lies."
+    if is_tied:
+        result += (
+            " Passes are fitted to one another by what two of them both saw: accuracy is relative "
+            "only, and an error that all of them share stays in the cloud."
+        )
+    if sigma > 0:
+        result += f" An error of up to {length_in_words(sigma)} is to be expected (one sigma)."
+    return result
+
+
+def _moved(held, extrapolated, left):
+    """Which share of the points was corrected, and on which grounds."""
+    total = max(held + extrapolated + left, 1)
+    sentence = (
+        f"{percent(held / total)} of the points corrected where control holds them, "
+        f"{percent(extrapolated / total)} by extrapolation, {percent(left / total)} left as they "
+        "were."
+    )
+    if left:
+        sentence += f" {left} of {total} points lie outside the trajectory or in its gaps."
+    return sentence
+
+
+def _datum(lengths):
+    terms = ", ".join(f"{term} {length_in_words(length)}" for term, length in lengths.items())
+    return (
+        f"Control and cloud differ by one linear term each ({terms}), which check points of the "
+        "same survey cannot show."
+    )
+
+
+def _extrapolated(seconds, metres, share, sigma):
+    return (
+        f"No control holds {seconds:.1f} s ({metres:.0f} m) of the drive, {percent(share)} of the "
+        "points: the correction is extrapolated there, and an error of up to "
+        f"{length_in_words(sigma)} is to be expected (one sigma)."
+    )
+
+
+def _left_out(rmse, rmse_3d):
+    axes = ", ".join(map(length_in_words, rmse))
+    return (
+        f"RMSE {length_in_words(rmse_3d)} in 3D ({axes} in E, N, H) at control points that the "
+        "others alone correct."
+    )
+
+
+def _sigma(largest, time, median):
+    return (
+        f"Up to {length_in_words(largest)} (at {time:.1f} s), {length_in_words(median)} at half of "
+        "the epochs: one sigma in 3D of the corrected position."
+    )
+
+
+def _assumed(count, purpose, sections, has_sigma):
+    columns = ""
+    if has_sigma:
+        columns = ", or give the trajectory sigma columns"
+    return (
+        f"{counted(count, 'accuracy')} that nobody stated {_verb(count, 'is', 'are')} assumed"
+        f"{purpose}. State what you know under {joined(sections)} in survey.toml{columns}."
+    )
+
+
+# Ties between passes, for a reader who never heard of them
+
+
+def _unused_ties(n, has_control):
+    outcome = "passes stay apart."
+    if has_control:
+        outcome = "control points alone made the correction."
+    return (
+        f"None of the {thousands(n)} places that were seen twice is used, since more than half of "
+        f"them contradict the others: {outcome}"
+    )
+
+
+def _ties_apart(n, before, after):
+    return (
+        "The same wall, road surface, pole or painted line was seen twice in "
+        f"{thousands(n)} places: there both views lay {length_in_words(before)} apart before the "
+        f"correction and lie {length_in_words(after)} apart after it (median)."
+    )
+
+
+def _wrong_ties(wrong):
+    return (
+        f"{thousands(wrong)} of these places {_verb(wrong, 'is', 'are')} not used, as the others "
+        "contradict them: cars that moved, people, leaves, or one row of windows taken for the "
+        "next."
+    )
+
+
+def _share(control):
+    return (
+        f"Of what the result knows of the drive, {percent(control)} comes from control points and "
+        f"{percent(1 - control)} from these places."
+    )
+
+
+def _sufficient(control, sufficient):
+    points = f"{sufficient} of them, evenly spread,"
+    if sufficient == 1:
+        points = "1 of them"
+    return (
+        f"{control} control points took part; {points} would have sufficed to know the drive about "
+        "as well (to a tenth of its sigma)."
+    )
+
+
+def _all_needed(control):
+    points = f"All {control}"
+    if control == 2:
+        points = "Both"
+    return f"{points} control points were needed: with fewer the drive is known less well."
+
+
+# A calibration
+
+
+def _together(first, name, fit, lever_arm, boresight):
+    both = f"No wall that scanners {first} and {name} both saw holds them."
+    if fit is not None:
+        both = (
+            f"Scanners {first} and {name} put a wall that both saw in one place to "
+            f"{millimetres(fit)} mm."
+        )
+    return (
+        f"{both} Scanner {name} beside scanner {first}: lever arm to "
+        f"{'/'.join(map(millimetres, lever_arm))} mm right/forward/up, boresight to "
+        f"{'/'.join(f'{sigma:.3f}' for sigma in boresight)} deg about them (one sigma)."
+    )
+
+
+def _component(row):
+    """A part of a mounting, with what it lacks and its sigma in mm or deg."""
+    value = row["lsc"]
+    sigma = row["lsc_sigma"]
+    if row["unit"] == "m":
+        return f"{row['name']} {millimetres(value)} ± {millimetres(sigma)} mm"
+    return f"{row['name']} {value:.3f} ± {sigma:.3f} deg"
+
+
+def _lacks(components):
+    words = []
+    for row in components:
+        text = _component(row)
+        if not row["determined"]:
+            text += " (not determined)"
+        words.append(text)
+    return f"The recorded mounting lacks {', '.join(words)}."
+
+
+def _undetermined(components, count):
+    return (
+        f"{count - len(components)} of {count} parts by this geometry. Not determined, and changed "
+        "only as far as the accuracy of the POS tells it from what looks the same: "
+        f"{', '.join(map(_component, components))}."
+    )
+
+
+def _calibrated(end: str) -> Callable[..., str]:
+    """Wording of how far targets of a role were and are off."""
+
+    def sentence(role, before, after):
+        return f"3D RMSE of {role} points {length_in_words(before)} → {length_in_words(after)}{end}"
+
+    return sentence
+
+
+def _scanner(end: str) -> Callable[..., str]:
+    """Wording of what the scanner's own ranges and encoder lack."""
+
+    def sentence(range_offset, encoder_scale):
+        undetermined = []
+        for row in (range_offset, encoder_scale):
+            words = ""
+            if row["significant"] and not row["determined"]:
+                words = " (not determined)"
+            undetermined.append(words)
+        return (
+            f"Ranges lack {millimetres(range_offset['correction'])} ± "
+            f"{millimetres(range_offset['sigma'])} mm{undetermined[0]}, scan angles "
+            f"{1e3 * encoder_scale['correction']:.2f} ± {1e3 * encoder_scale['sigma']:.2f} mrad "
+            f"per rad{undetermined[1]}{end}"
+        )
+
+    return sentence
+
+
+def _two_passes(used, n, is_between_scanners, before, after, without_drift):
+    views = "two passes"
+    if is_between_scanners:
+        views = "two passes, or two scanners of one,"
+    sentence = (
+        f"{used} of {n} places that {views} both saw are used: {length_in_words(before)} apart "
+        f"before, {length_in_words(after)} after (median)"
+    )
+    if without_drift is not None:
+        sentence += f", {length_in_words(without_drift)} without the drift"
+    return f"{sentence}."
+
+
+# A comparison of methods
+
+
+def _no_method(least, raw):
+    return (
+        f"No method improves this cloud by {1000 * least:.0f} mm or more. The cloud as recorded, "
+        f"with {number(raw)} m, is as good as any."
+    )
+
+
+def _best(name, about, rmse, raw):
+    return (
+        f"Best is {name}: 3D RMSE {number(rmse)} m, against {number(raw)} m without any "
+        f"correction. {about}"
+    )
+
+
+def _several_best(names, rmse, raw, least):
+    return (
+        f"Best are {joined(names)}: 3D RMSE {number(rmse)} m, against {number(raw)} m without any "
+        f"correction. They differ by less than {1000 * least:.0f} mm, which can't be told apart."
+    )
+
+
+def _best_of_kind(kind, name, rmse):
+    return f"{OTHERS[kind]}: {name}, with {number(rmse)} m."
+
+
+def _behind(name, rmse, behind):
+    return f"{name}, with {number(rmse)} m, is {number(behind)} m behind."
+
+
+def _fitted(control):
+    return f"Every method was fitted to the same {counted(control, 'control point')}"
+
+
+def _scored_by_checks(control, check):
+    return f"{_fitted(control)} and scored by {counted(check, 'check point')} that took no part."
+
+
+def _scored_by_fit(control):
+    return (
+        f"{_fitted(control)}. Nothing independent is left to score them by: this is the mere fit."
+    )
+
+
+def _cross_validated(control, check, groups):
+    too_few = "no check points"
+    others = ""
+    if check:
+        too_few = f"only {counted(check, 'check point')}"
+        others = "; each check point from all control points"
+    left = f"left out in {groups} groups in turn"
+    if groups == control:
+        left = "each left out in turn"
+    return (
+        f"{_fitted(control)}. There {_verb(check, 'is', 'are')} {too_few}, so the scores are "
+        f"cross-validated over all points: control points, {left}, are predicted from the "
+        f"others{others}."
+    )
+
+
+def _tied(name, count):
+    return (
+        f"{name} also uses {counted(count, 'tie')}: planes, poles and paint that two passes both "
+        "saw. All other methods use the control points alone."
+    )
+
+
+def _untied(name, other, why):
+    sentence = f"{name} equals {other} here, for no ties were used."
+    if why:
+        sentence += f" {why}"
+    return sentence
+
+
+SENTENCES: dict[str, Wording] = {
+    "nothing to judge by": "There is no surveyed point that could tell how good the correction is.",
+    "no target to judge by": "No target was found that could tell how good the correction is.",
+    "hardly changed": lambda before, after, kind: (
+        f"The correction changed next to nothing, {JUDGES[kind]}: {_off(before, after)}."
+    ),
+    "changed within sigma": lambda before, after, kind: (
+        f"The correction changed less than these targets tell, {JUDGES[kind]}: "
+        f"{_off(before, after)}."
+    ),
+    "made worse": lambda before, after, kind: (
+        f"The correction made the cloud worse, {JUDGES[kind]}: {_off(before, after)}. Don't use it."
+    ),
+    "improved": _improved,
+    "rmse of check points": _rmse_of_checks,
+    "rmse left out": _rmse_left_out,
+    "rmse of the fit": _rmse_of_fit,
+    "worse axes": _worse_axes,
+    "points": _moved,
+    "no check point": "No check point was surveyed, so nothing independent tests this result.",
+    "check points": _scored,
+    "hidden check points": lambda names: _lost(
+        names, "not seen although the cloud covers the surroundings"
+    ),
+    "refused check points": lambda names: _lost(
+        names, "found, but refused, as place, kind or size does not fit"
+    ),
+    "check points elsewhere": _elsewhere,
+    "control points": _control,
+    "no control point": _uncontrolled,
+    "control of other drives": "No point of its own takes part: those of other drives hold it, "
+    "through ties.",
+    "datum": _datum,
+    "held by other drives": "Control points of other drives hold the whole drive, through ties.",
+    "held": "Control points hold the whole drive.",
+    "extrapolated": _extrapolated,
+    "between control points": lambda sigma: (
+        f"Between control points it is up to {length_in_words(sigma)}."
+    ),
+    "left out": _left_out,
+    "single control point": "A single control point has no others: the POS's own sigmas alone "
+    "check it.",
+    "sigma": _sigma,
+    "stated sigma": lambda sigma: f"The POS states {length_in_words(sigma)} of the recorded one.",
+    "assumed": _assumed,
+    "warnings": lambda count: f"{counted(count, 'warning')}:",
+    "no ties": "{reason}",
+    "unused ties": _unused_ties,
+    "ties": _ties_apart,
+    "contradicting ties": _wrong_ties,
+    "relative ties": "This is relative only; nothing is claimed in absolute terms: no control "
+    "point takes part, and an error that all passes share stays in the cloud.",
+    "share of control": _share,
+    "sufficient control": _sufficient,
+    "all control needed": _all_needed,
+    "scanners together": _together,
+    "mounting not told": "This geometry does not tell whether the recorded mounting holds.",
+    "mounting holds": "The recorded mounting holds: it lacks nothing beyond {sigmas:g} sigmas.",
+    "determined parts hold": "The recorded mounting holds in the parts that are determined: it "
+    "lacks nothing beyond {sigmas:g} sigmas.",
+    "mounting lacks": _lacks,
+    "all parts determined": "All {count} parts by this geometry.",
+    "parts not determined": _undetermined,
+    "no target": "No target tells how good the calibration is.",
+    "fit of a calibration": _calibrated(": the fit alone, which proves little."),
+    "calibration tested": _calibrated("; they took no part."),
+    "worse by the scanner": _calibrated(
+        "; they took no part, and keep what the scanner itself lacks."
+    ),
+    "worse by chance": _calibrated("; they took no part. No part changed significantly."),
+    "scanner is off": _scanner("; the mounting is free of it."),
+    "scanner is right": _scanner(": nothing significant."),
+    "scanner hardly told": _scanner("; this geometry hardly tells it."),
+    "two passes": _two_passes,
+    "no method improves": _no_method,
+    "best method": _best,
+    "best methods": _several_best,
+    "best of a kind": _best_of_kind,
+    "behind the best": _behind,
+    "scored by check points": _scored_by_checks,
+    "scored by the fit": _scored_by_fit,
+    "cross-validated": _cross_validated,
+    "method with ties": _tied,
+    "method without ties": _untied,
+    "methods without a score": "{count} of {methods} methods have no score.",
+}
+
+
+def in_words(statements: Iterable[Statement]) -> list[str]:
+    """Sentences of statements.
+
+    Parameters
+    ----------
+    statements : iterable of Statement
+        Of keys of SENTENCES.
+    """
+    return [statement.sentence(SENTENCES) for statement in statements]

@@ -1,0 +1,261 @@
+"""The catalogue of the sentences of an evaluation, with values as a survey has them."""
+
+import numpy as np
+import pytest
+
+from mlscorr.evaluate.wording import ACCURACY, BEAMS, DATUM, GATES, REASONS, reason_in_words
+from mlscorr.io.trajectories import map_factors
+from mlscorr.matching import REASONS as MATCHING
+from mlscorr.survey import Statement
+
+GROUND = map_factors("EPSG:32650", np.array([522_700.0, 3_374_000.0, 42.0]))
+NET = {"length": 0.04, "extent": 100.0, "observations": 12, "log_evidence": np.log(5e7)}
+SHIFT = {"observations": 12, "log_evidence": np.log(25.0), "assumed_sigma": None}
+SCALE = {"size": [4e-4], "sigma": [1e-5], "ground": GROUND, "is_ground": True}
+EVIDENCE = "12 observations, Bayes factor 1e8 against an error of the POS"
+FOLLOWS = "The corrected cloud follows the control; find out which of the two is right."
+ASSUMED = (
+    " Nobody stated the sigma of the POS: 0.02 m is assumed, and a worse POS could differ as much. "
+    "State it under [pos] in survey.toml."
+)
+CLOCK = {"file": "a.laz", "beside": 90.2, "shifted": 8.1, "samples": 600}
+CLASS = {"axis": "vertical", "size": 3, "rmse": 0.025, "fit": 0.02, "survey": 0.015}
+
+CATALOGUE = [
+    (REASONS, "check point", {}, "check point"),
+    (
+        REASONS,
+        "outlier",
+        {"statistic": 41.26, "critical": 16.27},
+        "outlier: statistic 41.3 against 16.3",
+    ),
+    (
+        REASONS,
+        "no pose",
+        {"points": 25, "start": 413_241.0, "end": 413_243.5},
+        "25 points near it, at 413241.0 to 413243.5 s, were measured in a gap of the trajectory or "
+        "outside it, and nothing is interpolated there.",
+    ),
+    (REASONS, "seen by others", {}, "Another scanner saw it, this one did not."),
+    (
+        DATUM,
+        "shift",
+        {"size": [0.8, 0.4], "length": 0.894, **SHIFT},
+        "The control points lie 0.89 m beside the cloud as the POS puts it (E +0.80, N +0.40 m; 12 "
+        "observations, Bayes factor 25 against an error of the POS). It looks like another "
+        f"horizontal datum, realization or epoch. {FOLLOWS}",
+    ),
+    (
+        DATUM,
+        "height",
+        {"size": [-0.3], **SHIFT, "assumed_sigma": 0.02},
+        "The control points lie 0.30 m below the cloud as the POS puts it (12 observations, Bayes "
+        "factor 25 against an error of the POS). It looks like heights of another vertical datum "
+        "or geoid, or a wrong height of an antenna, an instrument or a post. "
+        f"{FOLLOWS}{ASSUMED}",
+    ),
+    (
+        DATUM,
+        "height",
+        {"size": [0.3], **SHIFT},
+        "The control points lie 0.30 m above the cloud as the POS puts it (12 observations, Bayes "
+        "factor 25 against an error of the POS). It looks like heights of another vertical datum "
+        "or geoid, or a wrong height of an antenna, an instrument or a post. "
+        f"{FOLLOWS}",
+    ),
+    (
+        DATUM,
+        "scale",
+        SCALE | NET,
+        "The net of control points is larger than in the cloud by +400 +/- 10 ppm (0.040 m at 100 "
+        f"m from its middle; {EVIDENCE}). Ground distances would be larger by +394 ppm there "
+        f'({GROUND}), which fits: if the control is in them, set scale_factor = "ground" under '
+        f"[control], or scale_factor = 0.999600. {FOLLOWS}",
+    ),
+    (
+        DATUM,
+        "scale",
+        SCALE | NET | {"size": [5e-3], "is_ground": False},
+        "The net of control points is larger than in the cloud by +5000 +/- 10 ppm (0.040 m at 100 "
+        f"m from its middle; {EVIDENCE}). Ground distances would be larger by +394 ppm there "
+        f"({GROUND}), which does not fit: look for another projection or a wrong unit. If the "
+        f"control has this scale, set scale_factor = 0.995025 under [control]. {FOLLOWS}",
+    ),
+    (
+        DATUM,
+        "scale",
+        SCALE | NET | {"ground": None, "is_ground": False},
+        "The net of control points is larger than in the cloud by +400 +/- 10 ppm (0.040 m at 100 "
+        f"m from its middle; {EVIDENCE}). It looks like ground distances without the scale of the "
+        f"map: if they are, set scale_factor = 0.999600 under [control]. {FOLLOWS}",
+    ),
+    (
+        DATUM,
+        "turn",
+        {"size": [np.radians(0.03)], "sigma": [1e-5], "ground": GROUND, **NET},
+        "The net of control points is turned to the left against the cloud by +0.0300 +/- 0.0006 "
+        f"deg (0.040 m at 100 m from its middle; {EVIDENCE}). It looks like another projection or "
+        "zone, or a local net oriented to another north (one to true north would be turned by "
+        f"{-np.degrees(GROUND.convergence):+.4f} deg): export the control in the crs of the cloud. "
+        f"{FOLLOWS}",
+    ),
+    (
+        DATUM,
+        "tilt",
+        {"size": np.array([4e-4, -1e-4]), "sigma": np.full(2, 1e-5), **NET},
+        "The net of control points is tilted against the cloud: it rises by +0.40 +/- 0.01 mm/m "
+        "towards east and -0.10 +/- 0.01 mm/m towards north (0.040 m at 100 m from its middle; "
+        f"{EVIDENCE}). It looks like heights of another geoid model, or like a network whose "
+        f"vertical was never levelled: export the control with the geoid of the cloud. {FOLLOWS}",
+    ),
+    (
+        BEAMS,
+        "no time",
+        {"file": "a.laz", "count": 9, "samples": 900, "values": "-1"},
+        "9 of 900 points sampled from a.laz have gps_time -1: they were written without times, and "
+        "stay as they are (exit code 4). Export them with gps_time, or remove them.",
+    ),
+    (
+        BEAMS,
+        "outside",
+        {
+            "file": "a.laz",
+            "count": 9,
+            "samples": 900,
+            "start": 413_200.0,
+            "end": 413_209.9,
+            "gaps": 2,
+            "away": 3.25,
+        },
+        "9 of 900 points sampled from a.laz lie outside the trajectory [413200.000, 413209.900] s "
+        "or in its gaps (2), up to 3.250 s from it: they stay as they are (exit code 4). Export "
+        "the whole trajectory.",
+    ),
+    (
+        BEAMS,
+        "backwards",
+        {"file": "a.laz", "steps": 899},
+        "The times of a.laz run backwards: none of 899 sampled points is later than the one "
+        "before. Unless the file was sorted so, its gps_time is wrong, and points get the "
+        "correction of another time.",
+    ),
+    (
+        BEAMS,
+        "other survey",
+        {
+            "file": "a.laz",
+            "beside": 3000.4,
+            "off": 71.0,
+            "samples": 900,
+            "near": 200.0,
+            "off_plane": 20.0,
+        },
+        "The points of a.laz lie 3000 m beside the trajectory and 71 deg off the scan plane "
+        "(median of 900 samples; limits 200 m and 20 deg): the file may be of another survey with "
+        "the same times, its gps_time wrong (UTC is 18 s late), or [mounting] another scanner's or "
+        "not in m and deg. Take out what doesn't fit.",
+    ),
+    (
+        BEAMS,
+        "other clock",
+        {"lag": 18, "later": -18, **CLOCK},
+        "The times of a.laz are 18 s later than the trajectory's: its points lie 90 m beside the "
+        "vehicle, and 8 m beside where it is 18 s before (horizontal medians of 600 samples). The "
+        "trajectory seems to be in UTC, the cloud in GPS time: export both in GPS time, or add 18 "
+        "to trajectory.time_constant (s) in survey.toml.",
+    ),
+    (
+        BEAMS,
+        "other clock",
+        {"lag": 17, "later": 17, **CLOCK},
+        "The times of a.laz are 17 s earlier than the trajectory's: its points lie 90 m beside the "
+        "vehicle, and 8 m beside where it is 17 s after (horizontal medians of 600 samples). The "
+        "cloud seems to be in UTC, the trajectory in GPS time: export both in GPS time, or add -17 "
+        "to trajectory.time_constant (s) in survey.toml.",
+    ),
+    (
+        ACCURACY,
+        "not determined",
+        {},
+        "Not determined: no check point was scored, and too few control points to leave one out in "
+        "turn.",
+    ),
+    (
+        ACCURACY,
+        "left out",
+        {"points": 12},
+        "No check point was scored. 12 control points were left out in turn and predicted from the "
+        "others: an estimate of the accuracy, and not a conformant test, as these points took part "
+        "in the correction.",
+    ),
+    (
+        ACCURACY,
+        "too few",
+        {"points": 1, "least": 30},
+        "The standard calls for at least 30 check points and 1 point was used: fewer than 30 check "
+        "points are not a conformant test.",
+    ),
+    (
+        ACCURACY,
+        "tested",
+        {"points": 30},
+        "This data set was tested with 30 independent check points.",
+    ),
+    (
+        ACCURACY,
+        "class",
+        CLASS | {"is_conformant": True},
+        "It meets the 3-cm vertical accuracy class: RMSE_V is 2.5 cm (2.0 cm fit to the points, "
+        "1.5 cm survey of the points).",
+    ),
+    (
+        ACCURACY,
+        "class",
+        CLASS | {"is_conformant": False},
+        "It would meet the 3-cm vertical accuracy class: RMSE_V is 2.5 cm (2.0 cm fit to the "
+        "points, 1.5 cm survey of the points).",
+    ),
+    (
+        ACCURACY,
+        "inaccurate points",
+        {"axis": "vertical", "survey": 0.015},
+        "The vertical survey error of the points, 1.5 cm, is more than half of what they found: "
+        "points for a test should be twice as accurate as the product.",
+    ),
+    (
+        GATES,
+        "not determined",
+        {"quantity": "check.rmse_h", "what": "rmse of check points in height (m)"},
+        "check.rmse_h: rmse of check points in height (m) was not determined.",
+    ),
+    (
+        GATES,
+        "exceeded",
+        {
+            "quantity": "check.rmse_h",
+            "what": "rmse of check points in height (m)",
+            "value": 0.05,
+            "operator": ">",
+            "limit": 0.03,
+        },
+        "check.rmse_h: rmse of check points in height (m) is 0.05 > 0.03.",
+    ),
+]
+
+
+@pytest.mark.parametrize(("wordings", "key", "values", "sentence"), CATALOGUE)
+def test_each_statement_has_its_sentence(wordings, key, values, sentence):
+    "What, how many, numbers with units, the likely cause and the way out"
+    assert Statement(key, values=values).sentence(wordings) == sentence
+
+
+@pytest.mark.parametrize("wordings", [REASONS, DATUM, BEAMS, ACCURACY, GATES])
+def test_no_sentence_is_missing_from_the_catalogue(wordings):
+    "Those of the matching are in the catalogue of that room"
+    listed = {key for known, key, _, _ in CATALOGUE if known is wordings}
+    assert listed == wordings.keys() - MATCHING.keys()
+
+
+def test_a_point_without_a_reason_has_no_words():
+    "As documents have it: an empty text"
+    assert reason_in_words(None) == ""
