@@ -11,8 +11,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from mlscorr.collocation import INTEGRATED
-from mlscorr.estimate.assembly import with_fallbacks
-from mlscorr.estimate.equations import Equations
+from mlscorr.estimate.equations import Equations, with_fallbacks
 from mlscorr.estimate.posterior import Objective
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.signals import SignalParameters

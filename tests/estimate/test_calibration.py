@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mlscorr.estimate import estimate_mounting
-from mlscorr.estimate.mounting_estimate import MountingEstimate, clock_warnings
+from mlscorr.estimate.calibration import MountingEstimate, clock_warnings
 from mlscorr.frames import georeferenced_anew
 from mlscorr.survey import Trajectory
 from tests.beds.tied_site import RECORDED, tied_site

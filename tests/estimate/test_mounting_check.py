@@ -12,7 +12,7 @@ from mlscorr.estimate import (
     mounting_warnings,
     with_ties,
 )
-from mlscorr.estimate._added_unknowns import AddedUnknowns
+from mlscorr.estimate.added_unknowns import AddedUnknowns
 from mlscorr.survey import Mounting
 from tests.beds.tied_passes import tied_passes
 

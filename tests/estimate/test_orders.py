@@ -8,7 +8,7 @@ from scipy.stats import multivariate_normal
 
 from mlscorr.collocation import polynomial_design
 from mlscorr.estimate import Objective
-from mlscorr.estimate.orders import affordable_order, compare_orders, leave_targets_out
+from mlscorr.estimate.pos_error import affordable_order, compare_orders, leave_targets_out
 from mlscorr.estimate.posterior import most_probable
 from mlscorr.estimate.signals import pose_signals
 from mlscorr.evaluate import model_section

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mlscorr.estimate import SETTINGS, Objective, position_equations, position_prior
-from mlscorr.estimate._refusals import drift_odds
+from mlscorr.estimate._runs import drift_odds
 from mlscorr.survey import Matched, Pos
 from tests.beds.pos_errors import EPOCHS, Case, even, rms, waves
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mlscorr.estimate import Objective, estimate_correction
-from mlscorr.estimate._screening import _doubtful_pairs
 from mlscorr.estimate.posterior import Posterior
+from mlscorr.estimate.target_tests import _doubtful_pairs
 from mlscorr.survey import Matched
 from tests.beds import lying_pos
 from tests.beds.pos_errors import (
