@@ -519,7 +519,10 @@ def _information(rows, number):
     n, r = variance.shape
     square = (signal.mixing**2).sum(axis=2).reshape(n, rows.gps_time.shape[1], r)
     ratio = (square / variance[:, None]).mean(axis=2).ravel()
-    clock = np.ravel(rows.gps_time if signal.clock is None else signal.clock)[ratio > 0]
+    clock = rows.gps_time
+    if signal.clock is not None:
+        clock = signal.clock
+    clock = np.ravel(clock)[ratio > 0]
     if len(clock) == 0:
         return 0.0, 0.0
     away = 1.0 / signal.covariance.rate  # beyond it views tell nothing of each other

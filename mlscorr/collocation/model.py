@@ -81,8 +81,16 @@ def signal_clocks(signals: Sequence[Signal], gps_time: np.ndarray) -> np.ndarray
     gps_time : (n,) array
         Units: s.
     """
-    clocks = [gps_time if s.clock is None else s.clock for s in signals]
-    return np.column_stack([np.zeros((len(gps_time), 0)), *clocks])
+    return _clock_columns(gps_time, [signal.clock for signal in signals])
+
+
+def _clock_columns(gps_time, clocks):
+    """Clocks (n, s) of which those that are None are gps_time."""
+    columns = np.tile(gps_time[:, None], (1, len(clocks)))
+    for number, clock in enumerate(clocks):
+        if clock is not None:
+            columns[:, number] = clock
+    return columns
 
 
 @dataclass(frozen=True)
@@ -253,11 +261,9 @@ class Collocation:
             includes that of the trend.
         """
         gps_time = np.asarray(gps_time, dtype=float)
-        clocks = [None] * len(mixings) if clocks is None else clocks
-        clocks = np.column_stack(
-            [np.zeros((len(gps_time), 0)), *(gps_time if c is None else c for c in clocks)]
-        )
-        return self._predictor(gps_time, clocks, design, mixings)
+        if clocks is None:
+            clocks = [None] * len(mixings)
+        return self._predictor(gps_time, _clock_columns(gps_time, clocks), design, mixings)
 
     def predict_mean(
         self,
@@ -370,6 +376,9 @@ def solve_trend(
     determinants = solver.log_determinant + 2 * np.log(np.abs(np.diag(triangle))).sum()
     determinants -= 2 * np.log(believed.sum(axis=1)).sum()
     log_likelihood = -0.5 * (squares + determinants + redundancy * np.log(2 * np.pi))
+    sigma0 = np.nan
+    if redundancy:
+        sigma0 = np.sqrt(squares / redundancy)
     return Collocation(
         solver=solver,
         misclosure=misclosure,
@@ -377,6 +386,6 @@ def solve_trend(
         trend=trend,
         trend_root=root,
         log_likelihood=float(log_likelihood),
-        sigma0=float(np.sqrt(squares / redundancy)) if redundancy else float("nan"),
+        sigma0=float(sigma0),
         believed=believed,
     )

@@ -108,7 +108,9 @@ class Sides(NamedTuple):
             Number of the first node for errors that they share.
         """
         gps_time, clocks = rows.epochs
-        mixing, noise, (n, e) = rows.mixing, rows.noise, rows.gps_time.shape
+        mixing = rows.mixing
+        noise = rows.noise
+        n, e = rows.gps_time.shape
         own = noise.separate
         check_finite(rows.gps_time[:, 0], rows.gps_time, rows.misclosure, own, rows.design, mixing)
         cell = np.searchsorted(knots.times, gps_time, side="right")

@@ -251,7 +251,9 @@ def factor(
     if np.isnan(whiteners).any():
         raise ValueError(NOT_POSITIVE.format(n))
     recursion = Recursion(layout, transitions, mixing[:, 0], gains[:, 0], whiteners[:, 0, 0])
-    return Whitener(recursion, np.zeros((n, 0)) if common is None else common)
+    if common is None:
+        common = np.zeros((n, 0))
+    return Whitener(recursion, common)
 
 
 @njit(cache=True, nogil=True)

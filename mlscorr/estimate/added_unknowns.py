@@ -130,11 +130,10 @@ def with_added(equations: Equations, added: np.ndarray) -> Equations:
     """
     epochs, of_ties = np.split(added, [equations.misclosure.size])
     ties = equations.ties
-    return replace(
-        equations,
-        misclosure=equations.misclosure + epochs.reshape(-1, 3),
-        ties=None if ties is None else replace(ties, misclosure=ties.misclosure + of_ties),
-    )
+    if ties is not None:
+        ties = replace(ties, misclosure=ties.misclosure + of_ties)
+    misclosure = equations.misclosure + epochs.reshape(-1, 3)
+    return replace(equations, misclosure=misclosure, ties=ties)
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")

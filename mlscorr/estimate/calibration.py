@@ -384,7 +384,7 @@ class Calibration(Summary):
             used=self.used[scanner == number],
             ties=self.ties and self.ties.of_scanner(number),
             ties_with_drift=self.ties_with_drift and self.ties_with_drift.of_scanner(number),
-            scanner=None if self.scanner is None else self.scanner.of(number),
+            scanner=self.scanner and self.scanner.of(number),
         )
 
 

@@ -118,11 +118,15 @@ class Equations(Summary):
         rows : (n,) bool or (k,) int array
         """
         rows = np.asarray(rows)
-        rows = np.flatnonzero(rows) if rows.dtype == bool else rows
+        if rows.dtype == bool:
+            rows = np.flatnonzero(rows)
         kept = np.append(rows, np.arange(len(self.names), len(self.gps_time)))
         return replace(self._rows(kept), names=self.names[rows])
 
     def _rows(self, kept):
+        mounting = self.mounting
+        if mounting is not None:
+            mounting = mounting[kept]
         return replace(
             self,
             gps_time=self.gps_time[kept],
@@ -130,7 +134,7 @@ class Equations(Summary):
             noise=self.noise.select(kept),
             partials=self.partials[kept],
             stated=self.stated.at(kept),
-            mounting=None if self.mounting is None else self.mounting[kept],
+            mounting=mounting,
         )
 
     def without_fallbacks(self) -> Equations:
@@ -209,8 +213,10 @@ class Equations(Summary):
         believed = self.believed(parameters)
         if self.ties is None:
             return self._without_places(collocate(*control, rows[0].signals, believed))
-        like = None if like is None else like.solver
-        return self._without_places(collocate_rows(rows, like, self.tolerance, believed))
+        known = None
+        if like is not None:
+            known = like.solver
+        return self._without_places(collocate_rows(rows, known, self.tolerance, believed))
 
     def _without_places(self, solved):
         """A Collocation whose sigma0 counts no place of a fall-back as known."""
@@ -302,7 +308,9 @@ class Equations(Summary):
             Units: s.
         """
         position = self._trend(gps_time)
-        columns = 0 if self.mounting is None else self.mounting.shape[2]
+        columns = 0
+        if self.mounting is not None:
+            columns = self.mounting.shape[2]
         pose = np.zeros((len(gps_time), 6, columns + position.shape[2]))
         pose[:, :3, columns:] = position
         return pose

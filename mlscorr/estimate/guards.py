@@ -112,23 +112,19 @@ def guards_of(passes: np.ndarray, observed: np.ndarray, guards: Guards) -> Guard
         Whose variance ratio and test hold there.
     """
     times = np.sort(observed)
-    control = [times[(times >= first) & (times <= last)] for first, last in passes.tolist()]
-    spans = list(zip(passes.tolist(), control, strict=True))
+    gaps: list[tuple[float, float]] = []
+    empty = []
+    for first, last in passes.tolist():
+        inside = times[(times >= first) & (times <= last)].tolist()
+        if inside:
+            gaps += pairwise([first, *inside, last])
+        else:
+            empty.append((first, last))
     return replace(
         guards,
-        gap=_longest_gap(passes.tolist(), control),
-        passes_without_control=tuple((a, b) for (a, b), inside in spans if not len(inside)),
+        gap=max(gaps, key=np.ptp, default=(0.0, 0.0)),
+        passes_without_control=tuple(empty),
     )
-
-
-def _longest_gap(passes, control):
-    gaps = [
-        gap
-        for (first, last), inside in zip(passes, control, strict=True)
-        if len(inside)
-        for gap in pairwise([first, *inside.tolist(), last])
-    ]
-    return max(gaps, key=np.ptp, default=(0.0, 0.0))
 
 
 def _variance_ratio(equations, parameters, corrected):
@@ -188,8 +184,11 @@ def sparse_warnings(equations: Equations, order: int) -> Iterator[Statement]:
         yield Statement("lowered order", "warning", values)
     yield from few_targets(targets)
     if epochs == 1 and targets > 1:
-        first, last = float(equations.observed.min()), float(equations.observed.max())
-        values = {"targets": targets, "seconds": last - first, "start": first}
+        values = {
+            "targets": targets,
+            "seconds": float(np.ptp(equations.observed)),
+            "start": float(equations.observed.min()),
+        }
         yield Statement("one epoch", "warning", values)
 
 

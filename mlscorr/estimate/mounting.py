@@ -61,7 +61,7 @@ def estimate_mounting(
         Where each scanner saw fewer than 3 targets or all of them at one time, and for sigmas that
         can't be.
     """
-    pos = Pos() if pos is None else pos
+    pos = pos or Pos()
     faults = [control_fault(matched, number) for number in range(len(mountings))]
     if all(faults):
         raise ValueError(faults[0])
@@ -93,7 +93,7 @@ def believed_mounting(
     Calibration
         Under the parameters that are believed. Ties can be added to it.
     """
-    pos = Pos() if pos is None else pos
+    pos = pos or Pos()
     filled, notes = filled_sigmas(trajectory)
     equations = position_equations(filled, matched, pos, 0, mounting_prior)
     kept, start, ls = _least_squares(equations, matched, mountings)

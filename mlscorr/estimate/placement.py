@@ -189,9 +189,10 @@ def _reason(observed, names, time, drive, share, limit, passes):
             f"Between {names[after - 1]} ({time - times[after - 1]:.0f} s before) and "
             f"{names[after]} ({times[after] - time:.0f} s after)"
         )
+    elif after == 0:
+        where = f"Before the first control point, {names[0]}, by {times[0] - time:.0f} s"
     else:
-        side, near = ("Before the first", 0) if after == 0 else ("After the last", -1)
-        where = f"{side} control point, {names[near]}, by {abs(time - times[near]):.0f} s"
+        where = f"After the last control point, {names[-1]}, by {time - times[-1]:.0f} s"
     often = f", seen by {passes} passes" if passes > 1 else ""
     if share[0] == share[1]:
         before = "as before"

@@ -187,7 +187,7 @@ def estimate_correction(
     ValueError
         Without any observation, and for sigmas that can't be.
     """
-    pos = Pos() if pos is None else pos
+    pos = pos or Pos()
     filled, notes = checked_inputs(trajectory, matched, pos, order)
     equations, screening, windows = _screened(filled, matched, pos, order)
     kept = equations.without({outlier.name for outlier in screening.outliers})
@@ -213,7 +213,7 @@ def _screened(trajectory, matched, pos, order):
         equations = position_equations(raised, matched, pos, order, position_prior)
         equations = replace(equations, order=affordable_order(order, equations))
         equations = with_drift_history(equations)
-        plain = equations if plain is None else plain
+        plain = plain or equations
         screening = screen(equations)
         more = find_windows(equations, screening)
         if not more:
@@ -241,7 +241,7 @@ def believed_correction(trajectory: Trajectory, pos: Pos | None = None) -> Estim
         To which ties can be added: then passes come together, and where they are is what the POS
         says.
     """
-    pos = Pos() if pos is None else pos
+    pos = pos or Pos()
     filled, notes = filled_sigmas(trajectory)
     equations = position_equations(filled, Matched.none(), pos, 0, position_prior)
     equations = with_fallbacks(equations, equations.stated.history.steps)
@@ -327,7 +327,8 @@ def _estimate(trajectory, names, predictions, screening, notes):
     parameters = posterior.modes[0][0]
     solved = predictions.take(parameters)
     left_out = np.full((len(names), 3), np.nan)
-    left_out[used] = leave_targets_out(kept, solved) if len(kept.target_rows) > 1 else np.nan
+    if len(kept.target_rows) > 1:
+        left_out[used] = leave_targets_out(kept, solved)
     pose_error = predict_pose_error(kept, posterior, predictions, solved)
     correction = Correction.by_pose_error(trajectory, *pose_error)
     return Estimate(

@@ -99,9 +99,15 @@ def _prior(equations, time, attitude_follows):
     if not is_held:  # nothing tells of what all passes share, of which the POS states this
         start["trend_sigma"] = float(np.sqrt(np.mean(equations.stated_epochs.gnss**2)))
     is_split = bool(np.any(equations.stated.gnss))
-    fixed = (() if is_split else SPLIT) + (("attitude_time",) if attitude_follows else ())
-    fixed += ("level_scale",) if equations.stated.gnss_clock is None else ()
-    fixed += ("trend_sigma",) if equations.order == NO_TREND or not is_held else ()
+    fixed: list[str] = []
+    if not is_split:
+        fixed += SPLIT
+    if attitude_follows:
+        fixed.append("attitude_time")
+    if equations.stated.gnss_clock is None:
+        fixed.append("level_scale")
+    if equations.order == NO_TREND or not is_held:
+        fixed.append("trend_sigma")
     free = [name for name in NAMES if name not in fixed]
     return Prior(
         np.log([start.get(name, 1.0) for name in NAMES]),
@@ -315,7 +321,9 @@ def choose_parameters(
         Number of parameters over which a prediction will be averaged.
     """
     objective = Objective.of(equations)
-    ties = 0 if equations.ties is None else len(equations.ties)  # a row each, targets have three
+    ties = 0
+    if equations.ties is not None:
+        ties = len(equations.ties)  # a row each, targets have three
     if ties + 3 * len(equations.names) <= equations.design.shape[-1]:
         families = (*FAMILIES, INTEGRATED)
         stated = [objective.parameters(family, objective.initial) for family in families]

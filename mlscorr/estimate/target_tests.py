@@ -81,8 +81,9 @@ def all_tests(
     tests = []
     targets = len(equations.target_rows)
     for block in Objective.of(equations).blocks:
-        whole = len(block.names) == len(equations.names)
-        tests += _tests(block, block.target_rows, posterior, targets, visit if whole else None)
+        if len(block.names) < len(equations.names):  # visitors want whole solutions
+            visit = None
+        tests += _tests(block, block.target_rows, posterior, targets, visit)
     return tests
 
 
@@ -198,7 +199,8 @@ def screen(equations: Equations) -> Screening:
     ----------
     equations : Equations
     """
-    (out, start), tried = _search(equations), []
+    out, start = _search(equations)
+    tried = []
     while True:
         kept = equations.without(out)
         posterior = choose_parameters(kept, start)
@@ -327,8 +329,9 @@ def _doubtful_pairs(equations, posterior):
             both = {
                 pair: np.concatenate([rows[name] for name in pair]) for pair in _neighbours(block)
             }
-            # a target of very many passes is a block without a neighbour
-            for pair, gain in (_gains(solved, both) if both else {}).items():
+            if not both:  # a target of very many passes is a block without a neighbour
+                continue
+            for pair, gain in _gains(solved, both).items():
                 if score + gain > pairs.get(pair, -np.inf):
                     pairs[pair] = score + gain
                     ways[pair] = solved.leave_out(both[pair])[0].reshape(-1, 3)

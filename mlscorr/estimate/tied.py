@@ -274,7 +274,8 @@ def robust_ties(
     ties : TieEquations
     """
     weighed = graduated(equations, parameters, ties)
-    if (held := _held(weighed)) == len(ties):
+    held = _held(weighed)
+    if held == len(ties):
         return weighed
     prior = Objective((), weighed.equations.prior(weighed.equations))
     other = graduated(equations, prior.parameters(INTEGRATED, prior.initial), ties)

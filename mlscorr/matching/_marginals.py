@@ -107,7 +107,8 @@ def _fill(both, chain, row, result):
         for hypothesis in range(len(share)):
             away = value[hypothesis, axis] - expected
             square += share[hypothesis] * (variance[hypothesis, axis] + away**2)
-        result.expected[row, axis], result.sigma[row, axis] = expected, np.sqrt(square)
+        result.expected[row, axis] = expected
+        result.sigma[row, axis] = np.sqrt(square)
 
 
 @njit(**INNER)

@@ -44,7 +44,8 @@ def bright_components(
     known = set()
     for share in SETTINGS.link_shares:
         for number, rows in _component_tree(xyz, level, share * size):
-            if (key := (rows[0], rows[-1], len(rows))) not in known:
+            key = rows[0], rows[-1], len(rows)
+            if key not in known:
                 known.add(key)
                 yield float(2.0 ** (number / OCTAVE)), rows
 

@@ -308,6 +308,9 @@ def assess(
         smallest = SETTINGS.hole_support
     else:
         smallest = SETTINGS.smallest_support
+    least_overlap = SETTINGS.smallest_overlap
+    if hidden:
+        least_overlap = SETTINGS.close_overlap
     overlap = outline.overlap
     if kind == "hole" and marked.sum() < 5:  # nothing behind it: all that counts is the board
         overlap = 1.0 - (inside & ~marked).sum() / max(len(points), 1)
@@ -333,7 +336,7 @@ def assess(
         plausible=bool(overlap >= SETTINGS.smallest_overlap - play and support >= smallest - play),
         accepted=bool(
             len(points) >= SETTINGS.smallest_count
-            and overlap >= (SETTINGS.close_overlap if hidden else SETTINGS.smallest_overlap)
+            and overlap >= least_overlap
             and support >= smallest
             and sigma <= SETTINGS.largest_sigma
             and flat > 0

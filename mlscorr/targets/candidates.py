@@ -255,7 +255,8 @@ class PointsInBalls:
 
     def add(self, cloud: PointCloud) -> None:
         """Hold points, each in a ball at least."""
-        self._read, counts = self._read + 1, np.zeros(len(cloud), np.uint16)
+        self._read += 1
+        counts = np.zeros(len(cloud), np.uint16)
         for ball, rows in enumerate(self._balls.each(cloud.xyz)):
             time = cloud.gps_time[rows]
             self._first[ball] = min(self._first[ball], time.min(initial=np.inf))
@@ -289,15 +290,18 @@ class PointsInBalls:
         for place, (read, part, counts) in enumerate(self._parts):
             if read > self._taken[number]:
                 rows = ball.contains(part.xyz)
-                there = slice(end, end := end + len(rows))
+                there = slice(end, end + len(rows))
+                end += len(rows)
                 np.subtract(part.xyz[rows], ball.position, out=cloud.xyz[there])
                 cloud.gps_time[there] = part.gps_time[rows]
                 cloud.intensity[there] = part.intensity[rows]
                 counts[rows] -= 1
-                if not (kept := counts > 0).all():
+                kept = counts > 0
+                if not kept.all():
                     self._parts[place] = read, part[kept], counts[kept]
         self._parts = [entry for entry in self._parts if len(entry[1])]
         self._first[number] = np.inf
         self._last[number] = -np.inf
-        self._size[number], self._taken[number] = 0, self._read
+        self._size[number] = 0
+        self._taken[number] = self._read
         return cloud

@@ -191,8 +191,10 @@ def why_useless(intensity: np.ndarray) -> str | None:
     True
     """
     values = np.unique(intensity)
-    if len(values) <= 1:
-        return f"The intensity of all points is {f'{values[0]:g}' if len(values) else 'missing'}."
+    if len(values) == 0:
+        return "The intensity of all points is missing."
+    if len(values) == 1:
+        return f"The intensity of all points is {values[0]:g}."
     if len(values) < SETTINGS.smallest_levels:
         return f"The intensity takes only {len(values)} values."
     return None
@@ -225,7 +227,9 @@ def fit_seeds(
                 continue
             if any(_is_settled(fit, *seed) for fit in rough):
                 waiting.append(seed)
-            elif (fit := rough_fit(echoes, *seed)) is not None:
+                continue
+            fit = rough_fit(echoes, *seed)
+            if fit is not None:
                 rough.append(fit)
         best = _best(rough)
         exact = [exact_fit(echoes, fit, scanner) for fit in best]
@@ -283,7 +287,11 @@ def _as_target(echoes, fit, origin):
     met = rows[fit.on_target & (rows >= 0)]
     intensity = echoes.intensity[met].astype(float)
     centre = vars(centre_of(echoes, plane, outline, met))
-    size, sigma = (outline.size, outline.size_sigma) if fit.size is None else (fit.size, 0.0)
+    size = fit.size
+    sigma = 0.0
+    if size is None:
+        size = outline.size
+        sigma = outline.size_sigma
     return FittedTarget(
         **centre | {"position": centre["position"] + origin},
         kind=fit.kind,
@@ -321,13 +329,16 @@ def centre_of(echoes: Echoes, plane: Plane, outline: Outline, rows: np.ndarray) 
     covariance[:2, :2] += outline.covariance
     time = echoes.gps_time[rows] - echoes.gps_time[0]
     span = echoes.gps_time[[0, -1]] - echoes.gps_time[0]
+    normal = plane.axes[2]
+    if beam[2] > 0:
+        normal = -normal
     floor = (SETTINGS.rounding / 3) ** 2  # what rounding leaves in a mean of many points
     return Centre(
         position=plane.origin + outline.centre @ plane.axes[:2],
         covariance=plane.axes.T @ covariance @ plane.axes + floor * np.eye(3),
         gps_time=float(echoes.gps_time[0] + np.clip(weights @ time, *span)),
         duration=float(time.std()),
-        normal=-plane.axes[2] if beam[2] > 0 else plane.axes[2],
+        normal=normal,
     )
 
 

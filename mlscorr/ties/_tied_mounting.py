@@ -108,7 +108,9 @@ def coarse_mounting(
     count = len(mountings)
     planes = some_blocks(features[features.kind == "plane"], count * SETTINGS.coarse_features)
     passes = np.unique(planes.pass_number)
-    shift = float(np.median(sigma)) if len(sigma) else 0.0
+    shift = 0.0
+    if len(sigma):
+        shift = float(np.median(sigma))
     known = [mounting.covariance for mounting in mountings]
     each = np.full(3 * len(passes), max(shift, SETTINGS.surface_sigma) ** -2.0)
     prior = block_diag(*map(np.linalg.inv, known), np.diag(each))

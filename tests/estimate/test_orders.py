@@ -21,7 +21,7 @@ def test_the_order_falls_with_too_few_control_points(n, order):
     "A trend needs one control point more than parameters per axis; a lowered order is told"
     rng = np.random.default_rng(n)
     estimate = Case(EPOCHS, CONSTANT, even(n), rng).estimate(order=3)
-    lowered = [text for text in estimate.warnings if "too few for a trend of order 3" in text]
+    lowered = [s for s in estimate.statements if s.key == "lowered order"]
     assert estimate.order == order
     assert len(lowered) == (order < 3)
 

@@ -6,7 +6,7 @@ import pytest
 from mlscorr.frames import attitude_from_angles
 from mlscorr.pipeline.finding import fit_while_reading
 from mlscorr.survey import PointCloud, Trajectory
-from mlscorr.targets import SETTINGS, Neighbourhoods, collect, search_radius
+from mlscorr.targets import Neighbourhoods, collect, search_radius
 from mlscorr.targets.candidates import PointsInBalls
 from tests.targets.test_extract import ORIGIN, SIZE, START, control_point, survey_of, view
 
@@ -55,8 +55,8 @@ def near(survey, read):
     return candidates, handed_on, sum(map(len, parts))
 
 
-def test_collect_by_chunks_is_the_whole(monkeypatch):
-    "Chunks of 700 points, few held, hand on what one does; the third ball is in a gap: unplaced"
+def test_collect_by_chunks_is_the_whole():
+    "Chunks of 700 points hand on what one does; the third ball is in a gap: unplaced"
     rng = np.random.default_rng(1)
     elapsed = np.sort(rng.uniform(0, 100, 20_000))
     xyz = ORIGIN + np.outer(elapsed, [0.0, 10.0, 0.0]) + rng.uniform(-5, 5, (20_000, 3))
@@ -72,7 +72,6 @@ def test_collect_by_chunks_is_the_whole(monkeypatch):
         return lambda _: (cloud[i : i + size] for i in range(0, len(cloud), size))
 
     whole, about, count = near(survey, read(len(cloud)))
-    monkeypatch.setitem(SETTINGS.__dict__, "held_points", 100)
     parts, about_parts, count_parts = near(survey, read(700))
     expected = np.linalg.norm(xyz[:, None] - control.position, axis=2)
     expected = expected < search_radius(survey, control)
