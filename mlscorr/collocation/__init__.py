@@ -1,25 +1,19 @@
 """Least squares collocation: l = A x + B s + n  (Mao et al. 2015, Eq. 6 and 13-15).
 
-- model: signals, the least squares of the trend, and the result
-- noise: what observations have alone, and what they share
-- trend: the polynomial, and what is believed of it
+- model: trend, signals and noise, the least squares of the trend, and the result
 - markov: linear in observations and epochs, by recursion and interpolation between them
 - dense: the same by the formula written out, with work that grows as the observations cubed
-- slopes: how the likelihood by that formula changes with signals and trend
 - linked: of rows that see two epochs and more, and errors that any number of them share
 - whitening: V of scalar observations, factored once for thousands of columns
 - literal: the paper's own predictor, whose covariances don't fit each other
 """
 
 from mlscorr.collocation.covariance import FAMILIES, INTEGRATED, Covariance
-from mlscorr.collocation.dense import collocate_rows_dense, covariance_given
+from mlscorr.collocation.dense import collocate_rows_dense, covariance_given, likelihood_changes
 from mlscorr.collocation.interpolation import CHUNK
 from mlscorr.collocation.linked import collocate_rows, leave_each_out, reweight
 from mlscorr.collocation.literal import LiteralSignal, collocate_literal
 from mlscorr.collocation.markov import collocate
-from mlscorr.collocation.model import Collocation, Signal
-from mlscorr.collocation.noise import Noise
-from mlscorr.collocation.slopes import likelihood_changes
+from mlscorr.collocation.model import Collocation, Noise, Signal, polynomial_design
 from mlscorr.collocation.sparse_rows import SparseRows
-from mlscorr.collocation.trend import polynomial_design
 from mlscorr.collocation.whitening import Whitener, factor

@@ -17,8 +17,7 @@ from scipy.linalg import LinAlgError, cholesky
 
 from mlscorr.collocation.covariance import Covariance
 from mlscorr.collocation.dense import CHUNK, DenseSolver
-from mlscorr.collocation.model import NOT_POSITIVE, Collocation, solve_trend
-from mlscorr.collocation.noise import Noise
+from mlscorr.collocation.model import NOT_POSITIVE, Collocation, Noise, solve_trend
 
 
 @dataclass(frozen=True)

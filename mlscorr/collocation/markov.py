@@ -16,8 +16,14 @@ from mlscorr.collocation._recursion import (
 )
 from mlscorr.collocation._states import Layout
 from mlscorr.collocation.interpolation import interpolate, predictor_by
-from mlscorr.collocation.model import NOT_POSITIVE, Collocation, Signal, signal_clocks, solve_trend
-from mlscorr.collocation.noise import Noise
+from mlscorr.collocation.model import (
+    NOT_POSITIVE,
+    Collocation,
+    Noise,
+    Signal,
+    signal_clocks,
+    solve_trend,
+)
 
 
 def collocate(

@@ -1,4 +1,6 @@
-"""What a collocation is about: signals, and the generalised least squares of the trend."""
+"""The model l = A x + B s + n: trend, signals and noise, and the least squares of the trend."""
+
+from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -8,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from mlscorr.collocation.covariance import Covariance
+from mlscorr.survey import SAME_EPOCH
 
 SMALLEST_INFORMATION = 1e-9  # least share of the trend's information left without some rows
 LARGEST_ERROR = 0.01  # of the log-likelihood by rounding: parameters differ by more than that
@@ -15,6 +18,37 @@ NOT_POSITIVE = (
     "The covariance of the {} misclosures is not positive definite: two observations of one time "
     "without noise, or a sigma of zero. Give each observation and control point the sigma it has."
 )
+
+
+def polynomial_design(
+    gps_time: np.ndarray, span: tuple[float, float], order: int, extrapolate: bool = False
+) -> np.ndarray:
+    """Partial derivatives of a polynomial per axis, in Legendre's well-conditioned basis.
+
+    Parameters
+    ----------
+    gps_time : (q,) array
+        Units: s.
+    span : (float, float)
+        First and last control epoch. Units: s.
+    order : int
+    extrapolate : bool
+        Whether the polynomial runs on outside the span, as in the paper; else it keeps its value
+        at the end, as it would run away there.
+
+    Returns
+    -------
+    (q, 3, 3 (order + 1)) array
+        Parameters of one degree, three axes, follow each other.
+    """
+    first, last = span
+    middle = (first + last) / 2
+    half = max((last - first) / 2, SAME_EPOCH)
+    argument = (gps_time - middle) / half
+    if not extrapolate:
+        argument = np.clip(argument, -1, 1)
+    basis = np.polynomial.legendre.legvander(argument, order)
+    return np.einsum("qi,jk->qjik", basis, np.eye(3)).reshape(len(basis), 3, 3 * (order + 1))
 
 
 @dataclass(frozen=True)
@@ -47,8 +81,115 @@ def signal_clocks(signals: Sequence[Signal], gps_time: np.ndarray) -> np.ndarray
     gps_time : (n,) array
         Units: s.
     """
-    clocks = [gps_time if s.clock is None else s.clock for s in signals]
-    return np.column_stack([np.zeros((len(gps_time), 0)), *clocks])
+    return _clock_columns(gps_time, [signal.clock for signal in signals])
+
+
+def _clock_columns(gps_time, clocks):
+    """Clocks (n, s) of which those that are None are gps_time."""
+    columns = np.tile(gps_time[:, None], (1, len(clocks)))
+    for number, clock in enumerate(clocks):
+        if clock is not None:
+            columns[:, number] = clock
+    return columns
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Noise of n epochs with r observations each (Mao et al. 2015, Eq. 19).
+
+    Parameters
+    ----------
+    own : (n, r, r) array
+        Covariance of what each epoch has alone: the extraction. Units: m^2.
+    group : (n,) int array, optional
+        Which target each epoch has seen, as a row of ``shared``.
+    shared : (g, r) array, optional
+        Sigmas of the error that all epochs of a target have in common: its survey. Units: m.
+    """
+
+    own: np.ndarray
+    group: np.ndarray | None = None
+    shared: np.ndarray | None = None
+
+    @cached_property
+    def separate(self) -> np.ndarray:
+        """Covariance (n, r, r) of each epoch's noise, without what it shares with others."""
+        if self.group is None:
+            return self.own
+        is_single = ~np.isin(self.group, self.repeated)
+        variance = np.where(is_single[:, None], self.shared[self.group] ** 2, 0.0)
+        return self.own + variance[:, :, None] * np.eye(variance.shape[1])
+
+    @cached_property
+    def common(self) -> np.ndarray:
+        """Columns (n r, c) of the errors shared by several epochs, each of unit variance."""
+        n, r = self.own.shape[:2]
+        if self.group is None:
+            return np.zeros((n * r, 0))
+        members = self.group[:, None] == self.repeated
+        sigma = np.where(members[:, :, None], self.shared[self.repeated], 0.0)
+        return np.einsum("ngk,jk->njgk", sigma, np.eye(r)).reshape(n * r, members.shape[1] * r)
+
+    @property
+    def repeated(self) -> np.ndarray:
+        """Groups that have several epochs and an error to share."""
+        if self.group is None:
+            return np.zeros(0, dtype=np.int64)
+        groups, count = np.unique(self.group, return_counts=True)
+        return groups[(count > 1) & np.any(self.shared[groups] > 0, axis=1)]
+
+    @property
+    def matrix(self) -> np.ndarray:
+        """All of it as one covariance matrix (n r, n r)."""
+        return self.block(np.arange(self.own.shape[0] * self.own.shape[1]))
+
+    def block(self, rows: np.ndarray) -> np.ndarray:
+        """Covariance of some rows, numbered as in a Collocation."""
+        epoch, row = np.divmod(np.asarray(rows, dtype=int), self.own.shape[1])
+        separate = self.separate[epoch[:, None], row[:, None], row]
+        common = self.common[rows]
+        return np.where(epoch[:, None] == epoch, separate, 0.0) + common @ common.T
+
+    def select(self, epochs: np.ndarray) -> Noise:
+        """The noise of some epochs: their numbers, or an (n,) mask."""
+        group = None if self.group is None else self.group[epochs]
+        return Noise(self.own[epochs], group, self.shared)
+
+    def insert(self, at: int, own: np.ndarray) -> Noise:
+        """The same with epochs that share no error with others, before the one of a number.
+
+        Parameters
+        ----------
+        at : int
+        own : (k, r, r) array
+            Units: m^2.
+        """
+        both = np.insert(self.own, at, own, axis=0)
+        if self.group is None:
+            return Noise(both)
+        nothing = np.zeros((len(own), self.shared.shape[1]))
+        group = np.insert(self.group, at, len(self.shared) + np.arange(len(own)))
+        return Noise(both, group, np.vstack([self.shared, nothing]))
+
+    def share(self, epochs: np.ndarray, number: np.ndarray, sigma: np.ndarray) -> Noise:
+        """The same with errors that some epochs, which share none so far, have in common.
+
+        Parameters
+        ----------
+        epochs : (k,) int array
+        number : (k,) int array
+            Of the error that each has, from 0.
+        sigma : (r,) array
+            Of each error. Units: m.
+        """
+        n, r = self.own.shape[:2]
+        shared = np.zeros((n, r)) if self.group is None else self.shared
+        if self.group is None:
+            group = np.arange(n)
+        else:
+            group = self.group.copy()
+        group[epochs] = len(shared) + number
+        return Noise(self.own, group, np.vstack([shared, np.tile(sigma, (max(number) + 1, 1))]))
 
 
 @dataclass(frozen=True)
@@ -120,11 +261,9 @@ class Collocation:
             includes that of the trend.
         """
         gps_time = np.asarray(gps_time, dtype=float)
-        clocks = [None] * len(mixings) if clocks is None else clocks
-        clocks = np.column_stack(
-            [np.zeros((len(gps_time), 0)), *(gps_time if c is None else c for c in clocks)]
-        )
-        return self._predictor(gps_time, clocks, design, mixings)
+        if clocks is None:
+            clocks = [None] * len(mixings)
+        return self._predictor(gps_time, _clock_columns(gps_time, clocks), design, mixings)
 
     def predict_mean(
         self,
@@ -237,6 +376,9 @@ def solve_trend(
     determinants = solver.log_determinant + 2 * np.log(np.abs(np.diag(triangle))).sum()
     determinants -= 2 * np.log(believed.sum(axis=1)).sum()
     log_likelihood = -0.5 * (squares + determinants + redundancy * np.log(2 * np.pi))
+    sigma0 = np.nan
+    if redundancy:
+        sigma0 = np.sqrt(squares / redundancy)
     return Collocation(
         solver=solver,
         misclosure=misclosure,
@@ -244,6 +386,6 @@ def solve_trend(
         trend=trend,
         trend_root=root,
         log_likelihood=float(log_likelihood),
-        sigma0=float(np.sqrt(squares / redundancy)) if redundancy else float("nan"),
+        sigma0=float(sigma0),
         believed=believed,
     )

@@ -11,51 +11,14 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numba import njit
 from scipy.linalg import solve_triangular
 
 from mlscorr.collocation._recursion import Recursion, filter_covariance
-from mlscorr.collocation._scalar import common_innovations, whiten_columns
-from mlscorr.collocation._states import Layout
+from mlscorr.collocation._states import Layout, carry
 from mlscorr.collocation.model import NOT_POSITIVE, Signal, signal_clocks
 
 CHUNK = 64  # columns filtered at once: their states stay in the first cache
-
-
-@dataclass(frozen=True)
-class Whitened:
-    """Columns c, whitened: those by V0, less what the errors in common explain of them.
-
-    Parameters
-    ----------
-    separate : (n, k) array
-    shared : (c, k) array
-    """
-
-    separate: np.ndarray
-    shared: np.ndarray
-
-    def __getitem__(self, columns: slice | np.ndarray) -> Whitened:
-        return Whitened(self.separate[:, columns], self.shared[:, columns])
-
-    def product(self, other: Whitened) -> np.ndarray:
-        """a^T V^-1 b of two sets of columns: (k, l)."""
-        return self.separate.T @ other.separate - self.shared.T @ other.shared
-
-    @property
-    def squares(self) -> np.ndarray:
-        """c^T V^-1 c of each column: (k,)."""
-        return (self.separate**2).sum(axis=0) - (self.shared**2).sum(axis=0)
-
-    def blocks(self, index: np.ndarray) -> np.ndarray:
-        """Products within blocks of columns: (h, p, p).
-
-        Parameters
-        ----------
-        index : (h, p) int array
-            Numbers of the columns of each block.
-        """
-        separate, shared = (v[:, index].transpose(1, 2, 0) for v in (self.separate, self.shared))
-        return separate @ separate.swapaxes(1, 2) - shared @ shared.swapaxes(1, 2)
 
 
 @dataclass(frozen=True)
@@ -200,6 +163,43 @@ class Whitener:
         return filtered, np.linalg.cholesky(filtered.T @ filtered + np.eye(filtered.shape[1]))
 
 
+@dataclass(frozen=True)
+class Whitened:
+    """Columns c, whitened: those by V0, less what the errors in common explain of them.
+
+    Parameters
+    ----------
+    separate : (n, k) array
+    shared : (c, k) array
+    """
+
+    separate: np.ndarray
+    shared: np.ndarray
+
+    def __getitem__(self, columns: slice | np.ndarray) -> Whitened:
+        return Whitened(self.separate[:, columns], self.shared[:, columns])
+
+    def product(self, other: Whitened) -> np.ndarray:
+        """a^T V^-1 b of two sets of columns: (k, l)."""
+        return self.separate.T @ other.separate - self.shared.T @ other.shared
+
+    @property
+    def squares(self) -> np.ndarray:
+        """c^T V^-1 c of each column: (k,)."""
+        return (self.separate**2).sum(axis=0) - (self.shared**2).sum(axis=0)
+
+    def blocks(self, index: np.ndarray) -> np.ndarray:
+        """Products within blocks of columns: (h, p, p).
+
+        Parameters
+        ----------
+        index : (h, p) int array
+            Numbers of the columns of each block.
+        """
+        separate, shared = (v[:, index].transpose(1, 2, 0) for v in (self.separate, self.shared))
+        return separate @ separate.swapaxes(1, 2) - shared @ shared.swapaxes(1, 2)
+
+
 def factor(
     gps_time: np.ndarray,
     signals: Sequence[Signal],
@@ -251,4 +251,88 @@ def factor(
     if np.isnan(whiteners).any():
         raise ValueError(NOT_POSITIVE.format(n))
     recursion = Recursion(layout, transitions, mixing[:, 0], gains[:, 0], whiteners[:, 0, 0])
-    return Whitener(recursion, np.zeros((n, 0)) if common is None else common)
+    if common is None:
+        common = np.zeros((n, 0))
+    return Whitener(recursion, common)
+
+
+@njit(cache=True, nogil=True)
+def whiten_columns(
+    recursion: Recursion, columns: np.ndarray, out: np.ndarray, inverse: bool = False
+) -> None:
+    """Whiten columns by the filter of scalar observations, without keeping its states.
+
+    Parameters
+    ----------
+    recursion : Recursion
+        Without the axis of observations: mixing (n, k), gains (n, d), whiteners (n,).
+    columns, out : (n, c) array
+    inverse : bool
+        Give white columns the covariance V0 instead.
+    """
+    layout, transitions, mixing, gains, whiteners = recursion
+    n, c = columns.shape
+    x = np.zeros((gains.shape[1], c))
+    innovation = np.empty(c)
+    for i in range(n):
+        if i > 0:
+            carry(layout, transitions[i], x, False)
+        out[i] = 0.0
+        for j in range(layout.first.size):
+            for b in range(c):
+                out[i, b] += mixing[i, j] * x[layout.first[j], b]
+        for b in range(c):
+            innovation[b] = columns[i, b] / whiteners[i] if inverse else columns[i, b] - out[i, b]
+            out[i, b] = out[i, b] + innovation[b] if inverse else innovation[b] * whiteners[i]
+        for a in range(x.shape[0]):
+            for b in range(c):
+                x[a, b] += gains[i, a] * innovation[b]
+
+
+@njit(cache=True, nogil=True)
+def common_innovations(shared: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Innovations where observations have unit errors in common.
+
+    Recursive least squares: the errors are estimated from all earlier observations.
+
+    Parameters
+    ----------
+    shared : (n, c) array
+        By which the errors enter white observations.
+    columns : (n, k) array
+        White but for these errors.
+
+    Returns
+    -------
+    innovations : (n, k) array
+    growth : (n,) array
+        Of their sigma by what isn't known of the errors.
+    """
+    n, k = columns.shape
+    c = shared.shape[1]
+    p = np.eye(c)
+    x = np.zeros((c, k))
+    u = np.empty((n, k))
+    growth = np.empty(n)
+    for i in range(n):
+        known = np.flatnonzero(shared[i])
+        gain = np.zeros(c)
+        for a in known:
+            for b in range(c):
+                gain[b] += shared[i, a] * p[a, b]
+        s = 1.0
+        for a in known:
+            s += shared[i, a] * gain[a]
+        growth[i] = np.sqrt(s)
+        touched = np.flatnonzero(gain)
+        for b in range(k):
+            v = columns[i, b]
+            for a in known:
+                v -= shared[i, a] * x[a, b]
+            u[i, b] = v / growth[i]
+            for a in touched:
+                x[a, b] += gain[a] * v / s
+        for a in touched:
+            for b in touched:
+                p[a, b] -= gain[a] * gain[b] / s
+    return u, growth

@@ -14,36 +14,53 @@ what they leave open of them is a part of the stated sigmas.
 """
 
 from mlscorr.estimate._tie_value import tie_value
-from mlscorr.estimate.assembly import position_equations, with_mountings
+from mlscorr.estimate._wording import sentences_of
+from mlscorr.estimate.added_unknowns import (
+    find_mounting_error,
+    mounting_warnings,
+    scanner_warnings,
+    with_scanner_errors,
+)
 from mlscorr.estimate.calibration import (
+    MOUNTING_COMPONENTS,
     SCANNER_COMPONENTS,
     Calibration,
+    corrected_mounting,
     mounted_corrections,
     sigma_note,
 )
-from mlscorr.estimate.equations import Equations
+from mlscorr.estimate.equations import Equations, position_equations, with_mountings
 from mlscorr.estimate.guards import COMPONENTS, few_targets, guards_of
 from mlscorr.estimate.inputs import check_order, checked_inputs, filled_sigmas
-from mlscorr.estimate.jumps import Jump, find_jumps
-from mlscorr.estimate.mounting import believed_mounting, control_fault, estimate_mounting
-from mlscorr.estimate.mounting_check import find_mounting_error, mounting_warnings, scanner_warnings
-from mlscorr.estimate.mounting_estimate import MOUNTING_COMPONENTS, corrected_mounting
-from mlscorr.estimate.orders import Alternative
+from mlscorr.estimate.mounting import (
+    believed_mounting,
+    calibration_with_ties,
+    control_fault,
+    estimate_mounting,
+    previewed_mounting,
+)
 from mlscorr.estimate.outages import with_drift_history
 from mlscorr.estimate.placement import NextControl, PlannedAccuracy, place_control, predict_accuracy
 from mlscorr.estimate.pos_error import (
+    Alternative,
     Estimate,
     believed_correction,
     estimate_correction,
     previewed_correction,
     with_ties,
 )
-from mlscorr.estimate.posterior import Objective
-from mlscorr.estimate.prior import position_prior
-from mlscorr.estimate.scanner_errors import with_scanner_errors
+from mlscorr.estimate.posterior import Objective, position_prior
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.signals import SignalParameters
-from mlscorr.estimate.support import DRIFT, HELD, REASONS, Support, WeakStretch, weak_stretches
+from mlscorr.estimate.support import (
+    DRIFT,
+    HELD,
+    REASONS,
+    Jump,
+    Support,
+    WeakStretch,
+    find_jumps,
+    weak_stretches,
+)
 from mlscorr.estimate.target_tests import TargetTest
 from mlscorr.estimate.tied import TieResiduals
-from mlscorr.estimate.tied_mounting import calibration_with_ties, previewed_mounting

@@ -115,7 +115,7 @@ def predict_pose_error(
     mode = posterior.modes[0][0]
     solved = solved or equations.solve(mode)
     pose, covariance = solved.predict(*pose_rows(equations, mode))
-    sigma = np.sqrt(np.maximum(np.einsum("qii->qi", covariance), SETTINGS.smallest_sigma**2))
+    sigma = np.sqrt(np.maximum(np.einsum("qii->qi", covariance), 0.0))
     predictions = predictions or GridPredictions(equations)
     rows = predictions.rows
     mean = 0.0
@@ -124,8 +124,12 @@ def predict_pose_error(
         predicted, variance = predictions.under(parameters)
         mean = mean + weight * predicted
         square = square + weight * (variance + predicted**2)
-    wider = np.sqrt(np.maximum(square - mean**2, 0.0)) / sigma[rows]
-    moved = (mean - pose[rows]) / sigma[rows]
+    # what the POS claims to know perfectly stays so
+    is_open = sigma[rows] > 0.0
+    zeros = np.zeros_like(mean)
+    spread = np.sqrt(np.maximum(square - mean**2, 0.0))
+    wider = np.divide(spread, sigma[rows], out=zeros.copy(), where=is_open)
+    moved = np.divide(mean - pose[rows], sigma[rows], out=zeros, where=is_open)
     pose += sigma * _interpolated(trajectory.gps_time, rows, moved)
     wider = _interpolated(trajectory.gps_time, rows, wider)
     covariance *= wider[:, :, None] * wider[:, None, :]

@@ -1,23 +1,30 @@
-"""Control points that deviate together: the POS drifts there, and doesn't say so.
+"""Refused control points beside which the POS drifts, and doesn't say so.
 
 A misread control point stands alone. Where neighbours in time are all rejected and deviate the same
 way, the error is the POS's: its sigma is raised there as it grows between two places where
 GNSS holds it, and everything is estimated anew. Where another pass sees them deviate likewise, it
 is the points', as by one setup of the instrument: no POS drifts twice alike.
+
+What is refused after that may still be drift that comes and goes between two points. But a wrong
+point is wrong in all its passes alike, what was seen within a second drifted together, and control
+points are seldom wrong in great numbers: the odds of both decide.
 """
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
-from mlscorr.estimate._screening import Screening
 from mlscorr.estimate.equations import Equations
+from mlscorr.estimate.posterior import choose_parameters
 from mlscorr.estimate.settings import SETTINGS
-from mlscorr.estimate.target_tests import TargetTest
+from mlscorr.estimate.signals import SignalParameters
+from mlscorr.estimate.target_tests import Screening, TargetTest, all_tests, gross_evidence
+from mlscorr.matching import log_share
 from mlscorr.pos import SETTINGS as POS_SETTINGS
 from mlscorr.pos import runs
-from mlscorr.survey import Trajectory
+from mlscorr.survey import Statement, Trajectory
 
 
 @dataclass(frozen=True)
@@ -55,12 +62,11 @@ class DriftWindow:
         inside = (gps_time >= self.first) & (gps_time <= self.last)
         return np.where(inside, self.size * held**1.5, 0.0)
 
-    def __str__(self):
-        return (
-            f"{', '.join(self.names)} deviate together by {self.size:.2f} m and more per axis from "
-            f"{self.first:.1f} to {self.last:.1f} s: the POS drifts there by more than it states, "
-            "so that its sigma was raised."
-        )
+    @property
+    def statement(self) -> Statement:
+        """That the POS drifts there by more than it states."""
+        values = {"names": self.names, "size": self.size, "first": self.first, "last": self.last}
+        return Statement("unstated drift", "warning", values)
 
 
 def find_windows(equations: Equations, screening: Screening) -> tuple[DriftWindow, ...]:
@@ -149,3 +155,86 @@ def with_windows(trajectory: Trajectory, windows: tuple[DriftWindow, ...]) -> Tr
     for window in windows:
         variance = variance + window.sigma(trajectory.gps_time)[:, None] ** 2
     return replace(trajectory, position_sigma=np.sqrt(variance))
+
+
+def weighed_refusals(
+    equations: Equations, plain: Equations, screening: Screening, windows: int
+) -> Screening:
+    """A Screening that refuses no more targets than are likely to be wrong.
+
+    Parameters
+    ----------
+    equations : Equations
+        Of all targets.
+    plain : Equations
+        The same before anything was raised in windows.
+    screening : Screening
+        Of the former.
+    windows : int
+        Number of the stretches that are known to be drift that nothing states.
+    """
+    rejected = screening.outliers
+    refused = {test.name for test in rejected}
+    names = [name for name in equations.target_rows if name in refused]
+    odds = drift_odds(equations, names, screening.posterior.modes[0][0], windows)
+    if not names or odds <= 0.0:
+        return screening
+    size = max(np.linalg.norm(test.left_out, axis=1).max() for test in rejected)
+    values = {"names": tuple(names), "targets": len(equations.target_rows), "size": float(size)}
+    if odds < np.log(SETTINGS.strong_evidence):
+        doubt = Statement("wrong or drift", "warning", values | {"odds": float(np.exp(odds))})
+        return replace(screening, warnings=(*screening.warnings, doubt))
+    doubt = Statement("rather drift", "warning", values)
+    posterior = choose_parameters(plain)
+    return Screening(posterior, (), tuple(all_tests(plain, posterior)), (doubt,))
+
+
+def drift_odds(
+    equations: Equations, names: Collection[str], parameters: SignalParameters, windows: int
+) -> float:
+    """Log odds of drift beside each of some targets against a gross error of each.
+
+    Before the data are seen both are as probable; a share of gross_share of the targets is wrong,
+    known by its mean alone, and any share of the observations sees drift that nothing states.
+
+    Parameters
+    ----------
+    equations : Equations
+        Of all targets.
+    names : collection of str
+        Of those that were refused.
+    parameters : SignalParameters
+        That the others chose.
+    windows : int
+        Number of the stretches that are known to be such drift.
+    """
+    odds = 0.0
+    drifts = windows
+    for name in names:
+        others = equations.without(set(names) - {name})
+        solved = others.solve(parameters)
+        passes = np.flatnonzero(others.names == name).tolist()
+        misread = gross_evidence(solved, {name: others.target_rows[name]})[name]
+        mistaken = _positive(solved, {number: _rows([number]) for number in passes})
+        drift = _positive(solved, {number: _rows(_beside(others, number)) for number in passes})
+        odds += sum(drift) - max(misread, sum(mistaken))
+        drifts += len(drift)
+    if windows:  # with none the POS may as well never drift so
+        odds -= log_share(windows, len(equations.names), 0.5)
+    odds += log_share(drifts, len(equations.names), 0.5)
+    return odds - log_share(len(names), len(equations.target_rows), SETTINGS.gross_share)
+
+
+def _positive(solved, rows_of):
+    """The evidence of those errors that are more probable than none."""
+    return [gain for gain in gross_evidence(solved, rows_of).values() if gain > 0.0]
+
+
+def _beside(equations, number):
+    """Numbers of all observations within a second of one."""
+    times = equations.observed
+    return np.flatnonzero(np.abs(times - times[number]) <= POS_SETTINGS.sigma_interval)
+
+
+def _rows(numbers):
+    return (3 * np.array(numbers)[:, None] + np.arange(3)).ravel()

@@ -77,6 +77,9 @@ class TieEquations:
         places = ties.place.reshape(-1, 3)
         along = along_ties(ties.direction, pose_partials(trajectory, places, times))
         epochs = _epochs(times, stated.history)
+        columns = None
+        if mountings:
+            columns = mounting_columns(trajectory, mountings, ties)
         return cls(
             gps_time=epochs.reshape(-1, 2),
             misclosure=ties.misclosure,
@@ -84,7 +87,7 @@ class TieEquations:
             partials=along,
             stated=stated_sigma(trajectory, pos, epochs, stated.starts),
             weight=np.ones(len(ties)),
-            mounting=mounting_columns(trajectory, mountings, ties) if mountings else None,
+            mounting=columns,
         )
 
     def __len__(self) -> int:
@@ -98,6 +101,9 @@ class TieEquations:
         rows : (n,) bool or (k,) int array, or slice
         """
         views = np.arange(2 * len(self)).reshape(-1, 2)[rows].ravel()
+        mounting = self.mounting
+        if mounting is not None:
+            mounting = mounting[rows]
         return replace(
             self,
             gps_time=self.gps_time[rows],
@@ -106,7 +112,7 @@ class TieEquations:
             partials=self.partials[rows],
             stated=self.stated.at(views),
             weight=self.weight[rows],
-            mounting=None if self.mounting is None else self.mounting[rows],
+            mounting=mounting,
         )
 
     def with_starts(self, starts: np.ndarray) -> TieEquations:

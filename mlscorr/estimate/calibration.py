@@ -1,30 +1,167 @@
-"""A calibrated mounting, and what its geometry can and can't tell of it."""
+"""Calibrated mountings: what recorded ones lack (Eq. 2), and what a geometry can't tell of it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import compress
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from mlscorr.correction import Correction
-from mlscorr.estimate._screening import Screening
+from mlscorr.estimate._wording import sentences_of
 from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.guards import Guards, few_targets, global_test_warnings
-from mlscorr.estimate.mounting_estimate import (
-    MOUNTING_COMPONENTS,
-    MountingEstimate,
-    clock_warnings,
-)
 from mlscorr.estimate.posterior import Posterior
+from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.signals import SignalParameters
-from mlscorr.estimate.target_tests import TargetTest
+from mlscorr.estimate.target_tests import Screening, TargetTest
 from mlscorr.estimate.tied import TieResiduals
-from mlscorr.survey import Mounting, Summary, Ties, Trajectory
+from mlscorr.survey import Mounting, Statement, Summary, Ties, Trajectory
 
+MOUNTING_COMPONENTS = (
+    "lever arm right",
+    "lever arm forward",
+    "lever arm up",
+    "boresight about right",
+    "boresight about forward",
+    "boresight about up",
+)
 SCANNER_COMPONENTS = ("range offset", "encoder scale")
+
+
+@dataclass(frozen=True)
+class MountingEstimate:
+    """What the recorded mountings of k scanners lack, by one method.
+
+    Parameters
+    ----------
+    mountings : tuple of Mounting
+        The calibrated ones.
+    correction : (6 k,) array
+        Lever arm (m) and boresight (rad) about right, forward, up: lever_arm_true = recorded + c,
+        R_L^P true = Exp(c) R_L^P recorded.
+    covariance : (6 k, 6 k) array
+    sigma0 : float
+        Of weight one; one if the model is right.
+    """
+
+    mountings: tuple[Mounting, ...]
+    correction: np.ndarray
+    covariance: np.ndarray
+    sigma0: float
+
+    @property
+    def mounting(self) -> Mounting:
+        """The calibrated one of the first scanner."""
+        return self.mountings[0]
+
+    @property
+    def sigma(self) -> np.ndarray:
+        """One sigma (6 k,) of the correction: m and rad."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def correlation(self) -> np.ndarray:
+        """Correlation matrix (6 k, 6 k) of the correction."""
+        return self.covariance / np.outer(self.sigma, self.sigma)
+
+    @classmethod
+    def about(
+        cls,
+        recorded: Sequence[Mounting],
+        correction: np.ndarray,
+        covariance: np.ndarray,
+        sigma0: float,
+    ) -> MountingEstimate:
+        """The estimate by corrections of recorded mountings; the calibrated ones know their sigmas.
+
+        Parameters
+        ----------
+        recorded : sequence of Mounting
+        correction, covariance, sigma0
+            As of the estimate.
+        """
+        mountings = tuple(
+            replace(mounting, covariance=covariance[6 * i : 6 * i + 6, 6 * i : 6 * i + 6])
+            for i, mounting in enumerate(corrected_mountings(recorded, correction))
+        )
+        return cls(mountings, correction, covariance, sigma0)
+
+    def of(self, number: int) -> MountingEstimate:
+        """The estimate of a scanner's mounting.
+
+        Parameters
+        ----------
+        number : int
+            From 0.
+        """
+        rows = slice(6 * number, 6 * number + 6)
+        mountings = self.mountings[number : number + 1]
+        covariance = self.covariance[rows, rows]
+        return MountingEstimate(mountings, self.correction[rows], covariance, self.sigma0)
+
+    def beside_first(self, number: int) -> tuple[np.ndarray, np.ndarray]:
+        """What a mounting lacks beside the first, and one sigma of it: (6,) each, m and rad.
+
+        Both scanners of a vehicle put what they see together in one place where this is known,
+        whatever both mountings have in common.
+
+        Parameters
+        ----------
+        number : int
+            Of the scanner, from 1.
+        """
+        first, other = self.correction.reshape(-1, 6)[[0, number]]
+        turn = Rotation.from_rotvec(other[3:]) * Rotation.from_rotvec(first[3:]).inv()
+        difference = np.zeros((6, len(self.correction)))
+        difference[:, 6 * number : 6 * number + 6] = np.eye(6)
+        difference[:, :6] -= np.eye(6)
+        variance = np.diag(difference @ self.covariance @ difference.T)
+        return np.append(other[:3] - first[:3], turn.as_rotvec()), np.sqrt(variance)
+
+
+def corrected_mounting(mounting: Mounting, correction: np.ndarray) -> Mounting:
+    """The mounting that lacked a correction  (Eq. 2).
+
+    Parameters
+    ----------
+    mounting : Mounting
+    correction : (6,) array
+        Lever arm and rotation. Units: m and rad.
+    """
+    turn = Rotation.from_rotvec(correction[3:])
+    return Mounting(mounting.lever_arm + correction[:3], turn * mounting.boresight)
+
+
+def corrected_mountings(
+    mountings: Sequence[Mounting], correction: np.ndarray
+) -> tuple[Mounting, ...]:
+    """The mountings that lacked a correction  (Eq. 2).
+
+    Parameters
+    ----------
+    mountings : sequence of Mounting
+    correction : (6 k,) array
+        Lever arm and rotation of each. Units: m and rad.
+    """
+    return tuple(map(corrected_mounting, mountings, correction.reshape(-1, 6)))
+
+
+def combined_correction(correction: np.ndarray, more: np.ndarray) -> np.ndarray:
+    """The correction (6 k,) of one after another: Exp(more) Exp(correction) of each mounting.
+
+    Parameters
+    ----------
+    correction, more : (6 k,) array
+        Lever arm and rotation of each. Units: m and rad.
+    """
+    first = correction.reshape(-1, 6)
+    second = more.reshape(-1, 6)
+    turn = Rotation.from_rotvec(second[:, 3:]) * Rotation.from_rotvec(first[:, 3:])
+    return np.hstack([first[:, :3] + second[:, :3], turn.as_rotvec()]).ravel()
 
 
 @dataclass(frozen=True)
@@ -57,22 +194,17 @@ class ScannerErrors:
         return ScannerErrors(*(values[rows] for values in vars(self).values()))
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """A sentence where something is significant, of one scanner."""
-        units = "mm", "mrad per rad"
-        rows = zip(SCANNER_COMPONENTS, units, *vars(self).values(), strict=True)
-        lacks = [
-            f"{part} {1000 * a:.1f} ± {1000 * s:.1f} {unit}{'' if known else ' (not determined)'}"
-            for part, unit, a, s, known, wrong in rows
-            if wrong
-        ]
-        if not lacks:
+    def statements(self) -> tuple[Statement, ...]:
+        """A warning where something is significant, of one scanner."""
+        if not self.significant.any():
             return ()
-        return (
-            f"The scanner itself is off: it lacks {', '.join(lacks)}. The mounting is given free "
-            "of that, but the points keep it: set it in the scanner's own software, export the "
-            "clouds anew, and calibrate again.",
-        )
+        values = {
+            "components": tuple(compress(SCANNER_COMPONENTS, self.significant)),
+            "corrections": tuple(self.correction[self.significant].tolist()),
+            "sigmas": tuple(self.sigma[self.significant].tolist()),
+            "determined": tuple(self.determined[self.significant].tolist()),
+        }
+        return (Statement("scanner errors", "warning", values),)
 
 
 @dataclass(frozen=True, repr=False)
@@ -98,7 +230,7 @@ class Calibration(Summary):
     drift : Correction
         Of the POS error beside the mountings, which all scanners share  (Eq. 14-15). It is zero on
         average, so the farther from a control point, the less of it is corrected.
-    notes : tuple of str
+    notes : tuple of Statement
         Of warnings, those on the inputs.
     ties, ties_with_drift : TieResiduals, optional
         What two passes both saw, and what the mountings leave of it, by themselves and with the POS
@@ -117,7 +249,7 @@ class Calibration(Summary):
     guards: Guards
     equations: Equations
     drift: Correction
-    notes: tuple[str, ...] = ()
+    notes: tuple[Statement, ...] = ()
     ties: TieResiduals | None = None
     ties_with_drift: TieResiduals | None = None
     scanner: ScannerErrors | None = None
@@ -143,21 +275,34 @@ class Calibration(Summary):
 
         Of several scanners each has its own: those of ``of``.
         """
-        return *self.shared_warnings, *(self.own_warnings if len(self.recorded) == 1 else ())
+        if len(self.recorded) == 1:
+            return self.shared_warnings + self.own_warnings
+        return self.shared_warnings
 
     @property
     def own_warnings(self) -> tuple[str, ...]:
         """Those of the sentences that concern the one scanner."""
-        scanner = () if self.scanner is None else self.scanner.warnings
-        clock = clock_warnings(self.lsc, self.trajectory)
-        return (*_warnings(self.lsc, self.determined), *clock, *scanner)
+        statements = [
+            *_undetermined(self.lsc, self.determined),
+            *clock_warnings(self.lsc, self.trajectory),
+        ]
+        if self.scanner is not None:
+            statements += self.scanner.statements
+        return sentences_of(statements)
 
     @property
     def shared_warnings(self) -> tuple[str, ...]:
         """Those of the sentences that concern all scanners."""
-        of_control = *_few_control(self.equations), *global_test_warnings(self.guards)
-        of_ties = () if self.ties is None else self.ties.warnings
-        return *self.notes, *of_control, *self.screening.warnings, *of_ties
+        targets = len(self.equations.target_rows)
+        statements = list(self.notes)
+        if targets == 0:
+            statements.append(Statement("mounting by ties alone", "warning"))
+        statements += few_targets(targets)
+        statements += global_test_warnings(self.guards)
+        statements += self.screening.warnings
+        if self.ties is not None:
+            statements += self.ties.statements
+        return sentences_of(statements)
 
     @property
     def parameters(self) -> tuple[tuple[SignalParameters, float], ...]:
@@ -239,7 +384,7 @@ class Calibration(Summary):
             used=self.used[scanner == number],
             ties=self.ties and self.ties.of_scanner(number),
             ties_with_drift=self.ties_with_drift and self.ties_with_drift.of_scanner(number),
-            scanner=None if self.scanner is None else self.scanner.of(number),
+            scanner=self.scanner and self.scanner.of(number),
         )
 
 
@@ -270,30 +415,30 @@ def mounted_corrections(
     )
 
 
-def _few_control(equations):
-    """A sentence where control points are too few to test each other."""
-    number = len(equations.target_rows)
-    if number == 0:
-        yield (
-            "No control point takes part: the mounting is that which makes the passes agree, and "
-            "where they are is what the POS says."
-        )
-    yield from few_targets(number)
+def clock_warnings(estimate: MountingEstimate, trajectory: Trajectory) -> Iterator[Statement]:
+    """A Statement on the clock offset that a lever arm's lack forward may be as well.
+
+    Parameters
+    ----------
+    estimate : MountingEstimate
+        Of a scanner.
+    trajectory : Trajectory
+    """
+    lack = estimate.correction[1]
+    if abs(lack) > SETTINGS.setup_sigmas * estimate.sigma[1]:
+        way = np.linalg.norm(np.diff(trajectory.position, axis=0), axis=1)
+        speeds = way / np.diff(trajectory.gps_time)
+        speed = np.average(speeds, weights=way)  # where it drives, no halts
+        spread = np.sqrt(np.average((speeds - speed) ** 2, weights=way))
+        values = {"lack": float(lack), "speed": float(speed), "spread": float(spread)}
+        yield Statement("clock", "warning", values)
 
 
-def _warnings(estimate, determined):
-    """Sentences on what this geometry can't tell, with the sigma that the POS's belief gives."""
-    if determined.all():
-        return ()
-    sigma = [f"{s:.3f} m" for s in estimate.sigma[:3]]
-    sigma += [f"{s:.3f} deg" for s in np.degrees(estimate.sigma[3:])]
-    unknown = ", ".join(
-        f"{MOUNTING_COMPONENTS[i]} (sigma {sigma[i]})" for i in np.flatnonzero(~determined)
-    )
-    return (
-        f"This geometry does not determine {unknown}: a constant difference between the "
-        "coordinates of control and trajectory, or another component, looks the same, and the "
-        "sigma holds only as far as the POS's own do. Targets on both sides, near and far, high "
-        "and low, passed in both directions tell more; no level street tells lever arm up from a "
-        "height difference.",
-    )
+def _undetermined(estimate, determined):
+    """A Statement on what this geometry can't tell, with the sigma that the POS's belief gives."""
+    if not determined.all():
+        values = {
+            "components": tuple(compress(MOUNTING_COMPONENTS, ~determined)),
+            "sigmas": tuple(estimate.sigma[~determined].tolist()),
+        }
+        yield Statement("undetermined", "warning", values)

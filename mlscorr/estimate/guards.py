@@ -1,7 +1,7 @@
-"""What the control points of a survey can't tell, and sentences about it."""
+"""What the control points of a survey can't tell, and warnings about it."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -13,8 +13,7 @@ from mlscorr.estimate.posterior import Objective
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.signals import SignalParameters, pose_signals
 from mlscorr.frames import angle_sigma
-from mlscorr.survey import Trajectory, control_epochs
-from mlscorr.wording import counted
+from mlscorr.survey import Statement, Trajectory, control_epochs
 
 COMPONENTS = ("easting", "northing", "height", "roll", "pitch", "heading")
 
@@ -113,23 +112,19 @@ def guards_of(passes: np.ndarray, observed: np.ndarray, guards: Guards) -> Guard
         Whose variance ratio and test hold there.
     """
     times = np.sort(observed)
-    control = [times[(times >= first) & (times <= last)] for first, last in passes.tolist()]
-    spans = list(zip(passes.tolist(), control, strict=True))
+    gaps: list[tuple[float, float]] = []
+    empty = []
+    for first, last in passes.tolist():
+        inside = times[(times >= first) & (times <= last)].tolist()
+        if inside:
+            gaps += pairwise([first, *inside, last])
+        else:
+            empty.append((first, last))
     return replace(
         guards,
-        gap=_longest_gap(passes.tolist(), control),
-        passes_without_control=tuple((a, b) for (a, b), inside in spans if not len(inside)),
+        gap=max(gaps, key=np.ptp, default=(0.0, 0.0)),
+        passes_without_control=tuple(empty),
     )
-
-
-def _longest_gap(passes, control):
-    gaps = [
-        gap
-        for (first, last), inside in zip(passes, control, strict=True)
-        if len(inside)
-        for gap in pairwise([first, *inside.tolist(), last])
-    ]
-    return max(gaps, key=np.ptp, default=(0.0, 0.0))
 
 
 def _variance_ratio(equations, parameters, corrected):
@@ -173,8 +168,8 @@ def _global_test(equations, parameters):
     return GlobalTest(float(statistic * redundancy / expected), float(redundancy), float(upper))
 
 
-def sparse_warnings(equations: Equations, order: int) -> Iterator[str]:
-    """Sentences about control points that are few, all at one epoch, or a lowered order.
+def sparse_warnings(equations: Equations, order: int) -> Iterator[Statement]:
+    """Statements about control points that are few, all at one epoch, or a lowered order.
 
     Parameters
     ----------
@@ -185,22 +180,20 @@ def sparse_warnings(equations: Equations, order: int) -> Iterator[str]:
     targets = len(equations.target_rows)
     epochs = len(control_epochs(equations.observed))
     if equations.order < order:
-        yield (
-            f"{counted(targets, 'control point')} at {counted(epochs, 'epoch')} "
-            f"{'is' if targets == 1 else 'are'} too few for a trend of order {order}, which needs "
-            f"{order + 2}: order {equations.order} is used."
-        )
+        values = {"targets": targets, "epochs": epochs, "asked": order, "order": equations.order}
+        yield Statement("lowered order", "warning", values)
     yield from few_targets(targets)
     if epochs == 1 and targets > 1:
-        yield (
-            f"All {targets} control points were seen within {np.ptp(equations.observed):.1f} s at "
-            f"{equations.observed.min():.1f} s: the correction is known there. Nothing tells "
-            "whether it is the same elsewhere, so that a part of it is kept, with growing sigmas."
-        )
+        values = {
+            "targets": targets,
+            "seconds": float(np.ptp(equations.observed)),
+            "start": float(equations.observed.min()),
+        }
+        yield Statement("one epoch", "warning", values)
 
 
-def few_targets(targets: int) -> Iterator[str]:
-    """A sentence where a wrong control point could not be found.
+def few_targets(targets: int) -> Iterator[Statement]:
+    """A Statement where a wrong control point could not be found.
 
     Parameters
     ----------
@@ -208,16 +201,14 @@ def few_targets(targets: int) -> Iterator[str]:
         Control points that take part.
     """
     if 0 < targets < SETTINGS.smallest_targets:
-        yield (
-            f"Only {targets} control {'point takes' if targets == 1 else 'points take'} part: a "
-            f"wrong one cannot be found. Survey at least {SETTINGS.smallest_targets}."
-        )
+        values = {"targets": targets, "least": SETTINGS.smallest_targets}
+        yield Statement("few targets", "warning", values)
 
 
 def guard_warnings(
     guards: Guards, equations: Equations, parameters: SignalParameters
-) -> Iterator[str]:
-    """Sentences about time without control points, and about the global test.
+) -> Iterator[Statement]:
+    """Statements about time without control points, and about the global test.
 
     Parameters
     ----------
@@ -226,10 +217,7 @@ def guard_warnings(
     parameters : SignalParameters
     """
     if len(equations.names) == 0:
-        yield (
-            "No control point takes part. The passes agree with each other, but nothing is known "
-            "of where they are beyond what the POS states: accuracy is relative only."
-        )
+        yield Statement("relative only", "warning")
         return
     time = parameters.bias_time
     if parameters.family != INTEGRATED:
@@ -240,15 +228,12 @@ def guard_warnings(
         yield from _faded(equations, time, *guards.gap)
     for first, last in guards.passes_without_control:
         if ties is None or not np.any((ties.gps_time >= first) & (ties.gps_time <= last)):
-            yield (
-                f"The pass from {first:.1f} to {last:.1f} s has no control point: only the trend "
-                "of the other passes and what is left of their signal correct it."
-            )
+            yield Statement("pass without control", "warning", {"first": first, "last": last})
     yield from global_test_warnings(guards)
 
 
-def global_test_warnings(guards: Guards) -> Iterator[str]:
-    """A sentence where the global test fails.
+def global_test_warnings(guards: Guards) -> Iterator[Statement]:
+    """A Statement where the global test fails.
 
     Parameters
     ----------
@@ -256,11 +241,7 @@ def global_test_warnings(guards: Guards) -> Iterator[str]:
     """
     test = guards.global_test
     if test is not None and not test.passed:
-        yield (
-            "The global test fails: the misclosures vary more than the stated sigmas of control "
-            f"points and targets allow (chi-squared {test.statistic:.0f} above {test.upper:.0f} of "
-            f"{test.redundancy:.0f} degrees of freedom). Are the sigmas of control points right?"
-        )
+        yield Statement("global test", "warning", asdict(test))
 
 
 def _scanned_times(equations):
@@ -269,29 +250,26 @@ def _scanned_times(equations):
 
 
 def _extrapolated(equations, time):
-    """Sentences about both ends beyond the control span."""
+    """Statements about both ends beyond the control span."""
     first, last = equations.span
     ends = _scanned_times(equations)[[0, -1]]
-    for length, where in ((first - ends[0], "before the first"), (ends[1] - last, "past the last")):
+    for length, side in ((first - ends[0], "before the first"), (ends[1] - last, "past the last")):
         if length > time:
-            if length >= SETTINGS.faded_times * time:
-                effect = "only the trend applies"
-            else:
-                effect = "it fades to the trend"
-            yield (
-                f"Signal extrapolated {length:.0f} s {where} control point ({length / time:.1f} "
-                f"correlation times): {effect} there."
-            )
+            values = {
+                "seconds": float(length),
+                "side": side,
+                "correlation_times": float(length / time),
+                "is_faded": bool(length >= SETTINGS.faded_times * time),
+            }
+            yield Statement("extrapolated", "warning", values)
 
 
 def _faded(equations, time, start, end):
-    """A sentence about the longest gap between control points where signals fade in it."""
+    """A Statement about the longest gap between control points where signals fade in it."""
     first, last = equations.span
     scanned = _scanned_times(equations)
     length = end - start
     away = np.minimum(scanned - start, end - scanned).max(initial=0.0)
     if 2 * away > SETTINGS.faded_times * time and first <= start and end <= last:
-        yield (
-            f"No control point for {length:.0f} s from {start:.1f} s "
-            f"({length / time:.1f} correlation times): only the trend applies in the middle of it."
-        )
+        values = {"seconds": length, "start": start, "correlation_times": length / time}
+        yield Statement("faded", "warning", values)

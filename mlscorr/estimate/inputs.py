@@ -6,13 +6,13 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from mlscorr.estimate.settings import SETTINGS
-from mlscorr.survey import Matched, Pos, Trajectory
+from mlscorr.survey import Matched, Pos, Statement, Trajectory
 
 
 def checked_inputs(
     trajectory: Trajectory, matched: Matched, pos: Pos, order: int
-) -> tuple[Trajectory, tuple[str, ...]]:
-    """The trajectory with all its sigmas, and sentences on those that were filled in.
+) -> tuple[Trajectory, tuple[Statement, ...]]:
+    """The trajectory with all its sigmas, and what is to be known of those that were filled in.
 
     Parameters
     ----------
@@ -73,8 +73,8 @@ def _check_noise(matched):
         )
 
 
-def filled_sigmas(trajectory: Trajectory) -> tuple[Trajectory, tuple[str, ...]]:
-    """The trajectory with all its sigmas, and sentences on those that were filled in.
+def filled_sigmas(trajectory: Trajectory) -> tuple[Trajectory, tuple[Statement, ...]]:
+    """The trajectory with all its sigmas, and what is to be known of those that were filled in.
 
     Sigmas of zero, and those that jump at single epochs, are taken from the epochs beside; zero at
     all epochs is no statement.
@@ -88,7 +88,7 @@ def filled_sigmas(trajectory: Trajectory) -> tuple[Trajectory, tuple[str, ...]]:
     ValueError
         For negative sigmas.
     """
-    notes: list[str] = []
+    notes: list[Statement] = []
     columns: dict[str, np.ndarray | None] = {}
     for name, unit in (("position_sigma", "m"), ("attitude_sigma", "deg")):
         sigma = getattr(trajectory, name)
@@ -102,10 +102,8 @@ def filled_sigmas(trajectory: Trajectory) -> tuple[Trajectory, tuple[str, ...]]:
         stated = (sigma > 0).all(axis=1)
         if not stated.any():
             columns[name] = None
-            notes.append(
-                f"All {len(trajectory)} trajectory epochs state a {name} of 0 {unit}, which no POS "
-                "has: what survey.toml's [pos] believes is used."
-            )
+            values = {"epochs": len(trajectory), "column": name, "unit": unit}
+            notes.append(Statement("zero sigmas", "warning", values))
             continue
         stated &= ~_is_lone_jump(sigma)
         if stated.all():
@@ -116,13 +114,17 @@ def filled_sigmas(trajectory: Trajectory) -> tuple[Trajectory, tuple[str, ...]]:
                 for v in sigma.T
             ]
         )
-        first = trajectory.gps_time[np.argmin(stated)]
-        notes.append(
-            f"{(~stated).sum()} of {len(trajectory)} trajectory epochs state a {name} of 0 {unit}, "
-            f"or one that jumps at these epochs alone (first at {first:.3f} s), which is no "
-            "statement: those of the epochs before and after are used there."
-        )
-    return (replace(trajectory, **columns) if columns else trajectory), tuple(notes)
+        values = {
+            "filled": int((~stated).sum()),
+            "epochs": len(trajectory),
+            "column": name,
+            "unit": unit,
+            "first": float(trajectory.gps_time[np.argmin(stated)]),
+        }
+        notes.append(Statement("filled sigmas", "warning", values))
+    if columns:
+        trajectory = replace(trajectory, **columns)
+    return trajectory, tuple(notes)
 
 
 def _is_lone_jump(sigma):

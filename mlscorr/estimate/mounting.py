@@ -3,6 +3,11 @@
 The mountings of all scanners are the trend, six columns each, and the POS error that they share is
 the signal: 3 of the position and 3 small rotations about the map axes. Plain least squares, which
 takes the POS to be free of error, stands beside it.
+
+A tie compares two views of one thing. What is wrong with the mounting turns and moves both with the
+body, so that views in opposite directions, or far and near, tell it; its rows of A are the
+differences of the partial derivatives at both. Two scanners that saw it a second apart share nearly
+all of the POS error: what is left between them is the one mounting beside the other.
 """
 
 from collections.abc import Sequence
@@ -12,22 +17,24 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from mlscorr.correction import Correction
-from mlscorr.estimate._prediction import predict_pose_error
-from mlscorr.estimate._screening import Screening, screen
-from mlscorr.estimate.assembly import mounting_equations, position_equations
-from mlscorr.estimate.calibration import Calibration
-from mlscorr.estimate.equations import Equations
-from mlscorr.estimate.guards import find_guards
-from mlscorr.estimate.inputs import checked_inputs, filled_sigmas
-from mlscorr.estimate.mounting_estimate import (
+from mlscorr.estimate._prediction import pose_rows, predict_pose_error
+from mlscorr.estimate._tie_equations import TieEquations
+from mlscorr.estimate.calibration import (
+    Calibration,
     MountingEstimate,
     combined_correction,
     corrected_mountings,
+    mounted_corrections,
 )
-from mlscorr.estimate.prior import mounting_prior
+from mlscorr.estimate.equations import Equations, mounting_equations, position_equations
+from mlscorr.estimate.guards import find_guards
+from mlscorr.estimate.inputs import checked_inputs, filled_sigmas
+from mlscorr.estimate.posterior import mounting_prior
 from mlscorr.estimate.settings import SETTINGS
+from mlscorr.estimate.target_tests import Screening, screen
+from mlscorr.estimate.tied import WeighedTies, graduated, screen_with_ties
 from mlscorr.frames import georeferenced_anew
-from mlscorr.survey import SAME_EPOCH, Matched, Mounting, Pos, Trajectory
+from mlscorr.survey import SAME_EPOCH, Matched, Mounting, Pos, Statement, Ties, Trajectory
 
 
 # The matrices are small: on a busy machine threads would wait longer than they work
@@ -54,7 +61,7 @@ def estimate_mounting(
         Where each scanner saw fewer than 3 targets or all of them at one time, and for sigmas that
         can't be.
     """
-    pos = Pos() if pos is None else pos
+    pos = pos or Pos()
     faults = [control_fault(matched, number) for number in range(len(mountings))]
     if all(faults):
         raise ValueError(faults[0])
@@ -86,7 +93,7 @@ def believed_mounting(
     Calibration
         Under the parameters that are believed. Ties can be added to it.
     """
-    pos = Pos() if pos is None else pos
+    pos = pos or Pos()
     filled, notes = filled_sigmas(trajectory)
     equations = position_equations(filled, matched, pos, 0, mounting_prior)
     kept, start, ls = _least_squares(equations, matched, mountings)
@@ -95,45 +102,61 @@ def believed_mounting(
     return calibration_by(trajectory, mountings, kept, screening, (start, ls), used, notes)
 
 
-def calibration_by(
-    trajectory: Trajectory,
-    recorded: Sequence[Mounting],
-    equations: Equations,
-    screening: Screening,
-    least_squares: tuple[np.ndarray, MountingEstimate],
-    used: np.ndarray,
-    notes: tuple[str, ...],
-) -> Calibration:
-    """The Calibration by equations, and the parameters that were chosen for them.
+@threadpool_limits.wrap(limits=1, user_api="blas")
+def calibration_with_ties(calibration: Calibration, matched: Matched, ties: Ties) -> Calibration:
+    """The calibration by control points and by what two passes both saw.
+
+    Least squares stays that of the control points.
 
     Parameters
     ----------
-    trajectory, recorded : Trajectory, sequence of Mounting
-    equations : Equations
-        About the mountings with a correction.
-    screening : Screening
-    least_squares : (6 k,) array and MountingEstimate
-        That correction, and the estimate by least squares. Units: m and rad.
-    used : (n,) bool array
-    notes : tuple of str
+    calibration : Calibration
+        By control points alone.
+    matched : Matched
+        These, as georeferenced with the recorded mountings.
+    ties : Ties
+        The places likewise; the directions are those of the things themselves.
     """
-    posterior = screening.posterior
-    lsc, determined = _collocation(equations, posterior, recorded, least_squares[0])
-    parameters = posterior.modes[0][0]
-    drift = Correction.by_pose_error(trajectory, *predict_pose_error(equations, posterior))
-    return Calibration(
-        trajectory=trajectory,
-        recorded=tuple(recorded),
-        lsc=lsc,
-        ls=least_squares[1],
-        determined=determined,
-        screening=screening,
-        used=used,
-        guards=find_guards(equations, parameters, drift.corrected),
-        equations=equations,
-        drift=drift,
-        notes=notes,
+    tied, correction = _converged(calibration, matched, ties)
+    rows = replace(tied.ties, weight=np.ones(len(ties)))  # without those of robust estimation
+    bare = replace(tied.equations, ties=None)
+    predictions, screening, is_used = screen_with_ties(bare, calibration.screening, rows)
+    if not is_used.any():
+        return calibration.with_residuals(ties, is_used)
+    used = calibration.used & ~np.isin(matched.name, [o.name for o in screening.outliers])
+    changed = calibration_by(
+        calibration.trajectory,
+        calibration.recorded,
+        predictions.equations,
+        screening,
+        (correction, calibration.ls),
+        used,
+        calibration.notes,
     )
+    return changed.with_residuals(ties, is_used)
+
+
+@threadpool_limits.wrap(limits=1, user_api="blas")
+def previewed_mounting(
+    calibration: Calibration, matched: Matched, ties: Ties
+) -> tuple[Correction, ...]:
+    """The corrections by each mounting and the POS error with ties that were paired so far.
+
+    Under the parameters of the control points alone, and without sigmas.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        By control points alone.
+    matched, ties : Matched, Ties
+        As of calibration_with_ties.
+    """
+    tied, correction = _converged(calibration, matched, ties)
+    recorded = calibration.recorded
+    mountings = corrected_mountings(recorded, correction)
+    pose = tied.solved.predict_mean(*pose_rows(tied.equations, tied.parameters))
+    drift = Correction.by_pose_error(calibration.trajectory, pose)
+    return mounted_corrections(drift, recorded, mountings)
 
 
 def control_fault(matched: Matched, number: int) -> str:
@@ -161,6 +184,47 @@ def control_fault(matched: Matched, number: int) -> str:
             "that of the mounting. Drive past control points in both directions."
         )
     return ""
+
+
+def calibration_by(
+    trajectory: Trajectory,
+    recorded: Sequence[Mounting],
+    equations: Equations,
+    screening: Screening,
+    least_squares: tuple[np.ndarray, MountingEstimate],
+    used: np.ndarray,
+    notes: tuple[Statement, ...],
+) -> Calibration:
+    """The Calibration by equations, and the parameters that were chosen for them.
+
+    Parameters
+    ----------
+    trajectory, recorded : Trajectory, sequence of Mounting
+    equations : Equations
+        About the mountings with a correction.
+    screening : Screening
+    least_squares : (6 k,) array and MountingEstimate
+        That correction, and the estimate by least squares. Units: m and rad.
+    used : (n,) bool array
+    notes : tuple of Statement
+    """
+    posterior = screening.posterior
+    lsc, determined = _collocation(equations, posterior, recorded, least_squares[0])
+    parameters = posterior.modes[0][0]
+    drift = Correction.by_pose_error(trajectory, *predict_pose_error(equations, posterior))
+    return Calibration(
+        trajectory=trajectory,
+        recorded=tuple(recorded),
+        lsc=lsc,
+        ls=least_squares[1],
+        determined=determined,
+        screening=screening,
+        used=used,
+        guards=find_guards(equations, parameters, drift.corrected),
+        equations=equations,
+        drift=drift,
+        notes=notes,
+    )
 
 
 def _least_squares(equations, matched, recorded):
@@ -211,6 +275,45 @@ def linearized(
     position = georeferenced_anew(equations.trajectory, recorded, mountings, *place)
     moved = replace(matched, observations=replace(observed, position=position))
     return mountings, mounting_equations(equations, moved, mountings, correction, _weak(recorded))
+
+
+def _converged(calibration, matched, ties) -> tuple[WeighedTies, np.ndarray]:
+    """Equations with robust weights about the mountings that they give, and these' correction."""
+    recorded = calibration.recorded
+    targets = matched[calibration.used]
+    step = 0.0
+    correction = calibration.lsc.correction
+    equations = calibration.equations
+    for _ in range(SETTINGS.mounting_iterations):
+        correction = correction + step  # here, so that the last equations are about the last one
+        mountings, about = linearized(equations, targets, recorded, correction)
+        moved = georeferenced_ties(about, recorded, mountings, ties)
+        tied = graduated(about, calibration.parameters[0][0], moved)
+        step = combined_correction(correction, tied.solved.trend) - correction
+        if np.abs(step).max() < SETTINGS.resolution:
+            break
+    return tied, correction
+
+
+def georeferenced_ties(
+    equations: Equations, recorded: Sequence[Mounting], mountings: Sequence[Mounting], ties: Ties
+) -> TieEquations:
+    """The equations of ties that mountings georeferenced, about other ones.
+
+    Parameters
+    ----------
+    equations : Equations
+    recorded, mountings : sequence of Mounting
+        Of each scanner: the recorded one, and that about which the equations are.
+    ties : Ties
+    """
+    trajectory = equations.trajectory
+    views = (ties.place, ties.gps_time, ties.scanner)
+    place = georeferenced_anew(trajectory, recorded, mountings, *views)
+    misclosure = np.einsum("ni,ni->n", ties.direction, place[:, 1] - place[:, 0])
+    moved = replace(ties, place=place, misclosure=misclosure)
+    numbered = dict(enumerate(mountings))
+    return TieEquations.of(trajectory, equations.pos, moved, equations.stated, numbered)
 
 
 def _weak(mountings):

@@ -11,8 +11,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from mlscorr.collocation import INTEGRATED
-from mlscorr.estimate.assembly import with_fallbacks
-from mlscorr.estimate.equations import Equations
+from mlscorr.estimate.equations import Equations, with_fallbacks
 from mlscorr.estimate.posterior import Objective
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.signals import SignalParameters
@@ -85,7 +84,10 @@ def _about(equations, first, last):
     ties = equations.ties
     if ties is not None and len(ties) > SETTINGS.tie_sample:
         inside = ((ties.gps_time >= first) & (ties.gps_time <= last)).any(axis=1)
-        equations = replace(equations, ties=ties.select(inside) if inside.any() else None)
+        some = None
+        if inside.any():
+            some = ties.select(inside)
+        equations = replace(equations, ties=some)
     if len(equations.names) <= SETTINGS.block:
         return equations
     times = equations.observed

@@ -5,20 +5,23 @@ collocation hold no misclosure. So each candidate is taken as it would be seen, 
 of the variance along the drive is worked out before anybody surveys it.
 """
 
+from __future__ import annotations
+
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from mlscorr.collocation import FAMILIES
-from mlscorr.estimate._outlook import Outlook
+from mlscorr.collocation import FAMILIES, Noise, SparseRows, covariance_given
 from mlscorr.estimate._prediction import predict_under
-from mlscorr.estimate.assembly import position_equations
+from mlscorr.estimate.equations import Equations, position_equations
 from mlscorr.estimate.inputs import checked_inputs
 from mlscorr.estimate.pos_error import Estimate
-from mlscorr.estimate.posterior import Objective
-from mlscorr.estimate.prior import position_prior
+from mlscorr.estimate.posterior import Objective, position_prior
 from mlscorr.estimate.settings import SETTINGS
+from mlscorr.estimate.signals import SignalParameters, pose_signals
+from mlscorr.estimate.tied import sample
+from mlscorr.pos import stated_sigma
 from mlscorr.survey import Matched, Pos, Trajectory
 from mlscorr.wording import percent
 
@@ -186,9 +189,10 @@ def _reason(observed, names, time, drive, share, limit, passes):
             f"Between {names[after - 1]} ({time - times[after - 1]:.0f} s before) and "
             f"{names[after]} ({times[after] - time:.0f} s after)"
         )
+    elif after == 0:
+        where = f"Before the first control point, {names[0]}, by {times[0] - time:.0f} s"
     else:
-        side, near = ("Before the first", 0) if after == 0 else ("After the last", -1)
-        where = f"{side} control point, {names[near]}, by {abs(time - times[near]):.0f} s"
+        where = f"After the last control point, {names[-1]}, by {time - times[-1]:.0f} s"
     often = f", seen by {passes} passes" if passes > 1 else ""
     if share[0] == share[1]:
         before = "as before"
@@ -236,3 +240,164 @@ def _passing(trajectory, equations, row):
     is_new = (np.diff(near) > 1) | np.isin(near[:-1], ends)
     parts = np.split(near, np.flatnonzero(is_new) + 1)
     return [int(part[np.argmin(away[part])]) for part in parts]
+
+
+@dataclass(frozen=True)
+class Outlook:
+    """The corrected position at some epochs, and targets that might be observed.
+
+    Parameters
+    ----------
+    weights : (f,) array
+        Of families of covariances; their sum is 1.
+    covariances : (f, q, q) array
+        Of what is left of the position at k epochs, 3 rows each, and of what targets show. Units:
+        m^2.
+    epochs : int
+        k.
+    targets : tuple of (r,) int array
+        Rows of each target.
+    noise : tuple of (r, r) array
+        Covariance of its survey and extraction. Units: m^2.
+    """
+
+    weights: np.ndarray
+    covariances: np.ndarray
+    epochs: int
+    targets: tuple[np.ndarray, ...]
+    noise: tuple[np.ndarray, ...]
+
+    @classmethod
+    def of(
+        cls,
+        equations: Equations,
+        families: list[tuple[SignalParameters, float]],
+        rows: np.ndarray,
+        sights: list[list[int]],
+    ) -> Outlook:
+        """Before any of them is observed.
+
+        Parameters
+        ----------
+        equations : Equations
+        families : list of (SignalParameters, weight)
+        rows : (k,) int array
+            Of the trajectory's epochs.
+        sights : list of lists of int
+            Epochs at which each target would be seen: as far and as well as the median control
+            point, on its side.
+        """
+        thinned = with_fewer_rows(equations)
+        at_target = np.concatenate(sights)
+        still = np.tile(np.eye(3, 6), (len(rows), 1, 1))
+        moved = np.concatenate([still, _target_partials(equations, at_target)])
+        at = np.concatenate([rows, at_target])
+        weights = np.array([weight for _, weight in families])
+        shown = [_shown(equations, chosen, at, moved) for chosen, _ in families]
+        covariances = np.stack(
+            [
+                covariance_given(thinned.rows(chosen), [part], thinned.believed(chosen))
+                for (chosen, _), part in zip(families, shown, strict=True)
+            ]
+        )
+        ends = 3 * (len(rows) + np.cumsum([len(sight) for sight in sights]))
+        targets = [np.arange(end - 3 * len(s), end) for end, s in zip(ends, sights, strict=True)]
+        noise = [_target_noise(equations.noise, len(equations.names), len(s)) for s in sights]
+        return cls(weights / weights.sum(), covariances, len(rows), tuple(targets), tuple(noise))
+
+    @property
+    def variance(self) -> np.ndarray:
+        """3D variance (k,) of the corrected position at the epochs. Units: m^2."""
+        diagonal = np.einsum("f,fii->i", self.weights, self.covariances)
+        return diagonal[: 3 * self.epochs].reshape(-1, 3).sum(axis=1)
+
+    def with_target(self, number: int) -> Outlook:
+        """The same with a target observed (Eq. 15, for one more observation).
+
+        Parameters
+        ----------
+        number : int
+            Of the target.
+        """
+        columns = self.covariances[:, :, self.targets[number]]
+        known = np.linalg.solve(self._observed(number), columns.swapaxes(1, 2))
+        return replace(self, covariances=self.covariances - columns @ known)
+
+    def best(self, counted: np.ndarray) -> int:
+        """Number of the target that lowers the variance most, by the first family.
+
+        Parameters
+        ----------
+        counted : (k,) bool array
+            Epochs that count.
+        """
+        rows = np.repeat(counted, 3).nonzero()[0]
+        gains = []
+        for number, columns in enumerate(self.targets):
+            cross = self.covariances[0][np.ix_(rows, columns)]
+            gains.append(np.sum(cross * np.linalg.solve(self._observed(number)[0], cross.T).T))
+        return int(np.argmax(gains))
+
+    def _observed(self, number):
+        """Covariances (f, r, r) of a target's observations."""
+        rows = self.targets[number]
+        return self.covariances[:, rows[:, None], rows] + self.noise[number]
+
+
+def with_fewer_rows(equations: Equations) -> Equations:
+    """The equations with some of the ties and targets, each as precise as those it stands for.
+
+    Parameters
+    ----------
+    equations : Equations
+    """
+    room = SETTINGS.dense_rows
+    if equations.ties is not None:
+        some = sample(equations)
+        share = len(some.ties) / len(equations.ties)
+        equations = replace(some, ties=replace(some.ties, variance=share * some.ties.variance))
+        room -= len(equations.ties)
+    step = -(-equations.misclosure.size // max(room, 1))
+    if step == 1:
+        return equations
+    thinned = equations.select(np.arange(0, len(equations.names), step))
+    noise = thinned.noise
+    own = noise.own / step
+    if noise.shared is None:
+        shared = None
+    else:
+        shared = noise.shared / np.sqrt(step)
+    return replace(thinned, noise=Noise(own, noise.group, shared))
+
+
+def _shown(equations, parameters, rows, partials):
+    """SparseRows of what is corrected of points with partials (n, 3, 6) at epochs."""
+    times = equations.trajectory.gps_time[rows]
+    n = len(rows)
+    noise = Noise(np.zeros((n, 3, 3)))
+    design = equations.pose_design(times)[:, :3]
+    signals = pose_signals(equations.stated_epochs.at(rows), parameters, partials)
+    return SparseRows(times[:, None], np.zeros((n, 3)), noise, design, signals)
+
+
+def _target_partials(equations, rows):
+    """Partials (n, 3, 6) of targets that are seen as the median control point, at epochs."""
+    trajectory = equations.trajectory
+    n = len(equations.names)
+    turned = stated_sigma(trajectory, equations.pos, equations.observed).rotation.as_matrix()
+    arm = np.median(turned.swapaxes(1, 2) @ equations.partials[:n, :, 3:] @ turned, axis=0)
+    attitude = trajectory.attitude[rows].as_matrix()
+    still = np.tile(np.eye(3), (len(rows), 1, 1))
+    return np.concatenate([still, attitude @ arm @ attitude.swapaxes(1, 2)], axis=2)
+
+
+def _target_noise(noise, n, sights):
+    """Covariance of a target's observations at some sights, by medians of the n control points'.
+
+    Of their variances alone: medians of whole matrices, element by element, can be no covariance.
+    """
+    own = np.diag(np.median(np.diagonal(noise.own[:n], axis1=1, axis2=2), axis=0))
+    usual = np.zeros((1, 3))
+    if noise.shared is not None:
+        usual = np.median(noise.shared[noise.group[:n]], axis=0)[None]
+    return Noise(np.tile(own, (sights, 1, 1)), np.zeros(sights, int), usual).matrix

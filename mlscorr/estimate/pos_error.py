@@ -1,4 +1,7 @@
-"""From misclosures to the corrected trajectory."""
+"""From misclosures to the corrected trajectory (Mao et al. 2015, section 2.4.2).
+
+Control points alone come first, then ties; other orders of the trend stand beside the one in use.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -7,27 +10,61 @@ from functools import cached_property
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from mlscorr.collocation import Collocation
 from mlscorr.correction import Correction
 from mlscorr.estimate._prediction import GridPredictions, pose_rows, predict_pose_error
-from mlscorr.estimate._refusals import weighed_refusals
-from mlscorr.estimate._runs import find_windows, with_windows
-from mlscorr.estimate._screening import Screening, screen
+from mlscorr.estimate._runs import find_windows, weighed_refusals, with_windows
 from mlscorr.estimate._tie_equations import TieEquations
-from mlscorr.estimate._tie_weights import robust_ties
-from mlscorr.estimate.assembly import position_equations, with_fallbacks, with_mountings
-from mlscorr.estimate.equations import Equations
+from mlscorr.estimate._wording import sentences_of
+from mlscorr.estimate.equations import (
+    NO_TREND,
+    Equations,
+    position_equations,
+    with_fallbacks,
+    with_mountings,
+)
 from mlscorr.estimate.guards import Guards, find_guards, guard_warnings, sparse_warnings
 from mlscorr.estimate.inputs import checked_inputs, filled_sigmas
 from mlscorr.estimate.mounting import prior_sigma
-from mlscorr.estimate.orders import Alternative, affordable_order, compare_orders, leave_targets_out
 from mlscorr.estimate.outages import with_drift_history
-from mlscorr.estimate.prior import position_prior
+from mlscorr.estimate.posterior import Objective, most_probable, position_prior
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.signals import SignalParameters
 from mlscorr.estimate.support import Support, find_support
-from mlscorr.estimate.target_tests import TargetTest
-from mlscorr.estimate.tied import TieResiduals, screen_with_ties
-from mlscorr.survey import Matched, Mounting, Pos, Summary, Ties, Trajectory
+from mlscorr.estimate.target_tests import Screening, TargetTest, screen
+from mlscorr.estimate.tied import TieResiduals, robust_ties, screen_with_ties
+from mlscorr.survey import (
+    Matched,
+    Mounting,
+    Pos,
+    Statement,
+    Summary,
+    Ties,
+    Trajectory,
+    control_epochs,
+)
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """A trend's order and a covariance family with its most probable parameters.
+
+    Parameters
+    ----------
+    order : int
+    parameters : SignalParameters
+    log_likelihood : float
+    probability : float
+        Among all alternatives.
+    leave_one_out : (3,) array
+        RMSE. Units: m.
+    """
+
+    order: int
+    parameters: SignalParameters
+    log_likelihood: float
+    probability: float
+    leave_one_out: np.ndarray
 
 
 @dataclass(frozen=True, repr=False)
@@ -50,8 +87,8 @@ class Estimate(Summary):
     guards : Guards
     support : Support
         Where control points and ties hold the correction, and where it is extrapolated.
-    notes : tuple of str
-        Sentences on what was put in.
+    notes : tuple of Statement
+        On what was put in.
     ties : TieResiduals, optional
         What is left of the ties that were given.
     untied : str
@@ -67,7 +104,7 @@ class Estimate(Summary):
     sigma0: float
     guards: Guards
     support: Support
-    notes: tuple[str, ...]
+    notes: tuple[Statement, ...]
     ties: TieResiduals | None = None
     untied: str = ""
 
@@ -104,15 +141,19 @@ class Estimate(Summary):
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences that a user should read."""
-        return (
-            *self.notes,
-            *self._guard_warnings(),
-            *self.screening.warnings,
-            *(() if self.ties is None else self.ties.warnings),
-        )
+        return sentences_of(self.statements)
 
-    def _guard_warnings(self):
-        return guard_warnings(self.guards, self.equations, self.parameters)
+    @property
+    def statements(self) -> tuple[Statement, ...]:
+        """What is doubtful."""
+        statements = [
+            *self.notes,
+            *guard_warnings(self.guards, self.equations, self.parameters),
+            *self.screening.warnings,
+        ]
+        if self.ties is not None:
+            statements += self.ties.statements
+        return tuple(statements)
 
     @cached_property
     def alternatives(self) -> tuple[Alternative, ...]:
@@ -146,12 +187,41 @@ def estimate_correction(
     ValueError
         Without any observation, and for sigmas that can't be.
     """
-    pos = Pos() if pos is None else pos
+    pos = pos or Pos()
     filled, notes = checked_inputs(trajectory, matched, pos, order)
     equations, screening, windows = _screened(filled, matched, pos, order)
     kept = equations.without({outlier.name for outlier in screening.outliers})
-    notes = (*notes, *map(str, windows), *sparse_warnings(kept, order))
+    notes = (
+        *notes,
+        *(window.statement for window in windows),
+        *sparse_warnings(kept, order),
+    )
     return _estimate(trajectory, matched.name, GridPredictions(kept), screening, notes)
+
+
+def _screened(trajectory, matched, pos, order):
+    """Equations, their Screening, and the windows of drift that runs of rejected targets show."""
+    windows = ()
+    more = ()
+    plain = None
+    for _ in range(SETTINGS.rounds):
+        windows += more
+        if windows:
+            raised = with_windows(trajectory, windows)
+        else:
+            raised = trajectory
+        equations = position_equations(raised, matched, pos, order, position_prior)
+        equations = replace(equations, order=affordable_order(order, equations))
+        equations = with_drift_history(equations)
+        plain = plain or equations
+        screening = screen(equations)
+        more = find_windows(equations, screening)
+        if not more:
+            break
+    weighed = weighed_refusals(equations, plain, screening, len(windows))
+    if screening.outliers and not weighed.outliers:
+        return plain, weighed, ()
+    return equations, weighed, windows
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
@@ -171,7 +241,7 @@ def believed_correction(trajectory: Trajectory, pos: Pos | None = None) -> Estim
         To which ties can be added: then passes come together, and where they are is what the POS
         says.
     """
-    pos = Pos() if pos is None else pos
+    pos = pos or Pos()
     filled, notes = filled_sigmas(trajectory)
     equations = position_equations(filled, Matched.none(), pos, 0, position_prior)
     equations = with_fallbacks(equations, equations.stated.history.steps)
@@ -257,7 +327,8 @@ def _estimate(trajectory, names, predictions, screening, notes):
     parameters = posterior.modes[0][0]
     solved = predictions.take(parameters)
     left_out = np.full((len(names), 3), np.nan)
-    left_out[used] = leave_targets_out(kept, solved) if len(kept.target_rows) > 1 else np.nan
+    if len(kept.target_rows) > 1:
+        left_out[used] = leave_targets_out(kept, solved)
     pose_error = predict_pose_error(kept, posterior, predictions, solved)
     correction = Correction.by_pose_error(trajectory, *pose_error)
     return Estimate(
@@ -274,26 +345,69 @@ def _estimate(trajectory, names, predictions, screening, notes):
     )
 
 
-def _screened(trajectory, matched, pos, order):
-    """Equations, their Screening, and the windows of drift that runs of rejected targets show."""
-    windows = ()
-    more = ()
-    plain = None
-    for _ in range(SETTINGS.rounds):
-        windows += more
-        if windows:
-            raised = with_windows(trajectory, windows)
+def compare_orders(
+    equations: Equations, families: Sequence[tuple[SignalParameters, float]]
+) -> tuple[Alternative, ...]:
+    """Alternatives of all families, for no trend and all orders up to one above that in use.
+
+    Parameters
+    ----------
+    equations : Equations
+    families : sequence of (SignalParameters, float)
+        Most probable parameters of each family at the order in use.
+    """
+    order = equations.order
+    # Blocks have trends of their own, which can't be compared; ties tell none
+    is_alone = len(equations.names) > SETTINGS.block or equations.ties is not None
+    orders = [order] if is_alone else range(NO_TREND, order + 2)
+    start = [chosen for chosen, _ in families]
+    rows = []
+    for tried in orders:
+        with_order = replace(equations, order=tried)
+        objective = Objective.of(with_order)
+        if tried == order:
+            modes = families
         else:
-            raised = trajectory
-        equations = position_equations(raised, matched, pos, order, position_prior)
-        equations = replace(equations, order=affordable_order(order, equations))
-        equations = with_drift_history(equations)
-        plain = equations if plain is None else plain
-        screening = screen(equations)
-        more = find_windows(equations, screening)
-        if not more:
-            break
-    weighed = weighed_refusals(equations, plain, screening, len(windows))
-    if screening.outliers and not weighed.outliers:
-        return plain, weighed, ()
-    return equations, weighed, windows
+            modes = most_probable(with_order, start)
+        for chosen, _ in modes:
+            value = objective(chosen.family, objective.logarithms(chosen))
+            solved = with_order.solve(chosen)
+            left = np.sqrt(np.mean(leave_targets_out(with_order, solved) ** 2, axis=0))
+            rows.append((tried, chosen, solved.log_likelihood, value, left))
+    share = np.exp([row[3] - max(row[3] for row in rows) for row in rows])
+    share /= share.sum()
+    return tuple(
+        Alternative(tried, chosen, float(likelihood), float(probability), left)
+        for (tried, chosen, likelihood, _, left), probability in zip(rows, share, strict=True)
+    )
+
+
+def affordable_order(order: int, equations: Equations) -> int:
+    """The order that leaves one control epoch more than the trend needs.
+
+    Parameters
+    ----------
+    order : int
+        As asked for.
+    equations : Equations
+    """
+    sizes = len(equations.target_rows), len(control_epochs(equations.observed))
+    return max(min(order, min(sizes) - 2), 0)
+
+
+def leave_targets_out(equations: Equations, solved: Collocation) -> np.ndarray:
+    """Misclosures (n, 3) that remain when each target in turn takes no part. Units: m.
+
+    Parameters
+    ----------
+    equations : Equations
+    solved : Collocation
+
+    Returns
+    -------
+    (n, 3) array
+    """
+    residuals = np.empty(3 * len(equations.names))
+    for rows in equations.target_rows.values():
+        residuals[rows] = solved.leave_out(rows)[0]
+    return residuals.reshape(-1, 3)

@@ -72,7 +72,6 @@ class Settings:
     heaviest: float = 5.0  # times the mean weight: one point in the tail can't stand for all
     least_parameter_weight: float = 1e-3  # of parameters whose prediction is worth the work
     prediction_epochs: int = 300  # for the parameters' spread, which changes as slowly as sigmas
-    smallest_sigma: float = 1e-12  # m, rad: for what the POS claims to know perfectly; guard
 
     # The mounting
     mounting_iterations: int = 10  # of Gauss-Newton; a boresight wrong by degrees needs four

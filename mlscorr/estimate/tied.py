@@ -8,26 +8,24 @@ Black and Rangarajan 1996), then Student's t in turn with the restricted likelih
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import ndtri
 
+from mlscorr.collocation import INTEGRATED, Collocation, reweight
 from mlscorr.correction import Correction, increments_by_scanner
 from mlscorr.estimate._prediction import GridPredictions
-from mlscorr.estimate._screening import Screening, may_go
 from mlscorr.estimate._tie_equations import TieEquations
-from mlscorr.estimate._tie_weights import robust_ties, solved_ties, student
 from mlscorr.estimate.equations import Equations
 from mlscorr.estimate.outages import with_likely_starts
 from mlscorr.estimate.posterior import Objective, Posterior, choose_parameters
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.signals import SignalParameters
-from mlscorr.estimate.target_tests import all_tests
-from mlscorr.survey import Ties
+from mlscorr.estimate.target_tests import Screening, all_tests, may_go
+from mlscorr.survey import Statement, Ties
 
-WRONG_BUT_USED = "It is used, as too few are left to tell which point is wrong"
 MEDIAN = float(ndtri(0.75))  # of the absolute value of a standard normal variable
 
 
@@ -82,16 +80,11 @@ class TieResiduals:
         return None
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """A sentence where no tie was used."""
+    def statements(self) -> tuple[Statement, ...]:
+        """A warning where no tie was used."""
         if self.used.any():
             return ()
-        return (
-            f"None of the {len(self.ties)} ties between passes was used: more than half of them "
-            "contradict the others, or all of them several control points. Did the street change "
-            "between the passes, is the mounting wrong (mlscorr calibrate), or does the scanner's "
-            "own encoder turn by another scale (milliradians per radian)?",
-        )
+        return (Statement("no tie used", "warning", {"ties": len(self.ties)}),)
 
 
 @dataclass(frozen=True)
@@ -180,22 +173,18 @@ def screen_with_ties(
         outliers=(*screening.outliers, *rejected),
         warnings=(
             *screening.warnings,
-            *(_contradiction(test, "It takes no part") for test in rejected),
-            *(_contradiction(test, WRONG_BUT_USED) for test in doubtful),
+            *(_contradiction(test, is_used=False) for test in rejected),
+            *(_contradiction(test, is_used=True) for test in doubtful),
         ),
     )
     return predictions, changed, tied.used
 
 
-def _contradiction(test, what):
-    """A sentence on a control point that ties and the other points contradict."""
+def _contradiction(test, is_used):
+    """A Statement on a control point that ties and the other points contradict."""
     worst = test.left_out[np.linalg.norm(test.left_out, axis=1).argmax()]
-    off = "/".join(f"{value:.3f}" for value in worst)
-    return (
-        f"Control point {test.name} contradicts what ties carry to it from the other control "
-        f"points: it is {off} m (E/N/H) off that, statistic {test.statistic:.1f} against "
-        f"{test.critical:.1f}. {what}: survey it again, or see by --no-ties whether ties are wrong."
-    )
+    values = {**test.document(), "misclosure": tuple(worst.tolist()), "is_used": is_used}
+    return Statement("contradicts ties", "warning", values)
 
 
 def sample(tied: Equations) -> Equations:
@@ -215,3 +204,133 @@ def sample(tied: Equations) -> Equations:
     number = min(3 * intervals // 2, SETTINGS.dense_rows - tied.misclosure.size)
     step = -(-len(tied.ties) // max(number, SETTINGS.tie_sample))
     return replace(tied, ties=tied.ties.select(slice(None, None, step)))
+
+
+@dataclass(frozen=True)
+class WeighedTies:
+    """Equations with robust weights of ties, solved.
+
+    Parameters
+    ----------
+    equations : Equations
+        With ties.
+    parameters : SignalParameters
+    solved : Collocation
+        By both.
+    first : (n,) array
+        Weights of the ties when the equations were solved first; others are put beside these.
+    """
+
+    equations: Equations
+    parameters: SignalParameters
+    solved: Collocation
+    first: np.ndarray
+
+    @property
+    def ties(self) -> TieEquations:
+        """The ties with their weights."""
+        ties = self.equations.ties
+        assert ties is not None
+        return ties
+
+    @property
+    def ratio(self) -> np.ndarray:
+        """Residuals (n,) of the ties over their sigmas."""
+        variance = self.ties.variance / self.ties.weight
+        residual = variance * self.solved.weights[-len(self.ties) :]  # N V^-1 (l - A x)
+        return residual / np.sqrt(self.ties.variance)
+
+    def graded(self, functions: Iterable[Callable]) -> WeighedTies:
+        """With weights by each function of the residuals in turn.
+
+        Parameters
+        ----------
+        functions : iterable of function
+            Of residuals over their sigmas (n,).
+        """
+        weighed = self
+        for function in functions:
+            weight = np.maximum(function(weighed.ratio), SETTINGS.resolution)
+            tied = replace(weighed.equations, ties=replace(weighed.ties, weight=weight))
+            both = [np.ones(len(tied.gps_time)), weight / self.first]
+            weighed = replace(weighed, equations=tied, solved=reweight(weighed.solved, both))
+        return weighed
+
+
+def robust_ties(
+    equations: Equations, parameters: SignalParameters, ties: TieEquations
+) -> WeighedTies:
+    """The equations with graduated weights of ties, under those parameters by which more hold.
+
+    Few control points may choose drift that is too slow or too small; then ties that agree with
+    each other contradict it. So they are also weighed by what is believed without control.
+
+    Parameters
+    ----------
+    equations : Equations
+        Of the control points.
+    parameters : SignalParameters
+        That these chose.
+    ties : TieEquations
+    """
+    weighed = graduated(equations, parameters, ties)
+    held = _held(weighed)
+    if held == len(ties):
+        return weighed
+    prior = Objective((), weighed.equations.prior(weighed.equations))
+    other = graduated(equations, prior.parameters(INTEGRATED, prior.initial), ties)
+    if _held(other) > held:
+        return other
+    return weighed
+
+
+def _held(weighed):
+    """Number of ties that hold."""
+    least = _geman_mcclure(SETTINGS.tie_cut)(SETTINGS.tie_cut)
+    return np.count_nonzero(weighed.ties.weight > least)
+
+
+def graduated(
+    equations: Equations, parameters: SignalParameters, ties: TieEquations
+) -> WeighedTies:
+    """The equations with ties, whose weights' scale has shrunk from all to the honest ones.
+
+    Parameters
+    ----------
+    equations : Equations
+        Without ties.
+    parameters : SignalParameters
+    ties : TieEquations
+    """
+    weighed = solved_ties(replace(equations, ties=ties), parameters)
+    largest = float(np.abs(weighed.ratio).max(initial=0.0))
+    steps = max(int(np.ceil(np.log2(max(largest, 1.0) / SETTINGS.tie_cut))), 1)
+    scales = SETTINGS.tie_cut * 2.0 ** np.arange(steps)[::-1]
+    return weighed.graded(_geman_mcclure(scale) for scale in scales)
+
+
+def solved_ties(tied: Equations, parameters: SignalParameters) -> WeighedTies:
+    """Equations with ties, solved as they are.
+
+    Parameters
+    ----------
+    tied : Equations
+    parameters : SignalParameters
+    """
+    assert tied.ties is not None
+    return WeighedTies(tied, parameters, tied.solve(parameters), tied.ties.weight)
+
+
+def _geman_mcclure(scale: float) -> Callable:
+    return lambda ratio: (1.0 + (ratio / scale) ** 2) ** -2.0
+
+
+def student(ratio: np.ndarray) -> np.ndarray:
+    """Weights (n,) of Student's t for residuals over their sigmas.
+
+    Parameters
+    ----------
+    ratio : (n,) array
+    """
+    freedom = SETTINGS.tie_freedom
+    return (freedom + 1.0) / (freedom + ratio**2)

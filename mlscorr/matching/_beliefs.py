@@ -97,7 +97,8 @@ def transition(chain: Chain, start: int, end: int) -> np.ndarray:
             decay = np.exp(-abs(step))
             matrix[m, 1, 1] = (1.0 + abs(step)) * decay
             matrix[m, 1, 2] = step * decay
-            matrix[m, 2, 1], matrix[m, 2, 2] = -step * decay, (1.0 - abs(step)) * decay
+            matrix[m, 2, 1] = -step * decay
+            matrix[m, 2, 2] = (1.0 - abs(step)) * decay
     return matrix
 
 

@@ -103,14 +103,15 @@ def match(
     order = np.argsort(observations.gps_time, kind="stable")
     ordered = observations[order]
     pose = trajectory.at(ordered.gps_time)
-    pos = Pos() if pos is None else pos
+    pos = pos or Pos()
     stated = stated_sigma(trajectory, pos, ordered.gps_time)
     pairs = find_pairs(ordered, control, search_radius)
     decision = _decide(build_chain(ordered, control, pose, stated, pairs, pos), len(control))
     refusals, reasons = explain(ordered, control, pairs, decision, search_radius)
     rank = np.argsort(order)
     column = decision.column[rank]
-    named = replace(observations, name=tuple(control.name[c] if c >= 0 else None for c in column))
+    known = (*control.name, None)  # the last, -1, of what has no name
+    named = replace(observations, name=tuple(known[c] for c in column))
     elsewhere = decision.moved(pairs)[rank]
     names = tuple(control.name[c] for c in elsewhere[elsewhere >= 0])
     moved = replace(observations[elsewhere >= 0], name=names)

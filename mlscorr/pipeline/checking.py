@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mlscorr.estimate import SETTINGS, checked_inputs, few_targets
+from mlscorr.estimate import SETTINGS, checked_inputs, few_targets, sentences_of
 from mlscorr.evaluate import DatumDifference, datum_differences, outside_warnings
 from mlscorr.io.clouds import (
     cloud_box,
@@ -216,7 +216,7 @@ def _looked(
     """
     if needs_control:
         faults.of("data", check_control, survey)
-        faults.warn(*few_targets(len(survey.control)))
+        faults.warn(*sentences_of(few_targets(len(survey.control))))
     faults.warn(*reuse_warnings(survey))
     if not len(survey.surveyed):
         return None, None, False, [], ("Targets in the cloud: the survey has no control.",)

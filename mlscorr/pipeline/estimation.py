@@ -200,13 +200,13 @@ def estimate_together(
     if features is None:
         return replace(estimate, untied=LEFT_OUT)
     estimate = tie_passes(survey, estimate, features)
-    sentences = ()  # on mountings, where the ties tell of wrong ones
+    wrong = ()  # of mountings, where the ties tell of it
     if estimate.equations.mounting is not None:
-        sentences = tuple(scanner_warnings(estimate, list(survey.by_scanner)))
-    if not sentences and None not in survey.mountings:  # all of them may be wrong alike
+        wrong = tuple(scanner_warnings(estimate, list(survey.by_scanner)))
+    if not wrong and None not in survey.mountings:  # all of them may be wrong alike
         error = find_mounting_error(estimate, control, survey.mountings)
-        sentences = mounting_warnings(error, len(survey.mountings))
-    return replace(estimate, notes=(*estimate.notes, *sentences))
+        wrong = mounting_warnings(error, len(survey.mountings))
+    return replace(estimate, notes=(*estimate.notes, *wrong))
 
 
 def control_score(estimate: Estimate, control: Matched) -> Score:

@@ -7,8 +7,7 @@ within moments, by a step that no vehicle drives. Across it drift starts anew, a
 the drift had grown to.
 """
 
-from mlscorr.pos.changes import runs
-from mlscorr.pos.history import drift_history
+from mlscorr.pos.history import drift_history, runs
 from mlscorr.pos.settings import SETTINGS
 from mlscorr.pos.stated import StatedSigma, stated_sigma
 from mlscorr.pos.steps import Steps, find_steps

@@ -173,6 +173,8 @@ def stated_sigma(
     else:
         pose = trajectory.at(gps_time)
     history = drift_history(trajectory)
+    if starts is None:
+        starts = history.starts
     shape = (len(pose.gps_time), 3)
     position = np.full(shape, pos.position_sigma)
     angles = pose.attitude_sigma
@@ -199,7 +201,7 @@ def stated_sigma(
         added=added,
         drift=drift,
         history=history,
-        starts=history.starts if starts is None else starts,
+        starts=starts,
     )
 
 

@@ -79,7 +79,8 @@ def beams_at_plane(
 @njit(cache=True, error_model="numpy")
 def _beams_near(xyz, gps_time, path, tolerance, place):
     """Rows (k,) of these beams, and which of them ended on the plane: thousands of calls look."""
-    (origin, axes, middle, radius), (epochs, scanner) = place, path
+    origin, axes, middle, radius = place
+    epochs, scanner = path
     rows = np.empty(len(xyz), np.int64)
     on_plane = np.empty(len(xyz), np.bool_)
     count = 0

@@ -106,7 +106,11 @@ def fit_outline(
     width = size.mean / SETTINGS.first_blur
     mean = trials.mean(axis=0)
     spread = np.ptp(trials, axis=0) / 2
-    rounds = SETTINGS.rough_rounds * (1 + (form == shapes.CHECKERED) if rough else 5)
+    rounds = SETTINGS.rough_rounds
+    if not rough:
+        rounds *= 5
+    elif form == shapes.CHECKERED:
+        rounds *= 2
     for number in range(1, rounds + 1):
         near = _informative(points, mean, spread, form, max(width, blur))
         if width > blur:
@@ -182,8 +186,11 @@ def _weights(value):
         weight /= weight.sum()
         effective = 1 / (weight @ weight)
         if effective >= SETTINGS.least_effective_share * len(value) or power < 1e-6:
-            return weight, effective if power == 1.0 else 0.0
+            break
         power *= 0.7
+    if power < 1.0:
+        effective = 0.0
+    return weight, effective
 
 
 def _moments(trials, weight, period):

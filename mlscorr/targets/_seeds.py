@@ -78,9 +78,16 @@ def bright_seeds(echoes: Echoes, kind: str, size: float | None) -> Iterator[Seed
     size : float or None
         Of any extent where it is None. Units: m.
     """
-    for guess in SETTINGS.size_guesses if size is None else (size,):
+    for guess in _guesses(size):
         for level, rows in bright_components(echoes.xyz, echoes.intensity, guess):
             yield from _bright_parts(echoes, rows, level, kind, size, guess)
+
+
+def _guesses(size):
+    """Sizes (m) that are looked for where a target's own is not known."""
+    if size is None:
+        return SETTINGS.size_guesses
+    return (size,)
 
 
 def plate_seeds(
@@ -96,7 +103,7 @@ def plate_seeds(
         Of any extent where it is None. Units: m.
     rng : numpy.random.Generator
     """
-    for guess in SETTINGS.size_guesses if size is None else (size,):
+    for guess in _guesses(size):
         for plane, rows in flat_patches(echoes, guess, rng):
             points = plane.crossing(echoes.xyz[rows], echoes.sight(rows))
             for share in SETTINGS.link_shares:
@@ -238,9 +245,12 @@ def _gaps(echoes, plane, points, size):
         return
     a, b, c = np.moveaxis(known[Delaunay(known).simplices], 1, 0)
     centre, radius = _circumcircles(a, b, c)
-    low, high = (SETTINGS.thickness, 0.75) if size is None else (0.4 * size, 0.75 * size)
     if size is None:
-        low = max(low, 2.5 * float(np.median(radius)))
+        low = max(SETTINGS.thickness, 2.5 * float(np.median(radius)))
+        high = 0.75
+    else:
+        low = 0.4 * size
+        high = 0.75 * size
     order = np.argsort(-radius)
     order = order[(radius[order] >= low) & (radius[order] <= high)]
     centres = []

@@ -1,14 +1,17 @@
-"""Pass 1 over the cloud: the points near each control point, whatever the file's size."""
+"""Pass 1 over the cloud: the points near each control point, whatever the file's size.
+
+Control points stand in balls; a raster of what reaches where finds the points of a chunk in each.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+from numba import njit
 
 from mlscorr.io import SETTINGS as IO
 from mlscorr.matching import SETTINGS as MATCHING
 from mlscorr.survey import ControlPoints, PointCloud, Survey
-from mlscorr.targets.balls import Neighbourhoods
 
 NO_POINTS = PointCloud(np.empty((0, 3)), np.empty(0), np.empty(0, np.uint16))
 
@@ -53,75 +56,6 @@ def search_radius(survey: Survey, points: ControlPoints) -> np.ndarray:
     points : ControlPoints
     """
     return survey.search_radius + points.size * np.sqrt(2)
-
-
-class PointsInBalls:
-    """Points of a file in balls, in the parts in which they were read, until a ball is passed.
-
-    Parameters
-    ----------
-    balls : Neighbourhoods
-    """
-
-    def __init__(self, balls: Neighbourhoods):
-        self._balls = balls
-        self._parts = []
-        self._read = 0
-        self._first = np.full(len(balls.position), np.inf)
-        self._last = -self._first
-        self._size, self._taken = np.zeros((2, len(balls.position)), int)
-
-    def __len__(self):
-        return sum(len(part) for _, part, _ in self._parts)
-
-    def add(self, cloud: PointCloud) -> None:
-        """Hold points, each in a ball at least."""
-        self._read, counts = self._read + 1, np.zeros(len(cloud), np.uint16)
-        for ball, rows in enumerate(self._balls.each(cloud.xyz)):
-            time = cloud.gps_time[rows]
-            self._first[ball] = min(self._first[ball], time.min(initial=np.inf))
-            self._last[ball] = max(self._last[ball], time.max(initial=-np.inf))
-            self._size[ball] += len(rows)
-            counts[rows] += 1
-        self._parts.append((self._read, cloud, counts))
-
-    def since(self) -> float:
-        """Time of the oldest point. Units: s."""
-        return float(self._first.min(initial=np.inf))
-
-    def passed(self, before: float) -> np.ndarray:
-        """Numbers (k,) of the balls with points of which none is later than a time (s).
-
-        Those of fewest points come first: when the largest is taken, little else is held.
-        """
-        numbers = np.flatnonzero((self._last > -np.inf) & (self._last < before))
-        return numbers[np.argsort(self._size[numbers], kind="stable")]
-
-    def take(self, number: int) -> PointCloud:
-        """Points in a ball from its middle (m), as they were read.
-
-        Those that no other ball waits for are let go of part by part, as dense balls are large.
-        """
-        ball = self._balls[np.array([number])]
-        size = self._size[number]
-        end = 0
-        kind = self._parts[0][1].intensity.dtype
-        cloud = PointCloud(np.empty((size, 3)), np.empty(size), np.empty(size, kind))
-        for place, (read, part, counts) in enumerate(self._parts):
-            if read > self._taken[number]:
-                rows = ball.contains(part.xyz)
-                there = slice(end, end := end + len(rows))
-                np.subtract(part.xyz[rows], ball.position, out=cloud.xyz[there])
-                cloud.gps_time[there] = part.gps_time[rows]
-                cloud.intensity[there] = part.intensity[rows]
-                counts[rows] -= 1
-                if not (kept := counts > 0).all():
-                    self._parts[place] = read, part[kept], counts[kept]
-        self._parts = [entry for entry in self._parts if len(entry[1])]
-        self._first[number] = np.inf
-        self._last[number] = -np.inf
-        self._size[number], self._taken[number] = 0, self._read
-        return cloud
 
 
 def collect(
@@ -207,3 +141,167 @@ def number_passes(starts: dict[tuple[int, int], float]) -> dict[tuple[int, int],
         When each begins. Units: s.
     """
     return {key: i for i, key in enumerate(sorted(starts, key=starts.get), start=1)}
+
+
+class Neighbourhoods:
+    """Balls about places: a raster of what reaches their squares first, then exact distances.
+
+    Parameters
+    ----------
+    position : (b, 3) array
+        Units: m.
+    radius : (b,) array
+        Units: m.
+    """
+
+    def __init__(self, position: np.ndarray, radius: np.ndarray):
+        self.position = np.ascontiguousarray(position, float)
+        self.radius = radius
+        margin = radius[:, None] * (1 + 1e-9)  # distances alone decide, not what is rounded here
+        ends = [self.position[:, :2] + sign * margin for sign in (-1, 1)]
+        low = ends[0].min(axis=0, initial=np.inf)
+        extent = ends[1].max(axis=0, initial=-np.inf) - low
+        edge = max(1.0, float(np.sqrt(max(extent.prod(), 0.0) / IO.chunk_points)))
+        first, last = (np.floor((end - low) / edge).astype(int) for end in ends)
+        shape = last.max(axis=0, initial=-1) + 1
+        self._raster = low, edge, shape, *_reaching(first, last, shape)
+
+    def __getitem__(self, numbers: np.ndarray) -> "Neighbourhoods":
+        return Neighbourhoods(self.position[numbers], self.radius[numbers])
+
+    def contains(self, xyz: np.ndarray) -> np.ndarray:
+        """Rows (k,) of the points in any ball, in order.
+
+        Parameters
+        ----------
+        xyz : (n, 3) array
+            Units: m.
+        """
+        return np.flatnonzero(np.bincount(np.concatenate([np.empty(0, int), *self.each(xyz)])))
+
+    def each(self, xyz: np.ndarray) -> list[np.ndarray]:
+        """Rows of the points within each ball, in order.
+
+        Parameters
+        ----------
+        xyz : (n, 3) array
+            Units: m.
+        """
+        balls = self._raster, self.position, self.radius**2
+        xyz = np.ascontiguousarray(xyz)
+        counts = np.zeros(len(self.position), int)
+        _enter(xyz, *balls, counts, np.empty(0, int))
+        ends = np.cumsum(counts)
+        rows = np.empty(counts.sum(), int)
+        _enter(xyz, *balls, ends - counts, rows)
+        if len(ends):
+            return np.split(rows, ends[:-1])
+        return []
+
+
+def _reaching(first, last, shape):
+    """Numbers of the balls that reach each cell, cell by cell, and where those of a cell start."""
+    cells = [
+        np.arange(x, east + 1)[:, None] * shape[1] + np.arange(y, north + 1)
+        for (x, y), (east, north) in zip(first, last, strict=True)
+    ]
+    ball = np.repeat(np.arange(len(cells)), [part.size for part in cells])
+    cell = np.concatenate([np.empty(0, int), *map(np.ravel, cells)])
+    starts = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=shape.prod()))])
+    return starts, ball[np.argsort(cell, kind="stable")]
+
+
+@njit(cache=True)
+def _enter(xyz, raster, position, squares, free, rows):
+    """Enter the row of each point at the free place of each ball it is in, or count them alone
+    where there is no room.
+    """
+    low, edge, shape, starts, balls = raster
+    for i in range(len(xyz)):
+        x = (xyz[i, 0] - low[0]) / edge
+        y = (xyz[i, 1] - low[1]) / edge
+        if not (x >= 0 and y >= 0 and x < shape[0] and y < shape[1]):
+            continue
+        cell = int(x) * shape[1] + int(y)
+        for k in range(starts[cell], starts[cell + 1]):
+            ball = balls[k]
+            apart = 0.0
+            for axis in range(3):
+                apart += (xyz[i, axis] - position[ball, axis]) ** 2
+            if apart <= squares[ball]:
+                if len(rows) > 0:
+                    rows[free[ball]] = i
+                free[ball] += 1
+
+
+class PointsInBalls:
+    """Points of a file in balls, in the parts in which they were read, until a ball is passed.
+
+    Parameters
+    ----------
+    balls : Neighbourhoods
+    """
+
+    def __init__(self, balls: Neighbourhoods):
+        self._balls = balls
+        self._parts = []
+        self._read = 0
+        self._first = np.full(len(balls.position), np.inf)
+        self._last = -self._first
+        self._size, self._taken = np.zeros((2, len(balls.position)), int)
+
+    def __len__(self):
+        return sum(len(part) for _, part, _ in self._parts)
+
+    def add(self, cloud: PointCloud) -> None:
+        """Hold points, each in a ball at least."""
+        self._read += 1
+        counts = np.zeros(len(cloud), np.uint16)
+        for ball, rows in enumerate(self._balls.each(cloud.xyz)):
+            time = cloud.gps_time[rows]
+            self._first[ball] = min(self._first[ball], time.min(initial=np.inf))
+            self._last[ball] = max(self._last[ball], time.max(initial=-np.inf))
+            self._size[ball] += len(rows)
+            counts[rows] += 1
+        self._parts.append((self._read, cloud, counts))
+
+    def since(self) -> float:
+        """Time of the oldest point. Units: s."""
+        return float(self._first.min(initial=np.inf))
+
+    def passed(self, before: float) -> np.ndarray:
+        """Numbers (k,) of the balls with points of which none is later than a time (s).
+
+        Those of fewest points come first: when the largest is taken, little else is held.
+        """
+        numbers = np.flatnonzero((self._last > -np.inf) & (self._last < before))
+        return numbers[np.argsort(self._size[numbers], kind="stable")]
+
+    def take(self, number: int) -> PointCloud:
+        """Points in a ball from its middle (m), as they were read.
+
+        Those that no other ball waits for are let go of part by part, as dense balls are large.
+        """
+        ball = self._balls[np.array([number])]
+        size = self._size[number]
+        end = 0
+        kind = self._parts[0][1].intensity.dtype
+        cloud = PointCloud(np.empty((size, 3)), np.empty(size), np.empty(size, kind))
+        for place, (read, part, counts) in enumerate(self._parts):
+            if read > self._taken[number]:
+                rows = ball.contains(part.xyz)
+                there = slice(end, end + len(rows))
+                end += len(rows)
+                np.subtract(part.xyz[rows], ball.position, out=cloud.xyz[there])
+                cloud.gps_time[there] = part.gps_time[rows]
+                cloud.intensity[there] = part.intensity[rows]
+                counts[rows] -= 1
+                kept = counts > 0
+                if not kept.all():
+                    self._parts[place] = read, part[kept], counts[kept]
+        self._parts = [entry for entry in self._parts if len(entry[1])]
+        self._first[number] = np.inf
+        self._last[number] = -np.inf
+        self._size[number] = 0
+        self._taken[number] = self._read
+        return cloud

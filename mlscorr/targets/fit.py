@@ -8,12 +8,11 @@ import numpy as np
 
 from mlscorr.matching import SETTINGS as MATCHING
 from mlscorr.survey import PointCloud, Scanner
-from mlscorr.targets._centre import Centre, centre_of
 from mlscorr.targets._echoes import Echoes
 from mlscorr.targets._outline import Outline
+from mlscorr.targets._plane import Plane
 from mlscorr.targets._seeds import Seed, bright_seeds, hole_seeds, plate_seeds, region_seeds
 from mlscorr.targets._shape_fit import ShapeFit, exact_fit, rough_fit
-from mlscorr.targets.intensity import why_useless
 from mlscorr.targets.regions import BrightRegion
 from mlscorr.targets.scanner_path import ScannerPath
 from mlscorr.targets.settings import SETTINGS
@@ -40,6 +39,31 @@ class TargetView:
     state: np.ndarray
     outline: Outline
     axes: np.ndarray
+
+
+@dataclass(frozen=True)
+class Centre:
+    """Where and when a beam meets the centre of an outline in a plane.
+
+    Parameters
+    ----------
+    position : (3,) array
+        Units: m.
+    covariance : (3, 3) array
+        Units: m^2.
+    gps_time : float
+        Units: s.
+    duration : float
+        Standard deviation of the points' times. Units: s.
+    normal : (3,) array
+        Towards the scanner.
+    """
+
+    position: np.ndarray
+    covariance: np.ndarray
+    gps_time: float
+    duration: float
+    normal: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -152,6 +176,30 @@ def fit_targets(
     ]
 
 
+def why_useless(intensity: np.ndarray) -> str | None:
+    """Sentence for intensities that tell no bright target; None where they can.
+
+    Parameters
+    ----------
+    intensity : (n,) array
+        8 bits in 16 are no reason: only ratios count.
+
+    >>> import numpy as np
+    >>> why_useless(np.zeros(1000))
+    'The intensity of all points is 0.'
+    >>> why_useless(np.r_[np.full(900, 20), np.arange(50, 150)]) is None
+    True
+    """
+    values = np.unique(intensity)
+    if len(values) == 0:
+        return "The intensity of all points is missing."
+    if len(values) == 1:
+        return f"The intensity of all points is {values[0]:g}."
+    if len(values) < SETTINGS.smallest_levels:
+        return f"The intensity takes only {len(values)} values."
+    return None
+
+
 def fit_seeds(
     echoes: Echoes,
     seeds: Sequence[tuple[Seed, str, float | None]],
@@ -179,7 +227,9 @@ def fit_seeds(
                 continue
             if any(_is_settled(fit, *seed) for fit in rough):
                 waiting.append(seed)
-            elif (fit := rough_fit(echoes, *seed)) is not None:
+                continue
+            fit = rough_fit(echoes, *seed)
+            if fit is not None:
                 rough.append(fit)
         best = _best(rough)
         exact = [exact_fit(echoes, fit, scanner) for fit in best]
@@ -237,7 +287,11 @@ def _as_target(echoes, fit, origin):
     met = rows[fit.on_target & (rows >= 0)]
     intensity = echoes.intensity[met].astype(float)
     centre = vars(centre_of(echoes, plane, outline, met))
-    size, sigma = (outline.size, outline.size_sigma) if fit.size is None else (fit.size, 0.0)
+    size = fit.size
+    sigma = 0.0
+    if size is None:
+        size = outline.size
+        sigma = outline.size_sigma
     return FittedTarget(
         **centre | {"position": centre["position"] + origin},
         kind=fit.kind,
@@ -248,3 +302,58 @@ def _as_target(echoes, fit, origin):
         cloud=PointCloud(echoes.xyz[met] + origin, echoes.gps_time[met], intensity),
         view=TargetView(points, state, outline, plane.axes[:2]),
     )
+
+
+def centre_of(echoes: Echoes, plane: Plane, outline: Outline, rows: np.ndarray) -> Centre:
+    """Centre of an outline in space from the points on the target.
+
+    Parameters
+    ----------
+    echoes : Echoes
+    plane : Plane
+    outline : Outline
+    rows : (k,) int array
+        Points on the target.
+
+    Height and time there follow by regression, as the points may lie on one side of it. A plane
+    too far moves the centre along the beam. Range noise may be correlated from point to point,
+    which plain sigmas of a fit overlook: the residuals tell by how much.
+    """
+    crossing = plane.crossing(echoes.xyz[rows], echoes.sight(rows))
+    weights = np.linalg.pinv(np.column_stack([np.ones(len(rows)), crossing - outline.centre]))[0]
+    height = plane.coordinates(echoes.xyz[rows])[:, 2]
+    free = max(len(rows) - 3, 1)
+    variance = plane.sigma**2 * (free + 2) / free * _correlation_factor(height)
+    beam = plane.axes @ echoes.sight(rows).mean(axis=0)
+    covariance = variance * (weights @ weights) * np.outer(beam, beam) / beam[2] ** 2
+    covariance[:2, :2] += outline.covariance
+    time = echoes.gps_time[rows] - echoes.gps_time[0]
+    span = echoes.gps_time[[0, -1]] - echoes.gps_time[0]
+    normal = plane.axes[2]
+    if beam[2] > 0:
+        normal = -normal
+    floor = (SETTINGS.rounding / 3) ** 2  # what rounding leaves in a mean of many points
+    return Centre(
+        position=plane.origin + outline.centre @ plane.axes[:2],
+        covariance=plane.axes.T @ covariance @ plane.axes + floor * np.eye(3),
+        gps_time=float(echoes.gps_time[0] + np.clip(weights @ time, *span)),
+        duration=float(time.std()),
+        normal=normal,
+    )
+
+
+def _correlation_factor(residual):
+    """By how much correlation from point to point raises the variance of a mean, at least 1.
+
+    Source: 1 + 2 sum of the autocorrelation up to where it is lost in its own noise.
+    """
+    n = len(residual)
+    centred = residual - residual.mean()
+    total = centred @ centred
+    factor = 1.0
+    for lag in range(1, n // 4):
+        correlation = centred[lag:] @ centred[:-lag] / max(total, 1e-30)
+        if correlation < 2 / np.sqrt(n):
+            break
+        factor += 2 * correlation
+    return factor

@@ -39,7 +39,9 @@ def diameter(kind: str, size: float) -> float:
     size : float
         Units: m.
     """
-    return size * (1.0 if FORMS[kind] == ROUND else np.sqrt(2))
+    if FORMS[kind] == ROUND:
+        return size
+    return size * np.sqrt(2)
 
 
 def sides(state: np.ndarray, kind: str, by_edges: bool) -> np.ndarray:

@@ -3,8 +3,7 @@
 Pairs and corrections come in turn: what the first pairs correct shows which are pairs at all.
 """
 
-from mlscorr.ties._coarse_mounting import coarse_mounting, remounted
-from mlscorr.ties._tied_mounting import tie_mounting
+from mlscorr.ties._tied_mounting import coarse_mounting, remounted, tie_mounting
 from mlscorr.ties._tied_passes import tie_passes
 from mlscorr.ties.agreement import (
     consistent_ties,

@@ -268,6 +268,7 @@ class CellTable:
         rows : (count,) bool array
         """
         rest = np.flatnonzero(~rows)
-        self.keys[: len(rest)], self.moments[: len(rest)] = self.keys[rest], self.moments[rest]
+        self.keys[: len(rest)] = self.keys[rest]
+        self.moments[: len(rest)] = self.moments[rest]
         self.count = len(rest)
         self._table = hash_rows(self.keys, self.count, 2 * len(self.keys))

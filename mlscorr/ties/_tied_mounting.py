@@ -1,8 +1,11 @@
 """Mountings by ties: paired while these may be wrong by degrees, and paired again, ever nearer."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.linalg import block_diag
+from scipy.spatial.transform import Rotation
 
 from mlscorr.correction import increments_by_scanner
 from mlscorr.estimate import (
@@ -11,12 +14,13 @@ from mlscorr.estimate import (
     mounted_corrections,
     previewed_mounting,
 )
-from mlscorr.survey import Matched, Survey, TieFeatures
-from mlscorr.ties._coarse_mounting import coarse_mounting, remounted, turned_directions
-from mlscorr.ties._gates import narrowest_gate, placed_sigma, widest_gate
-from mlscorr.ties.pairing import pair_features
+from mlscorr.frames import georeferenced_anew, mounting_partials, partials_by_scanner
+from mlscorr.survey import PAINTED, Matched, Mounting, Survey, TieFeatures, Trajectory
+from mlscorr.ties.agreement import narrowest_gate, placed_sigma, widest_gate
+from mlscorr.ties.pairing import candidate_pairs, pair_features
 from mlscorr.ties.search import agreeing_ties
 from mlscorr.ties.settings import SETTINGS
+from mlscorr.ties.thinning import some_blocks
 
 
 def tie_mounting(
@@ -72,3 +76,143 @@ def tie_mounting(
         if radius <= limit:
             return calibration_with_ties(calibration, matched, ties)
         radius = max(radius / 2, limit)
+
+
+def coarse_mounting(
+    features: TieFeatures,
+    trajectory: Trajectory,
+    mountings: Sequence[Mounting],
+    sigma: np.ndarray,
+    radius: float,
+) -> tuple[Mounting, ...]:
+    """Mountings of k scanners that put the planes of all visits on each other.
+
+    One lever arm and one boresight of each scanner for the whole survey, and a shift of each pass,
+    are looked for together: a shift of each stretch of time would take up what a boresight does,
+    and leave it half unexplained. A scanner that sees nothing twice is held by what others see. All
+    parallel planes within a radius pull, with weights (Geman-McClure) whose width halves, and are
+    paired anew each time. It is a start for pair_features, no more.
+
+    Parameters
+    ----------
+    features : TieFeatures
+        As georeferenced with the recorded mountings.
+    trajectory : Trajectory
+    mountings : sequence of Mounting
+        As recorded, with the covariance of what is known of each.
+    sigma : (n,) array
+        One sigma of the features' places by the POS. Units: m.
+    radius : float
+        Of the search. Units: m.
+    """
+    count = len(mountings)
+    planes = some_blocks(features[features.kind == "plane"], count * SETTINGS.coarse_features)
+    passes = np.unique(planes.pass_number)
+    shift = 0.0
+    if len(sigma):
+        shift = float(np.median(sigma))
+    known = [mounting.covariance for mounting in mountings]
+    each = np.full(3 * len(passes), max(shift, SETTINGS.surface_sigma) ** -2.0)
+    prior = block_diag(*map(np.linalg.inv, known), np.diag(each))
+    turn_sigma = np.sqrt(max(np.diag(covariance)[3:].max() for covariance in known))
+    state = np.zeros(len(prior))
+    width = radius / 2
+    at = tuple(mountings)
+    while width > SETTINGS.roughest:
+        angle = SETTINGS.parallel + 2 * turn_sigma * 2 * width / radius
+        for _ in range(3):
+            moved = remounted(planes, trajectory, mountings, at)
+            shifts = state[6 * count :].reshape(-1, 3)[np.searchsorted(passes, planes.pass_number)]
+            gates = np.full(len(planes), SETTINGS.gate_sigmas * width)
+            pairs, _ = candidate_pairs(moved, shifts, gates, 2 * width, angle=angle)
+            normal = moved.direction[pairs].sum(axis=1)
+            normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+            place = (moved.centre + shifts)[pairs]
+            left = np.einsum("ni,ni->n", normal, place[:, 1] - place[:, 0])
+            design = _design(moved, trajectory, at, passes, pairs, normal)
+            weight = width**2 / (width**2 + left**2) ** 2
+            matrix = (design.T * weight) @ design + prior
+            step = np.linalg.solve(matrix, design.T @ (weight * left) - prior @ state)
+            state = state + step
+            turns = step[: 6 * count].reshape(-1, 6)
+            at = tuple(
+                replace(
+                    mounting,
+                    lever_arm=mounting.lever_arm + turn[:3],
+                    boresight=Rotation.from_rotvec(turn[3:]) * mounting.boresight,
+                )
+                for mounting, turn in zip(at, turns, strict=True)
+            )
+        width /= 2
+    return at
+
+
+def remounted(
+    features: TieFeatures,
+    trajectory: Trajectory,
+    recorded: Sequence[Mounting],
+    mountings: Sequence[Mounting],
+) -> TieFeatures:
+    """Features as other mountings give them: their places and directions  (Eq. 1).
+
+    Parameters
+    ----------
+    features : TieFeatures
+    trajectory : Trajectory
+    recorded, mountings : sequence of Mounting
+        Of each scanner: that of the features, and the other.
+    """
+
+    def move(place, gps_time):
+        sightings = place, gps_time, features.scanner
+        return georeferenced_anew(trajectory, recorded, mountings, *sightings)
+
+    centre = move(features.centre, features.gps_time)
+    return replace(features, centre=centre, direction=turned_directions(features, move))
+
+
+def turned_directions(features: TieFeatures, move: Callable) -> np.ndarray:
+    """Directions (n, 3) of features whose points are moved, each by its own time.
+
+    A wall that a line scanner passes keeps the direction of the way, whatever the boresight: what
+    turns is the scan line.
+
+    Parameters
+    ----------
+    features : TieFeatures
+    move : function of places (n, 3) and times (n,)
+        Gives places. Units: m, s.
+    """
+    axis = features.direction
+    rows = np.arange(len(features))
+    side = np.cross(axis, np.eye(3)[np.abs(axis).argmin(axis=1)])
+    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    centre = move(features.centre, features.gps_time)
+
+    def tangent(unit):
+        way = SETTINGS.narrowest * unit
+        return move(features.centre + way, features.time_beside(rows, way)) - centre
+
+    up = np.array([0.0, 0.0, 1.0])
+    is_plane, is_line = ((features.kind == kind)[:, None] for kind in ("plane", "line"))
+    turned = tangent(np.where(is_line, np.cross(up, axis), axis))
+    turned[np.isin(features.kind, PAINTED), 2] = 0.0
+    turned = np.where(is_line, np.cross(turned, up), turned)
+    turned = np.where(is_plane, np.cross(tangent(side), tangent(np.cross(axis, side))), turned)
+    return turned / np.linalg.norm(turned, axis=1, keepdims=True)
+
+
+def _design(features, trajectory, mountings, passes, pairs, normal):
+    """Rows of pairs: n (first - second) of the k mountings and of p passes' shifts (6 k + 3 p)."""
+    first = 2 * len(mountings)
+    numbered = dict(enumerate(mountings))
+    rows = np.zeros((len(pairs), first + len(passes), 3))
+    number = np.searchsorted(passes, features.pass_number[pairs])
+    for view, sign in ((0, 1.0), (1, -1.0)):
+        columns = features.centre, features.gps_time, features.scanner
+        sightings = (column[pairs[:, view]] for column in columns)
+        partials = partials_by_scanner(mounting_partials, trajectory, numbered, *sightings)
+        along = np.einsum("ni,nij->nj", normal, partials)
+        rows[:, :first] += sign * along.reshape(len(pairs), first, 3)
+        rows[np.arange(len(pairs)), first + number[:, view]] += sign * normal
+    return rows.reshape(len(pairs), 3 * rows.shape[1])

@@ -6,9 +6,14 @@ from dataclasses import replace
 import numpy as np
 
 from mlscorr.estimate import Estimate, previewed_correction, with_ties
-from mlscorr.survey import Survey, TieFeatures, Ties, time_spans
-from mlscorr.ties._gates import narrowest_gate, placed_sigma, widest_gate
-from mlscorr.ties.agreement import unheld_directions, unheld_sentence
+from mlscorr.survey import Statement, Survey, TieFeatures, Ties, time_spans
+from mlscorr.ties.agreement import (
+    narrowest_gate,
+    placed_sigma,
+    unheld_directions,
+    unheld_sentence,
+    widest_gate,
+)
 from mlscorr.ties.coarse import coarse_correction
 from mlscorr.ties.pairing import pair_features
 from mlscorr.ties.search import agreeing_ties, least_pause
@@ -93,11 +98,15 @@ def _untied(estimate: Estimate, features: TieFeatures, radius: float) -> Estimat
         "Passes may lie farther apart than the POS states (raise its sigmas, or search_radius of "
         "[matching]), or the mounting be wrong by degrees (mlscorr calibrate)."
     )
-    return replace(estimate, untied=reason, notes=(*estimate.notes, reason))
+    return replace(estimate, untied=reason, notes=(*estimate.notes, _noted(reason)))
 
 
-def _unheld(estimate: Estimate, features: TieFeatures, ties: Ties) -> Iterator[str]:
-    """Sentences on passes between which neither ties nor control of both hold a direction."""
+def _noted(sentence):
+    return Statement("on ties", "warning", {"sentence": sentence})
+
+
+def _unheld(estimate: Estimate, features: TieFeatures, ties: Ties) -> Iterator[Statement]:
+    """Statements on passes between which neither ties nor control of both hold a direction."""
     control = estimate.equations.observed
     first, last = time_spans(features.pass_number, features.gps_time)
 
@@ -106,4 +115,4 @@ def _unheld(estimate: Estimate, features: TieFeatures, ties: Ties) -> Iterator[s
             continue
         spans = zip(first[part.pass_number[0]], last[part.pass_number[0]], strict=True)
         if not all(((control >= begin) & (control <= end)).any() for begin, end in spans):
-            yield unheld_sentence(part, axis)
+            yield _noted(unheld_sentence(part, axis))

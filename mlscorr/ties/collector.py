@@ -7,8 +7,7 @@ import numpy as np
 
 from mlscorr.survey import CloudFile, PointCloud, Survey, TieFeatures, Trajectory
 from mlscorr.ties._cells import CellTable
-from mlscorr.ties._markings import find_markings, window_of
-from mlscorr.ties._paint import Crossings, find_crossings
+from mlscorr.ties._markings import Crossings, find_crossings, find_markings, window_of
 from mlscorr.ties._shapes import find_shapes
 from mlscorr.ties.settings import SETTINGS
 from mlscorr.ties.thinning import thin

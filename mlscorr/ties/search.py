@@ -6,11 +6,15 @@ import numpy as np
 
 from mlscorr.pos import stated_sigma
 from mlscorr.survey import Survey, TieFeatures, Ties, time_spans
-from mlscorr.ties._candidates import visit_number
-from mlscorr.ties._gates import widest_gate
-from mlscorr.ties.agreement import NORMAL_SCATTER, consistent_ties, residuals, weigh_by_time
+from mlscorr.ties.agreement import (
+    NORMAL_SCATTER,
+    consistent_ties,
+    residuals,
+    weigh_by_time,
+    widest_gate,
+)
 from mlscorr.ties.coarse import coarse_correction
-from mlscorr.ties.pairing import pair_features
+from mlscorr.ties.pairing import pair_features, visit_number
 from mlscorr.ties.settings import SETTINGS
 from mlscorr.ties.thinning import thinned_ties
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mlscorr.estimate.mounting_estimate import corrected_mountings
+from mlscorr.estimate.calibration import corrected_mountings
 from mlscorr.frames import georeference, to_scanner
 from mlscorr.survey import Matched, Mounting, Ties, Trajectory
 from tests.beds import tied_site as site

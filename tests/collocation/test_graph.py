@@ -4,9 +4,9 @@ from itertools import combinations
 
 import numpy as np
 
-from mlscorr.collocation._graph import information_edges
 from mlscorr.collocation._knots import Knots, knot_step
 from mlscorr.collocation._states import Layout
+from mlscorr.collocation.linked import information_edges
 from mlscorr.collocation.sparse_rows import Sides
 from tests.collocation.linked_rows import Street
 

@@ -7,7 +7,7 @@ import pytest
 
 from mlscorr.collocation import Noise, collocate_rows
 from mlscorr.collocation._knots import knot_step
-from mlscorr.collocation._steps import LARGEST_SHARE, sufficient_steps
+from mlscorr.collocation.linked import LARGEST_SHARE, sufficient_steps
 from mlscorr.estimate import SETTINGS
 from tests.collocation.joint_states import ALL_FAMILIES
 from tests.collocation.linked_rows import Street

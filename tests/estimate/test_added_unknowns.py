@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mlscorr.estimate import estimate_correction
-from mlscorr.estimate._added_unknowns import AddedUnknowns, with_added
 from mlscorr.estimate._tie_equations import TieEquations
+from mlscorr.estimate.added_unknowns import AddedUnknowns, with_added
 from tests.beds.tied_passes import tied_passes
 
 

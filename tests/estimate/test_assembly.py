@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mlscorr.estimate import estimate_correction, position_equations, position_prior
-from mlscorr.estimate.assembly import _noise, mounting_equations, with_fallbacks
-from mlscorr.estimate.prior import mounting_prior
+from mlscorr.estimate.equations import _noise, mounting_equations, with_fallbacks
+from mlscorr.estimate.posterior import mounting_prior
 from mlscorr.frames import georeference, to_scanner
 from mlscorr.pos import Steps
 from mlscorr.survey import SEARCH_RADIUS, Matched, Mounting, Pos

@@ -16,7 +16,7 @@ from mlscorr.collocation import (
     polynomial_design,
 )
 from mlscorr.estimate import Objective, estimate_correction, with_ties
-from mlscorr.estimate.assembly import with_fallbacks
+from mlscorr.estimate.equations import with_fallbacks
 from mlscorr.estimate.signals import pose_signals
 from mlscorr.estimate.tied import sample
 from mlscorr.pos import Steps

@@ -162,6 +162,7 @@ def test_ranges_of_one_scanner_are_told_from_those_of_the_other():
     lacks = freed.scanner
     assert lacks.significant.tolist() == [False, False, True, False]
     assert abs(lacks.correction[2] - 0.03) < 3 * lacks.sigma[2]
-    assert lacks.of(0).warnings == () and "The scanner itself is off" in lacks.of(1).warnings[0]
+    assert lacks.of(0).statements == ()
+    assert lacks.of(1).statements[0].values["components"] == ("range offset",)
     error = freed.lsc.correction.reshape(2, 6) - LACKS
     assert (np.abs(error) < 3 * freed.lsc.sigma.reshape(2, 6)).all()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mlscorr.estimate.mounting_estimate import (
+from mlscorr.estimate.calibration import (
     MountingEstimate,
     combined_correction,
     corrected_mountings,

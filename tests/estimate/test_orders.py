@@ -8,7 +8,7 @@ from scipy.stats import multivariate_normal
 
 from mlscorr.collocation import polynomial_design
 from mlscorr.estimate import Objective
-from mlscorr.estimate.orders import affordable_order, compare_orders, leave_targets_out
+from mlscorr.estimate.pos_error import affordable_order, compare_orders, leave_targets_out
 from mlscorr.estimate.posterior import most_probable
 from mlscorr.estimate.signals import pose_signals
 from mlscorr.evaluate import model_section
@@ -21,7 +21,7 @@ def test_the_order_falls_with_too_few_control_points(n, order):
     "A trend needs one control point more than parameters per axis; a lowered order is told"
     rng = np.random.default_rng(n)
     estimate = Case(EPOCHS, CONSTANT, even(n), rng).estimate(order=3)
-    lowered = [text for text in estimate.warnings if "too few for a trend of order 3" in text]
+    lowered = [s for s in estimate.statements if s.key == "lowered order"]
     assert estimate.order == order
     assert len(lowered) == (order < 3)
 

@@ -13,7 +13,7 @@ from mlscorr.estimate import (
     with_drift_history,
     with_ties,
 )
-from mlscorr.estimate.assembly import with_fallbacks
+from mlscorr.estimate.equations import with_fallbacks
 from mlscorr.pos import Steps
 from mlscorr.survey import Matched, Pos, Ties, Trajectory
 from tests.beds.lying_pos import START, TIME, survey, walk

@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from mlscorr.collocation import Noise
 from mlscorr.estimate import estimate_correction, with_ties
-from mlscorr.estimate._outlook import Outlook, with_fewer_rows
 from mlscorr.estimate._prediction import predict_under
+from mlscorr.estimate.placement import Outlook, with_fewer_rows
 from tests.beds.tied_passes import tied_passes
 from tests.estimate.test_outages import BELIEVED, START, survey
 from tests.estimate.test_placement import GAPPED, slow_error

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.estimate.orders import leave_targets_out
+from mlscorr.estimate.pos_error import leave_targets_out
 from mlscorr.estimate.signals import pose_signals
 from mlscorr.pos import stated_sigma
 from mlscorr.survey import Pos, Trajectory

@@ -16,8 +16,14 @@ from mlscorr.estimate import (
     position_prior,
 )
 from mlscorr.estimate._tie_equations import TieEquations
-from mlscorr.estimate.posterior import IMPROBABLE, choose_parameters, most_probable
-from mlscorr.estimate.prior import NAMES, Prior, mounting_prior
+from mlscorr.estimate.posterior import (
+    IMPROBABLE,
+    NAMES,
+    Prior,
+    choose_parameters,
+    most_probable,
+    mounting_prior,
+)
 from mlscorr.survey import Pos
 from tests.beds.pos_errors import CONSTANT, EPOCHS, Case, even, smooth_case
 from tests.beds.tied_passes import tied_passes

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mlscorr.estimate import SETTINGS, position_equations, position_prior, with_drift_history
+from mlscorr.estimate import position_equations, position_prior, with_drift_history
 from mlscorr.estimate._prediction import (
     GridPredictions,
     bridge_steps,
@@ -83,7 +83,7 @@ def test_doubt_about_parameters_widens_the_sigma(equations, parameters):
     _, covariance = predict_pose_error(equations, sure((parameters, 0.5), (other, 0.5)))
     spreads = [predict_under(equations, p)[1] for p in (parameters, other)]
     variance = [np.einsum("qii->qi", c)[:, :3] for c in (covariance, *spreads)]
-    rows = np.linspace(0, 2000, SETTINGS.prediction_epochs).round().astype(int)
+    rows = GridPredictions(equations).rows
     mean = (variance[1] + variance[2]) / 2
     assert (variance[0][rows] > (1 - 1e-6) * mean[rows]).all()
 

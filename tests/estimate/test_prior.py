@@ -7,7 +7,7 @@ import pytest
 
 from mlscorr.estimate import position_equations, position_prior
 from mlscorr.estimate.equations import NO_TREND
-from mlscorr.estimate.prior import NAMES, SPLIT, mounting_prior
+from mlscorr.estimate.posterior import NAMES, SPLIT, mounting_prior
 from mlscorr.survey import Pos
 from tests.beds.pos_errors import CONSTANT, EPOCHS, Case, even, outage_case
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mlscorr.estimate import SETTINGS, Objective, position_equations, position_prior
-from mlscorr.estimate._refusals import drift_odds
+from mlscorr.estimate._runs import drift_odds
 from mlscorr.survey import Matched, Pos
 from tests.beds.pos_errors import EPOCHS, Case, even, rms, waves
 
@@ -40,7 +40,8 @@ def test_many_lone_deviations_are_drift():
     within = np.abs(remaining) < 1.96 * estimate.correction.corrected.position_sigma
     assert not estimate.outliers
     assert rms(remaining) < 0.5 * rms(error) and within.mean() > 0.9
-    assert any("T02, T06, T10, T14, T18" in line for line in estimate.warnings)
+    (doubt,) = (s for s in estimate.statements if s.key == "rather drift")
+    assert doubt.values["names"] == ("T02", "T06", "T10", "T14", "T18")
 
 
 def test_two_lone_deviations_of_twenty_are_blunders_rather():

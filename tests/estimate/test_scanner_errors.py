@@ -74,7 +74,7 @@ def test_an_encoder_beyond_any_data_sheet_is_not_pulled_to_it():
     assert lacks.significant.tolist() == [False, True] and not lacks.determined[1]
     assert abs(lacks.correction[1] + 0.005) < 2 * lacks.sigma[1]
     assert (np.abs(freed.lsc.correction - site.lacks) < 2 * freed.lsc.sigma).all()
-    assert "mrad per rad (not determined)." in freed.warnings[-1]
+    assert freed.scanner.statements[0].values["determined"] == (False,)
 
 
 def test_an_encoder_that_looks_like_a_boresight_leaves_it_undetermined():
@@ -96,7 +96,7 @@ def test_an_encoder_that_looks_like_a_boresight_leaves_it_undetermined():
 def test_a_scanner_that_is_right_changes_nothing():
     "No sentence, the same mounting, and values within three sigmas of zero"
     _, tied, freed = calibrated(1)
-    assert not freed.scanner.significant.any() and freed.scanner.warnings == ()
+    assert not freed.scanner.significant.any() and freed.scanner.statements == ()
     assert (np.abs(freed.scanner.correction) < 3 * freed.scanner.sigma).all()
     assert freed.lsc is tied.lsc
 

@@ -92,7 +92,7 @@ def test_times_at_which_nothing_was_scanned_are_not_extrapolated():
     estimate = estimate_correction(trajectory, matched, Pos(position_sigma=0.5))
     spans = [(stretch.start - START, stretch.end - START) for stretch in estimate.support.weak]
     assert np.ravel(spans) == pytest.approx([99.9, 101.0, 179.0, 180.0], abs=0.15)
-    assert not any("extrapolated" in sentence for sentence in estimate.warnings)
+    assert "extrapolated" not in [warning.key for warning in estimate.statements]
     assert estimate.guards.gap[1] - estimate.guards.gap[0] < 8.0
     sigma = largest_sigma(estimate.correction.corrected)
     places = place_control(estimate)

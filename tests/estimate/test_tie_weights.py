@@ -7,7 +7,7 @@ import pytest
 
 from mlscorr.estimate import estimate_correction
 from mlscorr.estimate._tie_equations import TieEquations
-from mlscorr.estimate._tie_weights import graduated, robust_ties, solved_ties, student
+from mlscorr.estimate.tied import graduated, robust_ties, solved_ties, student
 from tests.beds.tied_passes import tied_passes
 
 

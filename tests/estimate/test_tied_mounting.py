@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from mlscorr.estimate import calibration_with_ties, corrected_mounting, estimate_mounting
-from mlscorr.estimate.mounting import linearized
-from mlscorr.estimate.tied_mounting import georeferenced_ties
+from mlscorr.estimate.mounting import georeferenced_ties, linearized
 from tests.beds.tied_site import RECORDED, tied_site
 
 

@@ -99,13 +99,10 @@ def test_what_follows_an_estimate_knows_its_mountings(survey, tied):
 
 
 def test_a_second_scanner_that_lacks_something_is_named(tied):
-    "With the values, and what to do; not a word where both agree"
+    "And not a word where both agree"
     estimate, lacks = tied
-    sentences = list(scanner_warnings(estimate, ["left", "right"]))
-    assert len(sentences) == bool(lacks.any())
-    for sentence in sentences:
-        assert sentence.startswith("Scanner right puts what both see elsewhere than left does")
-        assert "mlscorr calibrate --clouds" in sentence
+    names = [w.values["name"] for w in scanner_warnings(estimate, ["left", "right"])]
+    assert names == ["right"] * bool(lacks.any())
 
 
 @pytest.fixture(scope="module", params=[0.0, 1.0])
@@ -127,7 +124,4 @@ def test_what_such_a_scanner_lacks_is_estimated_and_named(again):
     sigma = np.sqrt(np.diag(solved.trend_covariance)[:6])
     assert (np.abs(solved.trend[:6] - lacks) < 4 * sigma).all()
     assert (sigma[[3, 5]] < np.radians(0.1)).all()
-    sentences = list(scanner_warnings(estimate, [""]))
-    assert len(sentences) == bool(lacks.any())
-    for sentence in sentences:
-        assert sentence.startswith("The scanner puts what it sees twice elsewhere the second time")
+    assert len(list(scanner_warnings(estimate, [""]))) == bool(lacks.any())

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from mlscorr.matching import SETTINGS
-from mlscorr.matching._branching import best_of_each, merge, use
 from mlscorr.matching._hypotheses import log_likelihoods, start
+from mlscorr.matching._marginals import best_of_each, merge, use
 from tests.matching.test_marginals import small_chain
 
 

@@ -5,7 +5,6 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from mlscorr.matching import SETTINGS
-from mlscorr.matching._branching import use
 from mlscorr.matching._hypotheses import (
     displacement,
     log_likelihoods,
@@ -13,6 +12,7 @@ from mlscorr.matching._hypotheses import (
     select,
     start,
 )
+from mlscorr.matching._marginals import use
 from tests.matching.test_marginals import small_chain
 
 

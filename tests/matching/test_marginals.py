@@ -12,9 +12,8 @@ import pytest
 from mlscorr.collocation import Covariance
 from mlscorr.matching import SETTINGS, match
 from mlscorr.matching._beliefs import Chain, build_chain
-from mlscorr.matching._branching import use
 from mlscorr.matching._hypotheses import predict, start
-from mlscorr.matching._marginals import join, marginals
+from mlscorr.matching._marginals import join, marginals, use
 from mlscorr.matching._pairs import CandidatePairs, find_pairs
 from mlscorr.matching.settings import settings_tuple
 from mlscorr.pos import stated_sigma

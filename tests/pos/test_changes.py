@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mlscorr.pos import find_steps, runs
-from mlscorr.pos.changes import quick_changes, timely_sigma
+from mlscorr.pos.history import quick_changes, timely_sigma
 from mlscorr.survey import Trajectory
 
 # s, m

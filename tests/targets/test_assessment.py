@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from mlscorr.targets import ScannerPath
-from mlscorr.targets._assessment import assess
 from mlscorr.targets._echoes import Echoes
 from mlscorr.targets._outline import Outline
 from mlscorr.targets._seeds import Seed
+from mlscorr.targets._shape_fit import assess
 from mlscorr.targets.shapes import BRIGHT, DARK
 from tests.targets.planes import plane_through
 

@@ -56,7 +56,7 @@ def near(survey, read):
 
 
 def test_collect_by_chunks_is_the_whole():
-    "Chunks of 700 points, few held, hand on what one does; the third ball is in a gap: unplaced"
+    "Chunks of 700 points hand on what one does; the third ball is in a gap: unplaced"
     rng = np.random.default_rng(1)
     elapsed = np.sort(rng.uniform(0, 100, 20_000))
     xyz = ORIGIN + np.outer(elapsed, [0.0, 10.0, 0.0]) + rng.uniform(-5, 5, (20_000, 3))

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mlscorr.targets import SETTINGS, why_useless
+from mlscorr.targets import why_useless
 
 
 def test_why_useless_names_the_reason():
@@ -20,8 +20,8 @@ def test_levels_count_and_not_points(levels):
     "Three levels of a million points are a class; four of a few points may tell bright from dark"
     values = np.resize(np.arange(levels) * 1000, 1_000 * levels)
     told = why_useless(values)
-    assert (told is None) == (levels >= SETTINGS.smallest_levels)
-    if 1 < levels < SETTINGS.smallest_levels:
+    assert (told is None) == (levels >= 4)
+    if 1 < levels < 4:
         assert told == f"The intensity takes only {levels} values."
 
 

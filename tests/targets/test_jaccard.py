@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mlscorr.targets._jaccard import jaccard_index
+from mlscorr.targets.regions import jaccard_index
 
 # m, of length to width, of the search
 LONGEST = 1.0

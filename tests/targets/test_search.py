@@ -9,7 +9,7 @@ import pytest
 from mlscorr.frames import attitude_from_angles
 from mlscorr.survey import ControlPoints, PointCloud, Survey, Trajectory
 from mlscorr.targets import SETTINGS, distinct, search_targets
-from mlscorr.targets.search import _end_of, pieces
+from mlscorr.targets.extract import _end_of, pieces
 
 ORIGIN = np.array([532_000.0, 3_374_000.0, 42.0])  # m, UTM
 START = 413_200.0  # s

@@ -5,7 +5,7 @@ from scipy.spatial.transform import Rotation
 from mlscorr.frames import attitude_from_angles
 from mlscorr.survey import Mounting, PointCloud, Pos, Scanner, Survey, Trajectory
 from mlscorr.targets import ScannerPath
-from mlscorr.targets._visits import motion_covariance, split_visits
+from mlscorr.targets.scanner_path import motion_covariance, split_visits
 from tests.targets.test_extract import control_point
 
 ORIGIN = np.array([523_000.0, 3_378_000.0, 42.0])  # m, UTM

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mlscorr.targets._voxels import key_of, neighbours, number_voxels, sort_by_voxel
+from mlscorr.targets._clusters import key_of, neighbours, number_voxels, sort_by_voxel
 
 
 def test_voxels_are_numbered_once_and_know_their_neighbours():

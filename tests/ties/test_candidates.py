@@ -7,7 +7,7 @@ import pytest
 
 from mlscorr.survey import TIE_KINDS
 from mlscorr.ties import SETTINGS
-from mlscorr.ties._candidates import candidate_pairs, visit_number
+from mlscorr.ties.pairing import candidate_pairs, visit_number
 from tests.ties.test_pairing import walls
 
 

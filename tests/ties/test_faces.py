@@ -5,7 +5,7 @@ import pytest
 
 from mlscorr.survey import PointCloud
 from mlscorr.ties._cells import CellTable
-from mlscorr.ties._faces import join_across_faces
+from mlscorr.ties._shapes import join_across_faces
 
 # m, s
 ORIGIN = np.array([447_000.0, 5_410_000.0, 120.0])

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from mlscorr.ties import TieCollector
-from mlscorr.ties._markings import find_markings
-from mlscorr.ties._paint import Crossings, find_crossings
+from mlscorr.ties._markings import Crossings, find_crossings, find_markings
 from tests.beds import painted_roads as road
 from tests.ties.test_collector import assert_same
 

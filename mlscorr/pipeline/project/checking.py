@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from mlscorr.estimate import few_targets
+from mlscorr.estimate import few_targets, sentences_of
 from mlscorr.io.store import glance
 from mlscorr.io.surveys import ProjectParts, read_project, stated_project
 from mlscorr.pipeline.checking import CheckedSurvey, checked_survey
@@ -94,7 +94,7 @@ def _check_control(project, checked, faults):
     near = {name for survey, _ in checked for name in survey.surveyed.name}
     names = [*project.control.name, *project.check.name]
     held = near.intersection(project.control.name)
-    faults.warn(*few_targets(len(held)))
+    faults.warn(*sentences_of(few_targets(len(held))))
     faults.of("data", stages.check_control_near, project, [survey for survey, _ in checked])
     if held and (far := [name for name in names if name not in near]):
         faults.warn(

@@ -1,0 +1,307 @@
+"""Further unknowns that explain what trend and signals leave (Baarda's alternative hypothesis).
+
+They are more columns M of A; with P = V^-1 - V^-1 A (A'V^-1 A)^-1 A'V^-1, which the solver applies
+to any misclosures, they are (M'PM)^-1 M'Pl (Mao et al. 2015, Eq. 13-18):
+
+- ranges and encoder of scanners beside their mountings. An offset of all ranges pushes both sides
+  of the street outward, where a lever arm moves them one way; a wrong scale of the encoder turns
+  what lies far from the zero beam. (An offset of the encoder turns all about the scanner's axis, as
+  a boresight does, and is part of that.)
+- mountings beside a correction: drift depends on time, a boresight's part on the direction of
+  travel, so ties tell whether passes disagree as a wrong mounting makes them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import compress
+
+import numpy as np
+from scipy.special import chdtri
+from threadpoolctl import threadpool_limits
+
+from mlscorr.correction import Correction
+from mlscorr.estimate._prediction import predict_pose_error
+from mlscorr.estimate._tie_equations import along_ties, mounting_columns
+from mlscorr.estimate.calibration import (
+    MOUNTING_COMPONENTS,
+    SCANNER_COMPONENTS,
+    Calibration,
+    MountingEstimate,
+    ScannerErrors,
+    combined_correction,
+)
+from mlscorr.estimate.equations import Equations
+from mlscorr.estimate.mounting import is_determined, prior_sigma, with_shift
+from mlscorr.estimate.pos_error import Estimate
+from mlscorr.estimate.settings import SETTINGS
+from mlscorr.estimate.signals import SignalParameters
+from mlscorr.frames import (
+    georeferenced_anew,
+    mounting_partials,
+    partials_by_scanner,
+    scanner_partials,
+)
+from mlscorr.survey import Matched, Mounting, Statement
+
+
+@dataclass(frozen=True)
+class AddedUnknowns:
+    """What k further unknowns are, and whether that is chance.
+
+    Parameters
+    ----------
+    correction : (k,) array
+    covariance : (k, k) array
+    response : (p, k) array
+        Of the trend: by how much a unit of each would change it, where it is left out.
+    trend_variance : (p,) array
+        Of the trend beside them.
+    statistic, critical : float
+        Chi-squared of k degrees of freedom, and its critical value.
+    """
+
+    correction: np.ndarray
+    covariance: np.ndarray
+    response: np.ndarray
+    trend_variance: np.ndarray
+    statistic: float
+    critical: float
+
+    @classmethod
+    def of(
+        cls,
+        equations: Equations,
+        parameters: SignalParameters,
+        columns: np.ndarray,
+        prior_sigma: np.ndarray,
+    ) -> AddedUnknowns:
+        """Estimate the unknowns.
+
+        Parameters
+        ----------
+        equations : Equations
+            Of n + h epochs and m ties, or none.
+        parameters : SignalParameters
+        columns : (3 (n + h) + m, k) array
+            Partial derivatives of the misclosures by the unknowns.
+        prior_sigma : (k,) array
+            One sigma of what is known of them without the survey.
+        """
+        solved = equations.solve(parameters)
+        white = solved.solver.whiten(np.column_stack([solved.design, columns]))
+        trend, added = np.split(white, [solved.design.shape[1]], axis=1)
+        response = solved.trend_covariance @ trend.T @ added  # Eq. 13 of each column
+        weights = solved.solver.solve(columns - solved.design @ response)  # P M
+        covariance = np.linalg.inv(columns.T @ weights + np.diag(prior_sigma**-2.0))
+        right = weights.T @ solved.misclosure
+        correction = covariance @ right
+        critical = float(chdtri(len(correction), SETTINGS.significance))
+        beside = np.diag(solved.trend_covariance + response @ covariance @ response.T)
+        return cls(correction, covariance, response, beside, float(right @ correction), critical)
+
+    @property
+    def sigma(self) -> np.ndarray:
+        """One sigma (k,) of the correction."""
+        return np.sqrt(np.diag(self.covariance))
+
+    def is_wrong(self, least: np.ndarray) -> np.ndarray:
+        """Which unknowns (k,) are significant, and large enough to matter.
+
+        Parameters
+        ----------
+        least : (k,) array
+            Below it none matters.
+        """
+        size = np.abs(self.correction)
+        is_large = size > np.maximum(SETTINGS.setup_sigmas * self.sigma, least)
+        return is_large & (self.statistic > self.critical)
+
+
+def with_added(equations: Equations, added: np.ndarray) -> Equations:
+    """The same equations with something added to their misclosures.
+
+    Parameters
+    ----------
+    equations : Equations
+    added : (3 (n + h) + m,) array
+        To those of epochs, then of ties. Units: m.
+    """
+    epochs, of_ties = np.split(added, [equations.misclosure.size])
+    ties = equations.ties
+    if ties is not None:
+        ties = replace(ties, misclosure=ties.misclosure + of_ties)
+    misclosure = equations.misclosure + epochs.reshape(-1, 3)
+    return replace(equations, misclosure=misclosure, ties=ties)
+
+
+@threadpool_limits.wrap(limits=1, user_api="blas")
+def with_scanner_errors(calibration: Calibration, matched: Matched) -> Calibration:
+    """The calibration with what ranges and encoder lack, and free of it where that is significant.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        With ties or without.
+    matched : Matched
+        Its control points, as georeferenced with the recorded mounting.
+    """
+    columns = _columns(calibration, matched[calibration.used])
+    equations = calibration.equations
+    parameters = calibration.parameters[0][0]
+    known = SETTINGS.unmeasured_scanner, SETTINGS.least_scanner_error
+    prior, least = (np.tile(sigma, len(calibration.recorded)) for sigma in known)
+    lacks = AddedUnknowns.of(equations, parameters, columns, prior)
+    is_wrong = lacks.is_wrong(least)
+    correction = lacks.correction
+    sigma = lacks.sigma
+    if not is_wrong.any():
+        errors = ScannerErrors(correction, sigma, sigma < least, is_wrong)
+        return replace(calibration, scanner=errors)
+    columns = columns[:, is_wrong]
+    # An error that data sheets rule out is no draw from what they state: it is not held to that
+    free = np.full(is_wrong.sum(), np.inf)
+    lacks = AddedUnknowns.of(equations, parameters, columns, free)
+    shifted = AddedUnknowns.of(with_shift(equations), parameters, columns, free).trend_variance
+    determined = calibration.determined & is_determined(shifted[: len(calibration.determined)])
+    correction[is_wrong] = lacks.correction
+    sigma[is_wrong] = lacks.sigma
+    equations = with_added(equations, -columns @ lacks.correction)
+    pose_error = predict_pose_error(equations, calibration.posterior)
+    freed = replace(
+        calibration,
+        equations=equations,
+        drift=Correction.by_pose_error(calibration.trajectory, *pose_error),
+        determined=determined,
+        lsc=_without(calibration.recorded, calibration.lsc, lacks),
+        scanner=ScannerErrors(correction, sigma, sigma < least, is_wrong),
+    )
+    residuals = calibration.ties
+    if residuals is None:
+        return freed
+    return freed.with_residuals(residuals.ties, residuals.used)
+
+
+def _columns(calibration, targets):
+    """Partial derivatives of all misclosures by ranges and encoder: of targets, then of ties."""
+    equations = calibration.equations
+    mountings = calibration.lsc.mountings
+    trajectory = equations.trajectory
+    numbered = dict(enumerate(mountings))
+
+    def partials(place, *sighting):
+        place = georeferenced_anew(trajectory, calibration.recorded, mountings, place, *sighting)
+        return partials_by_scanner(scanner_partials, trajectory, numbered, place, *sighting)
+
+    number = len(SCANNER_COMPONENTS) * len(mountings)
+    control = np.zeros((*equations.misclosure.shape, number))
+    sightings = targets.observations.position, targets.gps_time, targets.scanner
+    control[: len(targets)] = partials(*sightings)
+    control = control.reshape(-1, number)
+    if equations.ties is None:
+        return control
+    ties = calibration.ties.ties[calibration.ties.used]
+    views = partials(ties.place.reshape(-1, 3), ties.gps_time.ravel(), ties.scanner.ravel())
+    return np.vstack([control, along_ties(ties.direction, views).sum(axis=1)])
+
+
+def _without(recorded, estimate, lacks):
+    """The estimate of mountings that took a part of what ranges and encoders lack."""
+    taken = lacks.response[: len(estimate.correction)]
+    correction = combined_correction(estimate.correction, -taken @ lacks.correction)
+    covariance = estimate.covariance + taken @ lacks.covariance @ taken.T
+    return MountingEstimate.about(recorded, correction, covariance, estimate.sigma0)
+
+
+@threadpool_limits.wrap(limits=1, user_api="blas")
+def find_mounting_error(
+    estimate: Estimate, matched: Matched, mountings: Sequence[Mounting]
+) -> AddedUnknowns | None:
+    """Test the recorded mountings by the ties of a correction; None without any.
+
+    Lever arm (m) and boresight (rad) about right, forward, up are the unknowns, of all scanners
+    alike: what one lacks beside another is in the estimate.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        With ties.
+    matched : Matched
+        Its control points.
+    mountings : sequence of Mounting
+        Of all scanners, as recorded.
+    """
+    equations = estimate.equations
+    residuals = estimate.ties
+    if equations.ties is None or residuals is None:
+        return None
+    used = residuals.ties[residuals.used]
+    targets = matched[estimate.used]
+    trajectory = equations.trajectory
+    numbered = dict(enumerate(mountings))
+    ties = mounting_columns(trajectory, numbered, used)
+    control = np.zeros((len(equations.gps_time), 3, ties.shape[1]))
+    sightings = targets.observations.position, targets.gps_time, targets.scanner
+    control[: len(targets)] = partials_by_scanner(
+        mounting_partials, trajectory, numbered, *sightings
+    )
+    columns = np.vstack([control.reshape(-1, ties.shape[1]), ties])
+    sums = columns.reshape(len(columns), len(mountings), 6).sum(axis=1)
+    return AddedUnknowns.of(equations, estimate.parameters, sums, prior_sigma(mountings[0]))
+
+
+def mounting_warnings(check: AddedUnknowns | None, scanners: int = 1) -> tuple[Statement, ...]:
+    """A Statement where a wrong mounting is significant, and large enough to matter.
+
+    Parameters
+    ----------
+    check : AddedUnknowns, optional
+        Of find_mounting_error.
+    scanners : int
+        Number of scanners.
+    """
+    if check is None:
+        return ()
+    is_wrong = check.is_wrong(np.repeat(SETTINGS.determined_sigma, 3))
+    if not is_wrong.any():
+        return ()
+    values = {
+        "components": tuple(compress(MOUNTING_COMPONENTS, is_wrong)),
+        "corrections": tuple(check.correction[is_wrong].tolist()),
+        "sigmas": tuple(check.sigma[is_wrong].tolist()),
+        "statistic": check.statistic,
+        "critical": check.critical,
+        "scanners": scanners,
+    }
+    return (Statement("wrong mounting", "warning", values),)
+
+
+def scanner_warnings(estimate: Estimate, names: Sequence[str]) -> Iterator[Statement]:
+    """Statements on scanners that see the street elsewhere than the first, as ties tell it; on the
+    only one where it sees a thing elsewhere from ahead than from behind.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        With ties between scanners, or between views of one at a visit.
+    names : sequence of str
+        Of all scanners.
+    """
+    solved = estimate.equations.solve(estimate.parameters)
+    least = np.repeat(SETTINGS.determined_sigma, 3)
+    for number, name in enumerate(names[1:] or names):
+        of_it = slice(6 * number, 6 * number + 6)
+        lacks = solved.trend[of_it]
+        covariance = solved.trend_covariance[of_it, of_it]
+        sigma = np.sqrt(np.diag(covariance))
+        statistic = lacks @ np.linalg.solve(covariance, lacks)
+        is_large = np.abs(lacks) > np.maximum(SETTINGS.setup_sigmas * sigma, least)
+        if statistic > chdtri(len(lacks), SETTINGS.significance) and is_large.any():
+            values = {
+                "name": name,
+                "first": names[0],
+                "corrections": tuple(lacks.tolist()),
+                "sigmas": tuple(sigma.tolist()),
+            }
+            yield Statement("wrong scanner", "warning", values)
