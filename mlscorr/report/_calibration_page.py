@@ -195,12 +195,12 @@ def _scanner(content) -> Iterator[StatementRow]:
         return
     values = {part: errors[part] for part in ("range_offset", "encoder_scale")}
     if _is_off(errors):
-        said = Statement("scanner is off", "warning", values)
+        fact = Statement("scanner is off", "warning", values)
     elif all(row["determined"] for row in errors.values()):
-        said = Statement("scanner is right", values=values)
+        fact = Statement("scanner is right", values=values)
     else:
-        said = Statement("scanner hardly told", values=values)
-    yield StatementRow.of("Scanner", said)
+        fact = Statement("scanner hardly told", values=values)
+    yield StatementRow.of("Scanner", fact)
 
 
 def _ties(content) -> Iterator[StatementRow]:

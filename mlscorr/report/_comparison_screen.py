@@ -79,20 +79,20 @@ def verdict(document: dict[str, Any]) -> list[Statement]:
     values = {"rmse": value[best], "raw": raw}
     if len(tied) == 1:
         values |= {"name": best, "about": ranked[0]["about"]}
-        said = [Statement("best method", severity, values)]
+        facts = [Statement("best method", severity, values)]
     else:
         values |= {"names": tied, "least": SETTINGS.difference}
-        said = [Statement("best methods", severity, values)]
+        facts = [Statement("best methods", severity, values)]
     for kind in KINDS:
         rest = [row["name"] for row in ranked if row["kind"] == kind]
         if rest and rest[0] not in tied:
             values = {"kind": kind, "name": rest[0], "rmse": value[rest[0]]}
-            said.append(Statement("best of a kind", values=values))
+            facts.append(Statement("best of a kind", values=values))
     if OWN in value and OWN not in tied:
         own = value[OWN]
         values = {"name": OWN, "rmse": own, "behind": own - value[best]}
-        said.append(Statement("behind the best", values=values))
-    return said
+        facts.append(Statement("behind the best", values=values))
+    return facts
 
 
 def _basis(document):
@@ -115,11 +115,11 @@ def _ties(document) -> Iterator[StatementRow]:
         return
     count = own["details"]["ties"]
     if count:
-        said = Statement("method with ties", values={"name": OWN, "count": count})
+        fact = Statement("method with ties", values={"name": OWN, "count": count})
     else:
         values = {"name": OWN, "other": UNTIED, "why": own["details"]["untied"]}
-        said = Statement("method without ties", values=values)
-    yield StatementRow.of("Ties", said)
+        fact = Statement("method without ties", values=values)
+    yield StatementRow.of("Ties", fact)
 
 
 def method_warnings(rows: list[dict]) -> list[str]:
@@ -142,8 +142,8 @@ def _undetermined(document) -> Iterator[StatementRow]:
     absent = undetermined(document)
     if absent:
         values = {"count": len(absent), "methods": len(document["methods"])}
-        said = Statement("methods without a score", "warning", values)
-        yield StatementRow.of("Not determined", said, items=absent)
+        fact = Statement("methods without a score", "warning", values)
+        yield StatementRow.of("Not determined", fact, items=absent)
 
 
 def undetermined(document: dict) -> list[tuple[str, str]]:

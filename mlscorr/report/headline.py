@@ -175,13 +175,13 @@ def verdict(report: CorrectionReport) -> list[Statement]:
     rmse = {"check": "rmse of check points", "leave-one-out": "rmse left out"}
     if kind == "leave-one-out":
         values["has_checks"] = report.points("check").surveyed > 0
-    said = [
+    facts = [
         _change(report, before.rmse[4], after.rmse[4], kind, bool(rises), severity),
         Statement(rmse.get(kind, "rmse of the fit"), values=values),
     ]
     if rises:
-        said.append(Statement("worse axes", "fault", {"rises": rises, **count}))
-    return said
+        facts.append(Statement("worse axes", "fault", {"rises": rises, **count}))
+    return facts
 
 
 def _rises(before, after, n, sigma):
@@ -239,13 +239,15 @@ def check_statement(points: PointCounts) -> StatementRow:
     if points.scored:
         severity = "note"
     values = {"scored": points.scored, "surveyed": points.surveyed}
-    said = [Statement("check points", severity, values)]
+    facts = [Statement("check points", severity, values)]
     lost = {"hidden check points": points.hidden, "refused check points": points.misplaced}
-    said += [Statement(key, "fault", {"names": _names(some)}) for key, some in lost.items() if some]
+    facts += [
+        Statement(key, "fault", {"names": _names(some)}) for key, some in lost.items() if some
+    ]
     for by_others, count in _elsewhere(points).items():
         values = {"count": count, "by_others": by_others}
-        said.append(Statement("check points elsewhere", values=values))
-    return StatementRow.of("Check points", *said, items=_named(points))
+        facts.append(Statement("check points elsewhere", values=values))
+    return StatementRow.of("Check points", *facts, items=_named(points))
 
 
 def _elsewhere(points):
@@ -285,8 +287,8 @@ def control_statement(points: PointCounts) -> StatementRow:
     severity: Severity = "note"
     if points.refused or points.missing:
         severity = "warning"
-    said = Statement("control points", severity, values)
-    return StatementRow.of("Control points", said, items=_named(points))
+    fact = Statement("control points", severity, values)
+    return StatementRow.of("Control points", fact, items=_named(points))
 
 
 def _datum(report) -> Iterator[StatementRow]:
@@ -294,8 +296,8 @@ def _datum(report) -> Iterator[StatementRow]:
     if report.datum:
         lengths = {each.term: each.length for each in report.datum}
         items = ((each.term, each.sentence) for each in report.datum)
-        said = Statement("datum", "warning", {"lengths": lengths})
-        yield StatementRow.of("Datum", said, items=items)
+        fact = Statement("datum", "warning", {"lengths": lengths})
+        yield StatementRow.of("Datum", fact, items=items)
 
 
 def _extrapolated(report):
@@ -317,10 +319,10 @@ def _extrapolated(report):
         "share": share,
         "sigma": largest,
     }
-    said = [Statement("extrapolated", severity, values)]
+    facts = [Statement("extrapolated", severity, values)]
     sigma = report.position_sigma
     if sigma is not None and not report.support.contains(np.array(sigma["time"])):
-        said.append(Statement("between control points", values={"sigma": sigma["largest"]}))
+        facts.append(Statement("between control points", values={"sigma": sigma["largest"]}))
     items = [
         stretch_in_words(
             stretch.start,
@@ -332,7 +334,7 @@ def _extrapolated(report):
         )
         for stretch in sorted(weak, key=lambda stretch: -stretch.sigma)
     ]
-    return StatementRow.of("Extrapolated", *said, items=capped(items))
+    return StatementRow.of("Extrapolated", *facts, items=capped(items))
 
 
 def _left_out(report) -> Iterator[StatementRow]:
@@ -353,11 +355,11 @@ def _sigma(report) -> Iterator[StatementRow]:
     if sigma is None:
         return
     values = {name: sigma[name] for name in ("largest", "time", "median")}
-    said = [Statement("sigma", values=values)]
+    facts = [Statement("sigma", values=values)]
     stated = sigma.get("stated", np.inf)
     if sigma["median"] > stated:
-        said.append(Statement("stated sigma", "warning", {"sigma": stated}))
-    yield StatementRow.of("Sigma", *said)
+        facts.append(Statement("stated sigma", "warning", {"sigma": stated}))
+    yield StatementRow.of("Sigma", *facts)
 
 
 def has_assumed_sigma(rows: Iterable[dict]) -> bool:
@@ -411,8 +413,8 @@ def warning_statements(warnings: Iterable[str]) -> Iterator[StatementRow]:
     """
     doubts = dict.fromkeys(warnings)
     if doubts:
-        said = Statement("warnings", "warning", {"count": len(doubts)})
-        yield StatementRow.of("Warnings", said, items=[("", text) for text in doubts])
+        fact = Statement("warnings", "warning", {"count": len(doubts)})
+        yield StatementRow.of("Warnings", fact, items=[("", text) for text in doubts])
 
 
 def _named(points):

@@ -127,22 +127,22 @@ def tie_statements(section: dict[str, Any] | None, control: int) -> list[Stateme
         values = {"n": section["n"], "has_control": control > 0}
         return [Statement("unused ties", "warning", values)]
     apart = {state: section[state]["median"] for state in ("before", "after")}
-    said = [Statement("ties", values={"n": section["n"], **apart})]
+    facts = [Statement("ties", values={"n": section["n"], **apart})]
     wrong = section["n"] - section["used"]
     if wrong:
-        said.append(Statement("contradicting ties", values={"wrong": wrong}))
+        facts.append(Statement("contradicting ties", values={"wrong": wrong}))
     if control == 0:
-        return [*said, Statement("relative ties", "warning")]
+        return [*facts, Statement("relative ties", "warning")]
     if "share" not in section:  # an area's, of which the drive is a piece
-        return said
-    said.append(Statement("share of control", values={"control": section["share"]["control"]}))
+        return facts
+    facts.append(Statement("share of control", values={"control": section["share"]["control"]}))
     sufficient = section["sufficient_control"]
     if sufficient is None or control < 2:
-        return said
+        return facts
     if sufficient < control:
         values = {"control": control, "sufficient": sufficient}
-        return [*said, Statement("sufficient control", values=values)]
-    return [*said, Statement("all control needed", values={"control": control})]
+        return [*facts, Statement("sufficient control", values=values)]
+    return [*facts, Statement("all control needed", values={"control": control})]
 
 
 def tie_sentences(section: dict[str, Any] | None, control: int) -> list[str]:

@@ -337,7 +337,7 @@ def _all_needed(control):
 # A calibration
 
 
-def _together(first, name, fit, lever_arm, boresight):
+def _relative(first, name, fit, lever_arm, boresight):
     both = f"No wall that scanners {first} and {name} both saw holds them."
     if fit is not None:
         both = (
@@ -551,7 +551,7 @@ SENTENCES: dict[str, Wording] = {
     "share of control": _share,
     "sufficient control": _sufficient,
     "all control needed": _all_needed,
-    "scanners together": _together,
+    "scanners together": _relative,
     "mounting not told": "This geometry does not tell whether the recorded mounting holds.",
     "mounting holds": "The recorded mounting holds: it lacks nothing beyond {sigmas:g} sigmas.",
     "determined parts hold": "The recorded mounting holds in the parts that are determined: it "
