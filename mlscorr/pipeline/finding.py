@@ -444,8 +444,8 @@ def find_targets(
     progress : function, optional
         ``progress(title, total)`` returns a function of the number of points just done.
     with_ties : bool
-        Whether the features that may tie passes are collected in the same reading; ``find_ties``
-        and ``estimate_pos_error`` take them from the result.
+        Whether the features that may tie passes are collected in the same reading; the result's
+        ``features`` go into ``find_ties`` or ``estimate_pos_error``.
 
     Returns
     -------

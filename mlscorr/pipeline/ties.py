@@ -32,7 +32,9 @@ if TYPE_CHECKING:
 AXES = ("across", "along", "up")  # of the way of the earlier view
 
 
-def find_ties(survey: Survey, progress: Callable | None = None) -> TiedSurvey:
+def find_ties(
+    survey: Survey, progress: Callable | None = None, features: TieFeatures | None = None
+) -> TiedSurvey:
     """Find planes, poles and paint that two passes both saw, without control.
 
     Parameters
@@ -40,6 +42,8 @@ def find_ties(survey: Survey, progress: Callable | None = None) -> TiedSurvey:
     survey : Survey
     progress : function, optional
         ``progress(title, total)`` returns a function of the number of points just done.
+    features : TieFeatures, optional
+        As ``find_targets(..., with_ties=True)`` has collected them; otherwise the clouds are read.
 
     Returns
     -------
@@ -60,17 +64,23 @@ def find_ties(survey: Survey, progress: Callable | None = None) -> TiedSurvey:
     [1, 2]
     """
     check_survey(survey)
+    if features is None:
+        features = _read_features(survey, progress)
+    tied = TiedSurvey(survey, features, search_ties(survey, features))
+    for sentence in tied.warnings:
+        warnings.warn(sentence, stacklevel=2)
+    return tied
+
+
+def _read_features(survey, progress):
+    """Planes, poles and paint of all clouds."""
     done = (progress or silent)("Searching the cloud", survey.points)
     collector = TieCollector(survey)
     for file in survey.clouds:
         for chunk in read_chunks(file):
             collector.add(file, chunk)
             done(len(chunk))
-    features = collector.features()
-    tied = TiedSurvey(survey, features, search_ties(survey, features))
-    for sentence in tied.warnings:
-        warnings.warn(sentence, stacklevel=2)
-    return tied
+    return collector.features()
 
 
 @dataclass(frozen=True, repr=False)
