@@ -224,7 +224,7 @@ class FoundTargets(Summary):
         return len(self.targets)
 
     def __getitem__(self, rows: Any) -> FoundTargets:
-        numbers = np.atleast_1d(np.arange(len(self))[np.asarray(rows)])
+        numbers = np.atleast_1d(np.arange(len(self))[rows])
         return replace(self, targets=tuple(self.targets[number] for number in numbers))
 
     @cached_property

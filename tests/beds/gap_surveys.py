@@ -7,7 +7,8 @@ import numpy as np
 from mlscorr.gap.closure import Surroundings, collect_beams
 from mlscorr.gap.residuals import PatchCollector, Patches, build_rows
 from mlscorr.io.clouds import read_chunks
-from mlscorr.pipeline.finding import MatchedTargets, find_or_compare_surfaces
+from mlscorr.pipeline import MatchedTargets
+from mlscorr.pipeline.finding import find_or_compare_surfaces
 
 
 @dataclass(frozen=True)

@@ -89,7 +89,7 @@ def build_rows(
     >>> import numpy as np, tempfile
     >>> from mlscorr.gap.residuals.patches import find_patches
     >>> from mlscorr.io.surveys.survey_file import read_survey
-    >>> from mlscorr.pipeline.finding import find_targets
+    >>> from mlscorr.pipeline import find_targets, match_targets
     >>> from mlscorr.simulate import Scenario, simulate
     >>> folder = tempfile.mkdtemp()
     >>> short = Scenario(
@@ -99,7 +99,7 @@ def build_rows(
     ... )
     >>> simulate(short, np.random.default_rng(1)).write(folder)
     >>> survey = read_survey(folder)
-    >>> found = find_targets(survey)
+    >>> found = match_targets(find_targets(survey), survey)
     >>> patches = find_patches(survey)
     >>> pairing = build_rows(survey, found.matches.matched, found.candidates, patches)
     >>> sorted(set(pairing.rows.channel.tolist()))

@@ -5,7 +5,7 @@ import pytest
 
 from mlscorr.gap.residuals import build_rows, find_patches
 from mlscorr.io.surveys import read_survey
-from mlscorr.pipeline.finding import find_targets, match_targets
+from mlscorr.pipeline import find_targets, match_targets
 from mlscorr.simulate import Scenario, simulate
 from tests.beds.gap_surveys import write_reference
 
