@@ -101,7 +101,7 @@ class Layer:
             As of ``painted``.
         """
         if self.colors is not None:
-            meaning = "its own colors"
+            meaning = "own colors"
         elif self.intensity_limits is not None:
             meaning = "colored by intensity"
         else:
@@ -379,9 +379,9 @@ def _page_content(layers, origin, title, points):
                     "spacing": spacing,
                 }
             )
-            size = f"{thousands(len(chosen))} of {counted(len(layer), 'point')}"
-            if len(chosen) == len(layer):
-                size = counted(len(layer), "point")
+            size = f"{thousands(len(layer))} points"
+            if len(chosen) < len(layer):
+                size = f"{thousands(len(chosen))} of {size}"
         else:
             scene.append(
                 {
@@ -390,7 +390,7 @@ def _page_content(layers, origin, title, points):
                     "pairs": packed(layer.pairs, "<u4"),
                 }
             )
-            size = counted(len(layer), "line")
+            size = f"{thousands(len(layer))} lines"
         words = ", ".join(filter(None, [size, meaning]))
         entries.append({"name": layer.name, "words": words, "mark": mark})
     clouds = [number for number, layer in enumerate(layers) if layer.pairs is None]
