@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from mlscorr.correction._kernel import fill_increments, move_integers, require_times
@@ -21,6 +22,7 @@ from mlscorr.survey import (
     as_cloud,
     box_distance,
     copied_las,
+    geometry_pair,
     is_las,
 )
 from mlscorr.wording import counted
@@ -208,6 +210,46 @@ class Correction(Summary):
         moved, inside = self._moved(points)
         self._require_inside(np.count_nonzero(~inside), points.gps_time)
         return back(moved)
+
+    def before_after(self, cloud: Any, origin: ArrayLike | None = None) -> dict[str, Any]:
+        """A cloud as it was and corrected, as two geometries of Open3D about one origin.
+
+        Both share the memory of all but their positions. They are colored alike, in grey by
+        intensity, unless the cloud has the attribute ``colors``.
+
+        Parameters
+        ----------
+        cloud : PointCloud, open3d.t.geometry.PointCloud or (xyz, gps_time)
+            As of ``apply``.
+        origin : (3,) array, optional
+            As of ``PointCloud.to_open3d``. Units: m.
+
+        Returns
+        -------
+        dict
+            ``before`` and ``after``, each an open3d.t.geometry.PointCloud.
+
+        Raises
+        ------
+        ValueError, TypeError
+            As of ``apply``.
+
+        >>> import numpy as np
+        >>> from mlscorr.frames import attitude_from_angles
+        >>> from mlscorr.survey import PointCloud, Trajectory
+        >>> time, zero = np.arange(413200.0, 413204.0), np.zeros(4)
+        >>> path = np.tile([532_000.0, 3_374_000.0, 42.0], (4, 1))
+        >>> recorded = Trajectory(time, path, attitude_from_angles(zero, zero, zero))
+        >>> corrected = replace(recorded, position=path + [0.0, 0.0, 0.5])
+        >>> pair = Correction(recorded, corrected).before_after(PointCloud.from_arrays(path, time))
+        >>> (pair["after"].point.positions - pair["before"].point.positions)[0].numpy().tolist()
+        [0.0, 0.0, 0.5]
+        """
+        points, _ = as_cloud(cloud)
+        self._require_near(points.xyz)
+        moved, inside = self._moved(points)
+        self._require_inside(np.count_nonzero(~inside), points.gps_time)
+        return geometry_pair(points, moved, origin)
 
     def _moved(self, cloud):
         """A PointCloud corrected, and which points lie within the trajectory."""

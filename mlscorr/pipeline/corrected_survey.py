@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -35,7 +35,7 @@ from mlscorr.pipeline._result import Reported, ResultFiles
 from mlscorr.pipeline.clouds import MovedClouds, WrittenClouds, write_counted
 from mlscorr.pipeline.estimation import check_score, control_score
 from mlscorr.pipeline.finding import silent
-from mlscorr.survey import Matched, Summary, Survey, Trajectory, rows_frame
+from mlscorr.survey import Matched, Summary, Survey, Trajectory, chosen_origin, rows_frame
 from mlscorr.targets import FittedTarget
 
 if TYPE_CHECKING:
@@ -141,6 +141,41 @@ class CorrectedSurvey(Summary):
 
         estimate = self.estimate
         return draw(correction_figures(estimate.correction, self._draft, estimate.ties), name)
+
+    def to_open3d(
+        self, origin: np.ndarray | None = None, color: str = "correction"
+    ) -> dict[str, Any]:
+        """The corrected trajectory, the misclosures and the ties as lines about one origin.
+
+        Parameters
+        ----------
+        origin : (3,) array, optional
+            A whole meter near the middle of the trajectory by default. Units: m.
+        color : str
+            Of the trajectory: ``correction`` or ``sigma``, as of ``PosErrorEstimate.to_open3d``.
+
+        Returns
+        -------
+        dict
+            ``trajectory``, ``misclosures`` and, where passes were tied, ``ties``: each an
+            open3d.t.geometry.LineSet.
+
+        Raises
+        ------
+        ValueError
+            For another color.
+        """
+        from mlscorr.report import correction_lines, misclosure_lines, tie_lines
+
+        place = chosen_origin(self.trajectory.position, origin)
+        lines = {
+            "trajectory": correction_lines(self.estimate.correction, place, color),
+            "misclosures": misclosure_lines(self.matched_control, self.matched_check, place),
+        }
+        ties = self.estimate.ties
+        if ties is not None:
+            lines["ties"] = tie_lines(ties.ties[ties.used], place, 1.0)
+        return lines
 
     def _overview(self):
         """What a notebook shows."""

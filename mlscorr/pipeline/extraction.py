@@ -6,7 +6,7 @@ import warnings
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,10 +23,11 @@ from mlscorr.pipeline.finding import (
 )
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.survey import Survey, TargetObservations, check_rng, check_survey, rows_frame
-from mlscorr.targets import BY_EDGES, distinct, search_targets, why_useless
+from mlscorr.targets import BY_EDGES, as_observations, distinct, search_targets, why_useless
 
 if TYPE_CHECKING:
     import pandas
+    from matplotlib.figure import Figure
 
 BRIGHT_KINDS = ("circle", "square", "checkerboard")  # kinds that stand out without a surveyed place
 NO_CONTROL = "No control point is known: every object was taken as it looks."
@@ -171,6 +172,33 @@ class ExtractedSurvey(KnownResult):
     def to_frame(self) -> pandas.DataFrame:
         """A row each object and pass, as targets.json has them; pandas is needed for it."""
         return rows_frame(self.targets)
+
+    def plot(self) -> Figure:
+        """The objects one by one, each with the points on it and the outline that was fitted."""
+        from mlscorr.report import targets_figure
+
+        return targets_figure(self._fitted)
+
+    def to_open3d(self, origin: np.ndarray | None = None, enlarged: float = 100.0) -> Any:
+        """Outlines of the objects, and about each center the ellipsoid of one sigma.
+
+        Parameters
+        ----------
+        origin, enlarged
+            As of ``FoundTargets.to_open3d``.
+
+        Returns
+        -------
+        open3d.t.geometry.LineSet
+        """
+        from mlscorr.report import target_lines
+
+        return target_lines(as_observations(self._fitted), origin, enlarged)
+
+    @property
+    def _fitted(self):
+        """(pass number, FittedTarget) of all objects."""
+        return [(number, target) for (number, _), target in self.finding.fitted.items()]
 
     def _overview(self):
         """What a notebook shows."""

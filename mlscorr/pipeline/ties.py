@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,6 +28,7 @@ from mlscorr.ties import (
 
 if TYPE_CHECKING:
     import pandas
+    from matplotlib.figure import Figure
 
 AXES = ("across", "along", "up")  # of the way of the earlier view
 
@@ -128,6 +129,31 @@ class TiedSurvey(KnownResult):
     def to_frame(self) -> pandas.DataFrame:
         """A row each tie, with both its views, as a data frame; pandas is needed for it."""
         return self.search.ties.to_frame()
+
+    def plot(self) -> Figure:
+        """The ties from above, colored by how far apart both views lie, and the refused pairs."""
+        from mlscorr.report import search_figure
+
+        return search_figure(self.survey.trajectory, self.search.ties, self.search.refused)
+
+    def to_open3d(self, origin: np.ndarray | None = None, enlarged: float = 1.0) -> Any:
+        """Lines between both views of each tie, colored by their misclosure.
+
+        Parameters
+        ----------
+        origin : (3,) array, optional
+            As of ``PointCloud.to_open3d``.
+        enlarged : float
+            Factor by which lines are drawn longer than they are, about their middles.
+
+        Returns
+        -------
+        open3d.t.geometry.LineSet
+            With the attribute ``misclosure`` of the lines, in m.
+        """
+        from mlscorr.report import tie_lines
+
+        return tie_lines(self.search.ties, origin, enlarged)
 
     def _overview(self):
         """What a notebook shows."""

@@ -208,12 +208,12 @@ def viewer_data(
         "origin": origin.tolist(),
         "even": len(spread),
         "spacing": spacing,
-        "before": _packed(picked.xyz - origin),
-        "after": _packed(moved - origin),
+        "before": packed(picked.xyz - origin),
+        "after": packed(moved - origin),
         "intensity": _scaled(picked.intensity),
         "height": _scaled(moved[:, 2]),
-        "colours": {name: _packed(colour_table(name), "u1") for name in ("intensity", "height")},
-        "trajectory": [_packed(line - origin) for line in _lines(correction)],
+        "colours": {name: packed(colour_table(name), "u1") for name in ("intensity", "height")},
+        "trajectory": [packed(line - origin) for line in _lines(correction)],
         "targets": [_target(row, origin) for row in recomputed(targets, correction)],
     }
 
@@ -282,9 +282,16 @@ def _target(row, origin):
 def _scaled(values):
     """Values (n,) between their percentiles as base64 of uint8."""
     low, high = percentiles(values)
-    return _packed(np.round(255 * np.clip((values - low) / max(high - low, 1e-9), 0, 1)), "u1")
+    return packed(np.round(255 * np.clip((values - low) / max(high - low, 1e-9), 0, 1)), "u1")
 
 
-def _packed(values, kind="<f4"):
-    """An array as base64."""
+def packed(values: np.ndarray, kind: str = "<f4") -> str:
+    """An array as base64.
+
+    Parameters
+    ----------
+    values : array
+    kind : str
+        Of its little-endian numbers.
+    """
     return base64.b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode()

@@ -80,7 +80,7 @@ def write_report(
     scripts = ()
     if views is not None:
         content |= cloud_content(views, report.targets)
-        scripts = ("slide.js", "turn.js")
+        scripts = ("slide.js", "view.js", "turn.js")
     Page(
         title=f"{survey.name}: correction of a mobile laser scan",
         summary="summary.html",

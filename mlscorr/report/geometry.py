@@ -1,4 +1,4 @@
-"""Targets, trajectories and misclosures as lines of Open3D, in the colours of the report."""
+"""Targets, trajectories, misclosures and ties as lines of Open3D, in the colours of the report."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from matplotlib.colors import to_rgb
 from mlscorr.correction import Correction
 from mlscorr.report.render import colour_table, percentiles
 from mlscorr.report.style import BLUE, MARKS, VERMILLION
-from mlscorr.survey import Matched, TargetObservations, Trajectory, line_geometry
+from mlscorr.survey import Matched, TargetObservations, Ties, Trajectory, line_geometry
 
 CORNERS = 48  # of a circle as a polygon: no corner is seen
 ROUND = ("circle", "hole")  # kinds with a circular outline
@@ -69,6 +69,31 @@ def misclosure_lines(control: Matched, check: Matched, origin: np.ndarray | None
     return line_geometry(places, pairs, origin, {"colors": colors})
 
 
+def tie_lines(ties: Ties, origin: np.ndarray | None, enlarged: float) -> Any:
+    """Lines between both views of each tie, colored by how far apart they lie.
+
+    Parameters
+    ----------
+    ties : Ties
+    origin : (3,) array or None
+        As of ``PointCloud.to_open3d``.
+    enlarged : float
+        Factor by which lines are drawn longer than they are, about their middles.
+
+    Returns
+    -------
+    open3d.t.geometry.LineSet
+        With the attribute ``misclosure`` of the lines, in m.
+    """
+    middle = ties.place.mean(axis=1, keepdims=True)
+    places = (middle + enlarged * (ties.place - middle)).reshape(-1, 3)
+    pairs = np.arange(len(places)).reshape(-1, 2)
+    attributes = {"misclosure": ties.misclosure}
+    if len(ties):
+        attributes["colors"] = _scale_colors(np.abs(ties.misclosure))
+    return line_geometry(places, pairs, origin, attributes)
+
+
 def correction_lines(correction: Correction, origin: np.ndarray | None, color: str) -> Any:
     """The corrected trajectory, coloured by how far it was moved or by its sigma.
 
@@ -97,6 +122,13 @@ def correction_lines(correction: Correction, origin: np.ndarray | None, color: s
     return path_lines(corrected, origin, {color: values})
 
 
+def _scale_colors(values):
+    """Colors (n, 3) of values on the scale of sigmas."""
+    low, high = percentiles(values)
+    share = np.clip((values - low) / max(high - low, np.finfo(float).tiny), 0, 1)
+    return colour_table("sigma")[np.rint(255 * share).astype(int)] / 255
+
+
 def path_lines(
     trajectory: Trajectory, origin: np.ndarray | None, values: dict[str, np.ndarray]
 ) -> Any:
@@ -114,9 +146,7 @@ def path_lines(
     attributes = {}
     for name, of_epoch in values.items():
         of_line = of_epoch[pairs].mean(axis=1)
-        low, high = percentiles(of_line)
-        share = np.clip((of_line - low) / max(high - low, np.finfo(float).tiny), 0, 1)
-        attributes["colors"] = colour_table("sigma")[np.rint(255 * share).astype(int)] / 255
+        attributes["colors"] = _scale_colors(of_line)
         attributes[name] = of_line
     return line_geometry(trajectory.position, pairs, origin, attributes)
 

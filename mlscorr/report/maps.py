@@ -32,7 +32,7 @@ from mlscorr.report.style import (
     styled,
     thin,
 )
-from mlscorr.survey import Trajectory
+from mlscorr.survey import Ties, Trajectory
 from mlscorr.wording import thousands
 
 STATES = ("Before the correction", "After the correction")
@@ -48,16 +48,38 @@ def tie_figure(correction: Correction, residuals: TieResiduals) -> Figure:
     residuals : TieResiduals
         What the correction leaves of the ties.
     """
-    way = track(correction.corrected)
-    used = residuals.used
-    places = residuals.ties.place.mean(axis=1)[:, :2]
-    misfits = [1000 * np.abs(v) for v in (residuals.ties.misclosure, residuals.after)]  # mm
+    states = dict(zip(STATES, (residuals.ties.misclosure, residuals.after), strict=True))
+    words = "Trajectory (corrected)"
+    return _tie_plan(correction.corrected, residuals.ties.place, residuals.used, states, words)
+
+
+@styled
+def search_figure(trajectory: Trajectory, ties: Ties, refused: Ties) -> Figure:
+    """Plan of the ties that a search found, and of the pairs that it refused.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        As recorded.
+    ties, refused : Ties
+    """
+    both = Ties.concatenate([ties, refused])
+    used = np.arange(len(both)) < len(ties)
+    states = {f"{len(ties)} ties, {len(refused)} pairs refused": both.misclosure}
+    return _tie_plan(trajectory, both.place, used, states, "Trajectory (recorded)")
+
+
+def _tie_plan(trajectory, place, used, states, words):
+    """Plans of places (n, 2, 3) coloured by misclosures (n,) of one or two states, in m."""
+    way = track(trajectory)
+    places = place.mean(axis=1)[:, :2]
+    misfits = [1000 * np.abs(misclosure) for misclosure in states.values()]  # mm
     low, high = corners(np.vstack([way, places]), 0.1)
-    figure, panels = map_panels(2, (high - low)[1] / (high - low)[0])
+    figure, panels = map_panels(len(states), (high - low)[1] / (high - low)[0])
     figure.set_dpi(SETTINGS.dots_per_inch)
     largest = max(np.max(misfit[used], initial=10.0) for misfit in misfits)
     scale = {"norm": LogNorm(1.0, largest), "cmap": ListedColormap(colour_table("sigma") / 255)}
-    for panel, misfit, title in zip(panels, misfits, STATES, strict=True):
+    for panel, misfit, title in zip(panels, misfits, states, strict=True):
         panel.plot(*way.T, **TRACK, zorder=1)
         panel.plot(*places[~used].T, linestyle="none", zorder=2, rasterized=True, **MARKS["unused"])
         front = np.flatnonzero(used)[np.argsort(misfit[used], kind="stable")]  # the worst on top
@@ -75,13 +97,13 @@ def tie_figure(correction: Correction, residuals: TieResiduals) -> Figure:
         panel.label_outer()
     bar = figure.colorbar(dots, ax=panels, pad=0.01, extend="min", format="%g")
     bar.set_label("How far apart both views lie (mm)")
-    legend_above(figure, _kinds_legend(used))
+    legend_above(figure, _kinds_legend(used, words))
     return figure
 
 
-def _kinds_legend(used):
+def _kinds_legend(used, words):
     """Legend entries of what is drawn."""
-    handles = [Line2D([], [], label="Trajectory (corrected)", **TRACK)]
+    handles = [Line2D([], [], label=words, **TRACK)]
     dot = {"linestyle": "none", "marker": "o", "markersize": 3, "color": "#5b2a86"}
     if used.any():
         handles.append(Line2D([], [], label="Seen twice", **dot))

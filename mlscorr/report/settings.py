@@ -29,6 +29,8 @@ class Settings:
     sample_points: int = 1_000_000  # of each part; up to twice as many are gathered; guard
     plan_cell: float = 2.0  # m, of the grid that tells what is near a target, and of walls
     viewer_points: tuple[int, int] = (36_000, 24_000)  # even and near targets: 3 MB of a page
+    shown_points: int = 300_000  # of a page of clouds alone: 6 MB
+    shown_extent: float = 100_000.0  # m; float32, in which views draw, holds 4 mm there
     close_ups: int = 24  # targets: 15 MB of a page
     panel: tuple[int, int] = (640, 480)  # pixels
     close_up: tuple[int, int] = (440, 330)  # pixels, as the page shows it: so are its letters

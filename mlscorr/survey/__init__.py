@@ -4,8 +4,14 @@ float64, SI units, radians inside; map axes E, N, H; body axes X right, Y forwar
 """
 
 from mlscorr.survey._angles import angles_from_attitude, attitude_from_angles
-from mlscorr.survey._interchange import as_cloud, box_distance, copied_las, is_las
-from mlscorr.survey._open3d import line_geometry
+from mlscorr.survey._interchange import as_cloud, box_distance, copied_las, geometry_pair, is_las
+from mlscorr.survey._open3d import (
+    chosen_origin,
+    geometry_columns,
+    is_geometry,
+    line_geometry,
+    map_places,
+)
 from mlscorr.survey.clouds import (
     COORDINATE_ROUNDING,
     NOISE_CLASSES,

@@ -7,6 +7,7 @@ from copy import deepcopy
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mlscorr.survey import _open3d
 from mlscorr.survey.clouds import PointCloud
@@ -44,6 +45,29 @@ def as_cloud(points: Any) -> tuple[PointCloud, Callable[[PointCloud], Any]]:
         f"A correction moves a PointCloud, an open3d.t.geometry.PointCloud with gps_time, a pair "
         f"(xyz, gps_time) of arrays or points of laspy, not {type(points).__name__}."
     )
+
+
+def geometry_pair(
+    before: PointCloud, after: PointCloud, origin: ArrayLike | None
+) -> dict[str, Any]:
+    """Two states of the same points as tensor clouds that share all but their positions.
+
+    Parameters
+    ----------
+    before, after : PointCloud
+        Points without ``colors`` get greys by intensity.
+    origin : (3,) array or None
+        As of ``PointCloud.to_open3d``, of both. Units: m.
+
+    Returns
+    -------
+    dict
+        ``before`` and ``after``.
+    """
+    geometry = before.to_open3d(origin)
+    if "colors" not in before.attributes:
+        geometry.point["colors"] = _open3d.grey_colors(before.intensity)
+    return {"before": geometry, "after": _open3d.moved_geometry(geometry, after.xyz)}
 
 
 def is_las(points: Any) -> bool:

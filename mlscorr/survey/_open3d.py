@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-OWN = ("positions", "gps_time", "intensity", "origin")  # what a PointCloud has a place for
+OWN = ("positions", "gps_time", "intensity", "origin")  # no further attribute may have these names
+GREY = (2.0, 98.0)  # percent of the values between black and white: single points darken no others
 
 
 def is_geometry(value: object) -> bool:
@@ -24,7 +25,11 @@ def is_geometry(value: object) -> bool:
 
 
 def cloud_geometry(
-    xyz: np.ndarray, attributes: Mapping[str, np.ndarray], origin: np.ndarray | None
+    xyz: np.ndarray,
+    gps_time: np.ndarray,
+    intensity: np.ndarray,
+    further: Mapping[str, np.ndarray],
+    origin: np.ndarray | None,
 ) -> Any:
     """A tensor point cloud that shares the memory of its attributes.
 
@@ -32,11 +37,19 @@ def cloud_geometry(
     ----------
     xyz : (n, 3) array
         Units: m.
-    attributes : mapping
+    gps_time, intensity : (n,) array
+    further : mapping
         Arrays (n,) or (n, k).
     origin : (3,) array or None
         The whole metre below the middle of the points without one. Units: m.
+
+    Raises
+    ------
+    ValueError
+        For attributes with a name or a type that can't be kept.
     """
+    _check_attributes(further)
+    attributes = {"gps_time": gps_time, "intensity": intensity, **further}
     geometry = _open3d().t.geometry.PointCloud()
     origin = chosen_origin(xyz, origin)
     geometry.point["positions"] = _tensor(xyz - origin)
@@ -122,21 +135,38 @@ def geometry_columns(geometry: Any, origin: np.ndarray | None) -> tuple[np.ndarr
             f"An open3d.t.geometry.PointCloud belongs where {type(geometry).__name__} was given: a "
             "legacy cloud has no gps_time. Give a tensor cloud with the point attribute gps_time."
         )
-    attributes = {name: _array(point[name]) for name in point}
-    if "positions" not in attributes:
-        raise ValueError("The Open3D cloud has no positions: an empty cloud can't be corrected.")
-    positions = attributes.pop("positions")
-    places = attributes.pop("origin", None)
+    others = [name for name in point if name not in ("positions", "origin")]
+    return map_places(geometry, origin), {name: _array(point[name]) for name in others}
+
+
+def map_places(geometry: Any, origin: np.ndarray | None = None) -> np.ndarray:
+    """Places (n, 3) of the points of a tensor cloud or line set in the map. Units: m.
+
+    Parameters
+    ----------
+    geometry : open3d.t.geometry.PointCloud or LineSet
+    origin : (3,) array or None
+        From which its positions count; its attribute ``origin`` by default, zero without one.
+
+    Raises
+    ------
+    ValueError
+        For a geometry without points.
+    """
+    if "positions" not in geometry.point:
+        raise ValueError(
+            f"The {type(geometry).__name__} of Open3D has no positions: it is empty. Give it points "
+            "first, as geometry.point.positions."
+        )
+    positions = geometry.point["positions"].cpu().numpy()
     if origin is not None:
-        place = chosen_origin(positions, origin)
-    elif places is not None and len(places):
-        if np.ptp(places, axis=0).any():
-            place = places.astype(float)
-        else:
-            place = places[0]
-    else:
-        place = np.zeros(3)
-    return positions + place, attributes
+        return positions + chosen_origin(positions, origin)
+    if "origin" not in geometry.point or len(positions) == 0:
+        return positions.astype(float)
+    places = geometry.point["origin"].cpu().numpy()
+    if np.ptp(places, axis=0).any():  # clouds of several origins were put together
+        return positions + places.astype(float)
+    return positions + places[0].astype(float)
 
 
 def moved_geometry(geometry: Any, xyz: np.ndarray) -> Any:
@@ -159,6 +189,41 @@ def moved_geometry(geometry: Any, xyz: np.ndarray) -> Any:
     return moved
 
 
+def grey_colors(values: np.ndarray) -> np.ndarray:
+    """Greys (n, 3) uint8 of values, from dark to bright.
+
+    Parameters
+    ----------
+    values : (n,) array
+    """
+    if len(values) == 0:
+        return np.empty((0, 3), np.uint8)
+    low, high = np.percentile(values, GREY)
+    if high > low:
+        share = np.clip((values - low) / (high - low), 0.0, 1.0)
+    else:
+        share = np.full(len(values), 0.5)
+    grey = np.rint(255 * share).astype(np.uint8)
+    return np.repeat(grey[:, None], 3, axis=1)
+
+
+def _check_attributes(further):
+    """Refuse attributes that would take the place of others, or whose type Open3D lacks."""
+    taken = sorted(set(further) & set(OWN))
+    if taken:
+        raise ValueError(
+            f"The attributes {', '.join(taken)} of the cloud have names that its Open3D geometry "
+            "needs itself. Rename them."
+        )
+    for name, values in further.items():
+        dtype = np.asarray(values).dtype
+        if dtype.kind not in "biuf" or dtype.itemsize > 8 or dtype == np.float16:
+            raise ValueError(
+                f"The attribute {name} is of type {dtype}, which Open3D has not: it knows bool, "
+                "integers, float32 and float64. Convert it, or leave it out."
+            )
+
+
 def _open3d():
     import open3d
 
@@ -167,7 +232,8 @@ def _open3d():
 
 def _tensor(values):
     """A tensor on top of an array's memory."""
-    return _open3d().core.Tensor.from_numpy(np.ascontiguousarray(values))
+    native = np.asarray(values, values.dtype.newbyteorder("="))
+    return _open3d().core.Tensor.from_numpy(np.ascontiguousarray(native))
 
 
 def _repeated(origin, n):

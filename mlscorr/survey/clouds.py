@@ -110,7 +110,7 @@ class PointCloud(Columns):
         Raises
         ------
         ValueError
-            For an origin that is no place.
+            For an origin that is no place, and attributes with names or types that can't be kept.
 
         >>> import numpy as np
         >>> from mlscorr.survey import PointCloud
@@ -121,9 +121,10 @@ class PointCloud(Columns):
         >>> PointCloud.from_open3d(geometry).xyz.tolist()
         [[532000.5, 3374000.0, 42.0]]
         """
-        columns = {"gps_time": self.gps_time, "intensity": self.intensity, **self.attributes}
         place = None if origin is None else np.asarray(origin, float)
-        return _open3d.cloud_geometry(self.xyz, columns, place)
+        return _open3d.cloud_geometry(
+            self.xyz, self.gps_time, self.intensity, self.attributes, place
+        )
 
     @classmethod
     def from_open3d(cls, cloud: Any, origin: ArrayLike | None = None) -> PointCloud:

@@ -1,0 +1,434 @@
+"""Clouds and results in one 3D view: Open3D's window, or a page where there is no display."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+import tempfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.colors import to_rgb
+
+from mlscorr.io.store import as_path, is_there, output_file
+from mlscorr.report.cloud import packed, thin_evenly
+from mlscorr.report.pages import Page
+from mlscorr.report.render import colour_table, percentiles
+from mlscorr.report.settings import SETTINGS
+from mlscorr.report.style import BLACK, BLUE, GREEN, ORANGE, SKY, VERMILLION
+from mlscorr.survey import PointCloud, chosen_origin, geometry_columns, is_geometry, map_places
+from mlscorr.wording import counted, thousands
+
+PALETTE = (BLUE, VERMILLION, GREEN, ORANGE, SKY, BLACK)  # of what has no colors of its own
+DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")  # variables that name one on Linux
+
+
+@dataclass(frozen=True)
+class Layer:
+    """Points or lines in the map, with their colors.
+
+    Parameters
+    ----------
+    name : str
+    xyz : (n, 3) array
+        Units: m.
+    pairs : (k, 2) int array or None
+        Numbers of the points that a line joins; None of a cloud.
+    colors : (n, 3) or (k, 3) array or None
+        Of the points or lines: uint8, uint16, or from 0 to 1.
+    intensity : (n,) array or None
+    gps_time : (n,) array or None
+        Units: s.
+    """
+
+    name: str
+    xyz: np.ndarray
+    pairs: np.ndarray | None = None
+    colors: np.ndarray | None = None
+    intensity: np.ndarray | None = None
+    gps_time: np.ndarray | None = None
+
+    def __len__(self) -> int:
+        """Number of its points or lines."""
+        if self.pairs is None:
+            return len(self.xyz)
+        return len(self.pairs)
+
+    @cached_property
+    def intensity_limits(self) -> np.ndarray | None:
+        """Ends of the scale of intensities; None where these tell nothing."""
+        if self.intensity is None or len(self.intensity) == 0:
+            return None
+        low, high = percentiles(self.intensity)
+        if high > low:
+            return np.array([low, high])
+        return None
+
+    def painted(self, rows: np.ndarray | slice, color: str) -> np.ndarray:
+        """Colors (k, 3) uint8 of some points or lines.
+
+        Parameters
+        ----------
+        rows : (k,) int array or slice
+        color : str
+            Of all, where neither colors nor intensities are known.
+        """
+        if self.colors is not None:
+            chosen = self.colors[rows]
+            if chosen.dtype == np.uint8:
+                return chosen
+            if chosen.dtype == np.uint16:  # of a LAS file
+                return (chosen >> 8).astype(np.uint8)
+            return np.rint(255 * np.clip(chosen, 0.0, 1.0)).astype(np.uint8)
+        if self.intensity is not None and self.intensity_limits is not None:
+            low, high = self.intensity_limits
+            share = np.clip((self.intensity[rows] - low) / (high - low), 0.0, 1.0)
+            return colour_table("intensity")[np.rint(255 * share).astype(np.uint8)]
+        one = np.rint(255 * np.array(to_rgb(color))).astype(np.uint8)
+        return np.tile(one, (len(np.arange(len(self))[rows]), 1))
+
+    def key(self, color: str) -> tuple[str, str]:
+        """The color of a legend's mark, and what colors mean.
+
+        Parameters
+        ----------
+        color : str
+            As of ``painted``.
+        """
+        if self.colors is not None:
+            meaning = "own colors"
+        elif self.intensity_limits is not None:
+            meaning = "colored by intensity"
+        else:
+            return color, ""
+        red, green, blue = np.median(self.painted(slice(None, None, 1000), color), axis=0)
+        return f"rgb({red:.0f}, {green:.0f}, {blue:.0f})", meaning
+
+
+def show(
+    *what: Any,
+    page: str | Path | None = None,
+    title: str = "3D view",
+    points: int = SETTINGS.shown_points,
+    overwrite: bool = False,
+    **named: Any,
+) -> Path | None:
+    """Show clouds, targets, trajectories and results together in 3D.
+
+    Where there is a display, Open3D's window opens and shows all points. Elsewhere, and where a
+    page is asked for, one HTML file is written that needs neither a network nor a server.
+
+    Parameters
+    ----------
+    *what : object
+        PointCloud, Open3D clouds and line sets (their positions count from their attribute
+        ``origin``), all that has ``to_open3d``, and dicts of these by name.
+    page : path, optional
+        The HTML file; without a display, a new one among the temporary files by default.
+    title : str
+        Of the window or page.
+    points : int
+        Of all clouds together on a page, thinned evenly in space; lines are whole.
+    overwrite : bool
+        Whether a page of the same name is replaced.
+    **named : object
+        Further things, by the names under which they are listed.
+
+    Returns
+    -------
+    Path or None
+        The page; None once the window is closed.
+
+    Raises
+    ------
+    ValueError
+        When there is nothing to show, places are not finite or too far apart for one view, or the
+        page exists without ``overwrite``.
+    TypeError
+        For what can't be shown.
+
+    >>> import mlscorr, numpy as np, tempfile
+    >>> from mlscorr.survey import PointCloud
+    >>> rng = np.random.default_rng(1)
+    >>> xyz = np.array([532_000.0, 3_374_000.0, 42.0]) + rng.uniform(0, 30, (1000, 3))
+    >>> before = PointCloud.from_arrays(xyz, 357_700 + np.arange(1000) / 1000)
+    >>> after = PointCloud.from_arrays(xyz + 0.2, before.gps_time)
+    >>> page = mlscorr.show(before=before, after=after, page=f"{tempfile.mkdtemp()}/pair.html")
+    >>> page.name
+    'pair.html'
+    """
+    layers = _distinct([*_layers(what, {}), *_layers((), named)])
+    origin = _common_origin(layers)
+    if points < 1:
+        raise ValueError(f"points = {points} shows none: give 1 or more.")
+    if page is None and _has_display():
+        _open_window(layers, origin, title)
+        return None
+    if page is None:
+        path = Path(tempfile.mkdtemp(prefix="mlscorr-")) / "show.html"
+    else:
+        path = as_path(page)
+        if is_there(path) and not overwrite:
+            raise ValueError(f"{path} exists: give another name, or overwrite=True.")
+    content = _page_content(layers, origin, title, points)
+    with output_file(path) as part:
+        Page(
+            title=title,
+            summary="show-summary.html",
+            sections={"view": "3D view"},
+            content=content,
+            prefix="show-",
+            scripts=("view.js", "show.js"),
+        ).write(part)
+    return path
+
+
+def _layers(what, named) -> Iterator[Layer]:
+    """Layers of values without a name, and of those with one."""
+    for value in what:
+        if isinstance(value, Mapping):
+            yield from _layers((), value)
+        else:
+            yield from _layers_of(value, _spoken(value))
+    for name, value in named.items():
+        if isinstance(value, Mapping):
+            yield from _layers((), {f"{name}: {key}": part for key, part in value.items()})
+        else:
+            yield from _layers_of(value, str(name))
+
+
+def _layers_of(value, name) -> Iterator[Layer]:
+    """Layers of one value; results of several geometries have several."""
+    if isinstance(value, PointCloud):
+        colors = value.attributes.get("colors")
+        yield Layer(name, value.xyz, None, colors, value.intensity, value.gps_time)
+    elif is_geometry(value):
+        yield _geometry_layer(value, name)
+    elif hasattr(value, "to_open3d"):
+        geometry = value.to_open3d()
+        if isinstance(geometry, Mapping):
+            yield from _layers((), {name: geometry})
+        else:
+            yield _geometry_layer(geometry, name)
+    else:
+        raise TypeError(
+            f"{name}: a {type(value).__name__} can't be shown. Give a PointCloud, a point cloud or "
+            "line set of Open3D, or a result that has to_open3d()."
+        )
+
+
+def _geometry_layer(geometry, name):
+    """The layer of a geometry of Open3D, a legacy one included."""
+    import open3d
+
+    if isinstance(geometry, open3d.geometry.PointCloud):
+        double = open3d.core.float64
+        geometry = open3d.t.geometry.PointCloud.from_legacy(geometry, double)
+    elif isinstance(geometry, open3d.geometry.LineSet):
+        geometry = open3d.t.geometry.LineSet.from_legacy(geometry, open3d.core.float64)
+    if isinstance(geometry, open3d.t.geometry.PointCloud):
+        xyz, attributes = geometry_columns(geometry, None)
+        further = (attributes.get(key) for key in ("colors", "intensity", "gps_time"))
+        return Layer(name, xyz, None, *further)
+    if isinstance(geometry, open3d.t.geometry.LineSet):
+        pairs = np.empty((0, 2), int)
+        colors = None
+        if "indices" in geometry.line:
+            pairs = geometry.line["indices"].cpu().numpy()
+        if "colors" in geometry.line:
+            colors = geometry.line["colors"].cpu().numpy()
+        return Layer(name, map_places(geometry), pairs, colors)
+    raise TypeError(
+        f"{name}: Open3D's {type(geometry).__name__} can't be shown here. Give point clouds and "
+        "line sets; open3d.visualization.draw shows the others."
+    )
+
+
+def _spoken(value):
+    """The name of a value's class in words: FoundTargets as Found targets."""
+    words = re.findall(r"[A-Z]+[a-z0-9]*|[a-z0-9]+", type(value).__name__)
+    return " ".join(words).capitalize()
+
+
+def _distinct(layers):
+    """Layers with distinct names: the second of a name gets a number."""
+    known: dict[str, int] = {}
+    distinct = []
+    for layer in layers:
+        known[layer.name] = known.get(layer.name, 0) + 1
+        name = layer.name
+        if known[name] > 1:
+            name = f"{name} {known[name]}"
+        distinct.append(replace(layer, name=name))
+    return distinct
+
+
+def _common_origin(layers):
+    """A whole meter near the middle of all layers (3,), which must fit one view. Units: m."""
+    if not layers:
+        raise ValueError(
+            "Nothing was given to show: give a PointCloud, geometries of Open3D, or results."
+        )
+    there = [layer for layer in layers if len(layer)]
+    if not there:
+        names = ", ".join(layer.name for layer in layers)
+        raise ValueError(f"There is no point and no line to show: {names} are empty.")
+    for layer in there:
+        bad = np.flatnonzero(~np.isfinite(layer.xyz).all(axis=1))
+        if len(bad):
+            raise ValueError(
+                f"{layer.name}: {len(bad)} of {counted(len(layer.xyz), 'point')} have coordinates "
+                f"that are not finite (first: point {bad[0]}). Leave them out: nothing places them."
+            )
+    ends = np.array([[layer.xyz.min(axis=0), layer.xyz.max(axis=0)] for layer in there])
+    middles = ends.mean(axis=1)
+    apart = np.linalg.norm(middles[:, None] - middles[None], axis=2)
+    extent = float(np.linalg.norm(ends.max(axis=(0, 1)) - ends.min(axis=(0, 1))))
+    if extent > SETTINGS.shown_extent:
+        one, other = np.unravel_index(apart.argmax(), apart.shape)
+        raise ValueError(
+            f"What is to be shown extends over {extent / 1000:.0f} km, and one view holds "
+            f"{SETTINGS.shown_extent / 1000:.0f} km ({there[one].name} and {there[other].name} are "
+            f"{apart.max() / 1000:.0f} km apart). One of them may be about a local origin or in "
+            "another CRS: an Open3D geometry in the map needs its attribute origin."
+        )
+    return chosen_origin(ends.reshape(-1, 3), None)
+
+
+def _has_display():
+    """Whether a window can be opened."""
+    return sys.platform in ("win32", "darwin") or any(map(os.environ.get, DISPLAYS))
+
+
+def _color_of(number):
+    return PALETTE[number % len(PALETTE)]
+
+
+def _open_window(layers, origin, title):
+    """Show all points and lines in Open3D's viewer until it is closed."""
+    import open3d
+
+    place = f"map axes about {origin[0]:.0f} E, {origin[1]:.0f} N, {origin[2]:.0f} H"
+    shown = [
+        {"name": layer.name, "geometry": viewer_geometry(layer, origin, _color_of(number))}
+        for number, layer in enumerate(layers)
+        if len(layer)
+    ]
+    viewer: Any = open3d.visualization
+    viewer.draw(
+        shown,
+        title=f"{title} ({place})",
+        show_ui=True,
+        show_skybox=False,
+        bg_color=(1.0, 1.0, 1.0, 1.0),
+        point_size=2,
+        line_width=2,
+    )
+
+
+def viewer_geometry(layer: Layer, origin: np.ndarray, color: str) -> Any:
+    """A layer as Open3D's viewer draws it: float32 about an origin near it.
+
+    Parameters
+    ----------
+    layer : Layer
+    origin : (3,) array
+        Units: m.
+    color : str
+        As of ``Layer.painted``.
+
+    Returns
+    -------
+    open3d.t.geometry.PointCloud or LineSet
+    """
+    import open3d
+
+    tensor = open3d.core.Tensor.from_numpy
+    places = tensor((layer.xyz - origin).astype(np.float32))
+    colors = tensor(layer.painted(slice(None), color).astype(np.float32) / 255)
+    if layer.pairs is None:
+        cloud = open3d.t.geometry.PointCloud(places)
+        cloud.point["colors"] = colors
+        return cloud
+    lines = open3d.t.geometry.LineSet()
+    lines.point["positions"] = places
+    lines.line["indices"] = tensor(np.ascontiguousarray(layer.pairs, np.int32))
+    lines.line["colors"] = colors
+    return lines
+
+
+def _page_content(layers, origin, title, points):
+    """What the templates show."""
+    rows = _thinned(layers, points)
+    scene = []
+    entries = []
+    for number, layer in enumerate(layers):
+        color = _color_of(number)
+        mark, meaning = layer.key(color)
+        if layer.pairs is None:
+            chosen, spacing = rows[number]
+            scene.append(
+                {
+                    "places": packed(layer.xyz[chosen] - origin),
+                    "colours": packed(layer.painted(chosen, color), "u1"),
+                    "spacing": spacing,
+                }
+            )
+            size = f"{thousands(len(layer))} points"
+            if len(chosen) < len(layer):
+                size = f"{thousands(len(chosen))} of {size}"
+        else:
+            scene.append(
+                {
+                    "places": packed(layer.xyz - origin),
+                    "colours": packed(layer.painted(slice(None), color), "u1"),
+                    "pairs": packed(layer.pairs, "<u4"),
+                }
+            )
+            size = f"{thousands(len(layer))} lines"
+        words = ", ".join(filter(None, [size, meaning]))
+        entries.append({"name": layer.name, "words": words, "mark": mark})
+    clouds = [number for number, layer in enumerate(layers) if layer.pairs is None]
+    return {
+        "title": title,
+        "entries": entries,
+        "scene": {"layers": scene},
+        "origin": origin,
+        "shown": thousands(sum(len(rows[number][0]) for number in clouds)),
+        "total": thousands(sum(len(layers[number]) for number in clouds)),
+        "clouds": len(clouds),
+    }
+
+
+def _thinned(layers, points):
+    """(rows, spacing in m) of each cloud by its number; two states of a cloud keep the same."""
+    clouds = [number for number, layer in enumerate(layers) if layer.pairs is None]
+    chosen: dict[int, tuple[np.ndarray, float]] = {}
+    limit = max(1, points // max(1, len(clouds)))
+    for number in clouds:
+        layer = layers[number]
+        if len(layer) == 0:
+            chosen[number] = (np.empty(0, int), 0.0)
+            continue
+        same = (k for k in chosen if _are_states(layers[k], layer))
+        first = next(same, None)
+        if first is None:
+            rows, spacing = thin_evenly(layer.xyz, limit)
+            if len(layer) <= limit:
+                rows = np.arange(len(layer))
+            chosen[number] = (rows, spacing)
+        else:
+            chosen[number] = chosen[first]
+    return chosen
+
+
+def _are_states(one, other):
+    """Whether two clouds are the same points before and after something."""
+    if one.gps_time is None or other.gps_time is None:
+        return False
+    return np.array_equal(one.gps_time, other.gps_time)
