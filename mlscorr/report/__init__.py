@@ -7,6 +7,7 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
     submod_attrs={
         "_calibration_page": ["calibration_page", "calibration_screen", "scanners_screen"],
         "_comparison_screen": ["comparison_screen", "method_warnings"],
+        "_results_screen": ["results_screen"],
         "cloud": ["view_cloud"],
         "comparison_page": ["comparison_figure", "write_comparison"],
         "correction_page": ["write_report"],
@@ -15,6 +16,7 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
         "geometry": ["correction_lines", "misclosure_lines", "target_lines"],
         "headline": ["RATINGS", "StatementRow", "capped", "first_screen", "statements_section"],
         "project_page": ["write_project"],
+        "results_page": ["results_figure", "write_results"],
         "stage_figures": [
             "misclosure_figure",
             "pos_error_figure",
