@@ -179,12 +179,13 @@ class TrajectoryDifference:
             if sigma is not None:
                 sigma[~is_equal] = between.position_sigma
         own = None if first.position_sigma is None else first.position_sigma[inside]
-        only = [np.count_nonzero(~inside), np.count_nonzero(~_covered(second.gps_time, first))]
+        lost = ~inside, ~_covered(second.gps_time, first)
         gaps = np.vstack([first.gaps, second.gaps])
         gaps = gaps[(gaps[:, 1] > time[0]) & (gaps[:, 0] < time[-1])] if len(time) else gaps[:0]
         difference = other - first.position[inside]
         interpolated = int(np.count_nonzero(~is_equal))
-        return cls(time, difference, (own, sigma), _disjoint(gaps), interpolated, tuple(only))
+        only = int(lost[0].sum()), int(lost[1].sum())
+        return cls(time, difference, (own, sigma), _disjoint(gaps), interpolated, only)
 
     def document(self) -> dict[str, Any]:
         """The section ``trajectory`` of compare_results.json."""

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from pyproj import Transformer
 
-from mlscorr.frames import angles_from_attitude
+from mlscorr.frames import angles_from_attitude, attitude_from_angles
 from mlscorr.io.store import output_file
 from mlscorr.io.tables import write_csv
+from mlscorr.io.trajectories._motion import motion_columns
 from mlscorr.io.trajectories.projection import check_crs, to_geographic
 from mlscorr.io.trajectories.sbet import SBET_FIELDS, SMRMSG_FIELDS
 from mlscorr.survey import AXES, Trajectory
@@ -50,9 +51,11 @@ def check_exports(names: Sequence[str], crs: str | None = None, is_read: bool = 
 def export_trajectory(path: str | Path, trajectory: Trajectory, crs: str | None) -> list[str]:
     """Write a trajectory as its suffix says; files appear whole or not at all.
 
-    Velocities, accelerations, rates and the wander angle of an SBET are zero. Beside it stands
-    smrmsg_NAME.out, where the trajectory has sigmas: at each epoch, for a second is long beside a
-    target. TUM's quaternions are of the body axes right, forward, up.
+    The wander angle of an SBET is zero: its velocities are north, west, up. Velocities, and
+    accelerations and rates about the body axes forward, right, down, are derivatives of the
+    trajectory, which cross no gap. Beside it stands smrmsg_NAME.out, where the trajectory has
+    sigmas: at each epoch, for a second is long beside a target. TUM's quaternions are of the body
+    axes right, forward, up.
 
     Parameters
     ----------
@@ -81,7 +84,10 @@ def export_trajectory(path: str | Path, trajectory: Trajectory, crs: str | None)
     roll, pitch, heading = angles_from_attitude(trajectory.attitude)
     true_heading = np.mod(heading + convergence, 2 * np.pi)
     angles = dict(zip(("roll", "pitch", "heading"), (roll, pitch, true_heading), strict=True))
-    _write_records(path, SBET_FIELDS, {"gps_time": trajectory.file_time, **place, **angles})
+    true_attitude = attitude_from_angles(roll, pitch, true_heading)
+    motion = motion_columns(trajectory, place, true_attitude, check_crs(crs))
+    columns = {"gps_time": trajectory.file_time, **place, **angles, **motion}
+    _write_records(path, SBET_FIELDS, columns)
     if trajectory.position_sigma is None or trajectory.attitude_sigma is None:
         return [path.name]
     sigmas = np.hstack([trajectory.position_sigma, np.degrees(trajectory.attitude_sigma) * 60])
