@@ -101,9 +101,7 @@ def test_the_motion_of_an_sbet_crosses_no_gap(tmp_path):
     seconds = np.r_[np.arange(0.0, 10.0, 0.05), np.arange(20.0, 30.0, 0.05)]
     whole = circle(seconds)
     apart = whole.position + np.where(seconds < 15.0, 0.0, 30.0)[:, None] * [1.0, 0.0, 0.0]
-    export_trajectory(
-        tmp_path / "gap.sbet", Trajectory(whole.gps_time, apart, whole.attitude), CRS
-    )
+    export_trajectory(tmp_path / "gap.sbet", Trajectory(whole.gps_time, apart, whole.attitude), CRS)
     record = record_of(tmp_path / "gap.sbet")
     assert np.abs(vectors(record, "velocity") - ground_velocity(seconds)).max() < 1e-3
     assert np.ptp(record["rate_z"]) < 1e-5
