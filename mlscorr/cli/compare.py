@@ -1,5 +1,6 @@
-"""The command that compares all methods on one survey."""
+"""The command that compares all methods on one survey, or two results of it."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -8,10 +9,34 @@ import mlscorr
 from mlscorr.cli import terminal
 from mlscorr.cli.work import print_json, work
 
+RESULT_FILES = ("report.json", "trajectory.csv")  # that are read of a result
+
 
 def compare(
-    survey: terminal.SurveyArgument,
-    out: terminal.Out,
+    survey: Annotated[
+        Path,
+        typer.Argument(
+            help="survey.toml, or the folder that holds it; or the first of two folders that "
+            "mlscorr correct wrote.",
+            parser=terminal.path_or_url,
+        ),
+    ],
+    second: Annotated[
+        Path | None,
+        typer.Argument(
+            help="The second result, which is compared with the first.",
+            parser=terminal.path_or_url,
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "-o",
+            "--out",
+            help="Folder for the results; of two results the screen alone without it.",
+            parser=terminal.path_or_url,
+        ),
+    ] = None,
     clouds: Annotated[
         list[str],
         typer.Option(
@@ -24,7 +49,16 @@ def compare(
     as_json: terminal.Json = False,
     quiet: terminal.Quiet = False,
 ) -> None:
-    """Correct a survey by every method, and score them by the same check points."""
+    """Correct a survey by every method, and score them by the same check points.
+
+    Two folders that mlscorr correct wrote are compared with each other instead:
+    mlscorr compare corrected-1 corrected-2 -o compared
+    """
+    with terminal.exit_code(terminal.Exit.USAGE):
+        _check_arguments(survey, second, out, clouds)
+    if second is not None:
+        _compare_results(survey, second, out, overwrite, as_json)
+        return
     with terminal.exit_code(terminal.Exit.USAGE):
         from mlscorr.pipeline import method_named
 
@@ -42,6 +76,52 @@ def compare(
         )
     if left:
         raise typer.Exit(terminal.Exit.IN_PART)
+
+
+def _check_arguments(survey, second, out, clouds):
+    """Refuse what is neither one survey nor two results."""
+    from mlscorr.pipeline import is_result
+
+    if second is None:
+        if is_result(survey):
+            raise ValueError(
+                f"{survey} is a result of mlscorr correct, and one alone has nothing to be "
+                f"compared with. Name a second one: mlscorr compare {survey} OTHER -o compared."
+            )
+        if out is None:
+            raise ValueError(
+                "The option -o is missing, the folder for the results: "
+                f"mlscorr compare {survey} -o compared."
+            )
+        return
+    for path in (survey, second):
+        if not is_result(path):
+            raise ValueError(
+                f"{path} is no result of mlscorr correct: it holds no report.json. Give two "
+                "folders that mlscorr correct -o wrote, or one survey.toml."
+            )
+    if clouds:
+        raise ValueError("--clouds is of the methods on one survey; two results have no methods.")
+
+
+def _compare_results(first, second, out, overwrite, as_json):
+    """Compare two results, and write what was found where a folder is given."""
+    if out is None:
+        with terminal.exit_code(terminal.Exit.BAD_DATA):
+            result = mlscorr.compare_results(first, second)
+            document = result.document
+    else:
+        read = [folder / name for folder in (first, second) for name in RESULT_FILES]
+        with work(out, overwrite, inputs=read):
+            result = mlscorr.compare_results(first, second)
+            document = result.write(out, overwrite)
+    print_json(document, as_json)
+    for side in ("first", "second"):
+        terminal.say(f"{side.capitalize()}: {document[side]['folder']}")
+    terminal.say_statements(document["statements"])
+    terminal.say(result)
+    if out is not None:
+        terminal.say_results([("Report", out / "compare_results.html")])
 
 
 def _tell(report, out):

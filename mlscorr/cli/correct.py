@@ -36,10 +36,27 @@ def correct(
     trajectory: Annotated[
         list[str],
         typer.Option(
-            help="A further file for the corrected trajectory, in OUT: NAME.sbet (with its smrmsg) "
-            "or NAME.tum."
+            help="A further file for the corrected trajectory, in OUT: NAME.sbet (with its "
+            "smrmsg), NAME.tum, NAME.gpkg or NAME.geojson."
         ),
     ] = (),
+    targets: Annotated[
+        list[str],
+        typer.Option(
+            help="A further file for the surveyed points, in OUT, for a GIS: NAME.gpkg (in the "
+            "survey's CRS) or NAME.geojson (WGS 84)."
+        ),
+    ] = (),
+    displacement: Annotated[
+        bool,
+        typer.Option("--displacement", help="Add to each point by how much its E, N, H moved."),
+    ] = False,
+    provenance: Annotated[
+        bool,
+        typer.Option(
+            "--provenance", help="State version, settings and inputs in the header of each cloud."
+        ),
+    ] = False,
     fail_if: Annotated[
         list[str],
         typer.Option(
@@ -63,14 +80,19 @@ def correct(
     as_json: terminal.Json = False,
     quiet: terminal.Quiet = False,
 ) -> None:
-    """Correct the cloud of a survey, or all drives of a project.toml, and report on it."""
+    """Correct the cloud of a survey, or all drives of a project.toml, and report on it.
+
+    mlscorr correct survey.toml -o corrected --targets targets.gpkg --trajectory drive.sbet
+    """
     with terminal.exit_code(terminal.Exit.USAGE):
         from mlscorr.evaluate import failures, read_gate
-        from mlscorr.io.clouds import add_sigma_fields, read_layout
+        from mlscorr.io.clouds import Additions, read_layout, with_additions
         from mlscorr.io.surveys import is_project
-        from mlscorr.io.trajectories import check_exports
+        from mlscorr.io.trajectories import check_distinct, check_exports, check_target_exports
 
         check_exports(trajectory)
+        check_target_exports(targets)
+        check_distinct([*trajectory, *targets])
         gates = [read_gate(text) for text in fail_if]
         if no_ties and ties_only:
             raise ValueError("--no-ties and --ties-only leave nothing to correct with: give one.")
@@ -79,7 +101,13 @@ def correct(
         if is_project(survey):
             from mlscorr.pipeline.project import Options
 
-            given = order, ties, sigma, not no_report, tuple(trajectory), *shared, overwrite
+            if provenance:
+                raise ValueError(
+                    "--provenance is of one survey, and a cloud of a project may belong to several "
+                    "drives. The report.json of each drive names its inputs and their SHA-256."
+                )
+            exports = tuple(trajectory), tuple(targets)
+            given = order, ties, sigma, not no_report, *exports, displacement, *shared, overwrite
             correct_drives(survey, out, Options(*given), gates, as_json)
             return
         if shared != (1, None, False):
@@ -92,11 +120,21 @@ def correct(
         for sentence in recorded.layouts:
             terminal.say(sentence)
         check_exports(trajectory, recorded.crs, is_read=True)
-        for cloud in recorded.cloud_paths if sigma else ():
-            add_sigma_fields(read_layout(cloud))  # refuses a cloud that has them, before the work
+        check_target_exports(targets, recorded.crs, is_read=True)
+        added = Additions(sigma, displacement)
+        for cloud in recorded.cloud_paths if added.has_fields else ():
+            with_additions(read_layout(cloud), added)  # refuses one that has them, before the work
         result = mlscorr.correct(recorded, order, progress=progress, ties=ties)
         report = result.write(
-            out, overwrite, progress, sigma, page=not no_report, trajectories=trajectory
+            out,
+            overwrite,
+            progress,
+            sigma,
+            page=not no_report,
+            trajectories=trajectory,
+            targets=targets,
+            displacement=displacement,
+            provenance=provenance,
         )
     tell(report, out, as_json, not no_report)
     terminal.end(failures(gates, report), not report["coverage"]["points_untouched"])

@@ -9,6 +9,7 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
         "blind": ["make_blind", "run_blind", "score_blind"],
         "calibration": ["CalibratedScanners", "CalibratedSurvey", "calibrate"],
         "checking": ["CheckedSurvey", "check"],
+        "compared_results": ["ComparedResults", "compare_results", "is_result"],
         "comparison": ["ComparedSurvey", "compare"],
         "corrected_survey": ["CorrectedSurvey"],
         "correction": ["correct"],

@@ -10,7 +10,7 @@ import numpy as np
 
 from mlscorr.correction import Correction, PointSigma
 from mlscorr.estimate import Support
-from mlscorr.io.clouds import CorrectedPart, sha256, write_parts, written_name
+from mlscorr.io.clouds import Additions, CorrectedPart, sha256, write_parts, written_name
 from mlscorr.survey import Correcting, Survey
 
 
@@ -120,7 +120,7 @@ class MovedClouds:
     held: tuple[tuple[float, float], Support]
 
     def parts(
-        self, watch: Callable[[np.ndarray, np.ndarray], object], with_sigma: bool
+        self, watch: Callable[[np.ndarray, np.ndarray], object], additions: Additions
     ) -> Iterator[CorrectedPart]:
         """The points of each file and scanner.
 
@@ -128,17 +128,21 @@ class MovedClouds:
         ----------
         watch : function
             As of CorrectedPart.
-        with_sigma : bool
-            Whether each point gets its sigmas.
+        additions : Additions
+            What the files get beside new places.
         """
         for part in self.survey.by_scanner.values():
             of_part = self.correction, part.scanner, part.mounting
-            sigma = PointSigma.of(*of_part) if with_sigma else None
-            yield from (CorrectedPart(file, self.correction, sigma, watch) for file in part.clouds)
+            sigma = PointSigma.of(*of_part) if additions.sigma else None
+            for file in part.clouds:
+                yield CorrectedPart(file, self.correction, sigma, watch, additions)
 
 
 def write_counted(
-    drives: Sequence[MovedClouds], folder: Path, done: Callable[[int], object], with_sigma: bool
+    drives: Sequence[MovedClouds],
+    folder: Path,
+    done: Callable[[int], object],
+    additions: Additions,
 ) -> list[WrittenClouds]:
     """Write the clouds of drives, a file of several once, and count the points that nothing holds.
 
@@ -148,8 +152,8 @@ def write_counted(
         One, or several that share files.
     folder : Path
     done : function of a number of points
-    with_sigma : bool
-        Whether each point gets three fields more: its sigmas.
+    additions : Additions
+        What the files get beside new places.
 
     Returns
     -------
@@ -159,7 +163,7 @@ def write_counted(
     counts = [np.zeros(3, int) for _ in drives]
     parts: dict[Path, list[tuple[int, CorrectedPart]]] = {}
     for number, drive in enumerate(drives):
-        for part in drive.parts(_counting(drive.held, counts[number], done), with_sigma):
+        for part in drive.parts(_counting(drive.held, counts[number], done), additions):
             parts.setdefault(part.file.path, []).append((number, part))
     rows: list[list] = [[] for _ in drives]
     for source, some in parts.items():

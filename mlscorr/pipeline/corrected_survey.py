@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,10 +26,13 @@ from mlscorr.evaluate import (
     surveyed_rows,
     tie_section,
 )
-from mlscorr.io.clouds import sha256
+from mlscorr.io.clouds import Additions, sha256
 from mlscorr.io.tables import write_targets_csv
 from mlscorr.io.trajectories import (
+    check_distinct,
     check_exports,
+    check_target_exports,
+    export_targets,
     export_trajectory,
     write_trajectory_csv,
     write_weak,
@@ -43,6 +49,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from mlscorr.report import CorrectionReport
+
+VERSION = version("mlscorr")
 
 
 @dataclass(frozen=True, repr=False)
@@ -196,6 +204,9 @@ class CorrectedSurvey(Summary):
         sigma: bool = False,
         page: bool = True,
         trajectories: Sequence[str] = (),
+        targets: Sequence[str] = (),
+        displacement: bool = False,
+        provenance: bool = False,
     ) -> dict:
         """Write corrected clouds, trajectory, targets and report into a folder.
 
@@ -212,8 +223,17 @@ class CorrectedSurvey(Summary):
             Draw report.html and the pictures too, which takes longer than all else where the
             survey is short.
         trajectories : sequence of str
-            Further files for the corrected trajectory: NAME.sbet or NAME.out with its smrmsg, or
-            NAME.tum.
+            Further files for the corrected trajectory: NAME.sbet or NAME.out with its smrmsg,
+            NAME.tum, NAME.gpkg or NAME.geojson.
+        targets : sequence of str
+            Further files for the surveyed points: NAME.gpkg or NAME.geojson.
+        displacement : bool
+            Give each point the fields displacement_easting, displacement_northing and
+            displacement_height, corrected - recorded.
+        provenance : bool
+            Name mlscorr as the generating software of each cloud, and give it a VLR (user id
+            mlscorr, record id 1) with version, settings, and the hash of the inputs. Without it all
+            but the coordinates stays as it was, byte for byte; so it is not the default.
 
         Returns
         -------
@@ -228,14 +248,33 @@ class CorrectedSurvey(Summary):
             When writing fails.
         """
         check_exports(trajectories, self.survey.crs, is_read=True)
+        check_target_exports(targets, self.survey.crs, is_read=True)
+        check_distinct([*trajectories, *targets])
+        text = self._provenance() if provenance else None
+        added = Additions(sigma, displacement, text, VERSION)
 
         def clouds(folder):
             done = (progress or silent)("Writing the cloud", self.survey.points)
             moved = MovedClouds(self.survey, self.estimate.correction, self.held)
-            (written,) = write_counted([moved], folder, done, sigma)
+            (written,) = write_counted([moved], folder, done, added)
             return written
 
-        return self._files(progress, page, trajectories).write(out, overwrite, clouds)
+        return self._files(progress, page, trajectories, targets).write(out, overwrite, clouds)
+
+    def _provenance(self):
+        """Text of the VLR that names what corrected a cloud."""
+        settings = {
+            "order": self.estimate.order,
+            "ties_used": (self.tie_section or {}).get("used", 0),
+        }
+        inputs = sorted((file.path.name, sha256(file.path)) for file in self.survey.inputs)
+        content = {
+            "version": VERSION,
+            "settings": settings,
+            "settings_sha256": _digest(json.dumps(settings, sort_keys=True)),
+            "inputs_sha256": _digest("".join(f"{content}  {name}\n" for name, content in inputs)),
+        }
+        return json.dumps({"schema": "mlscorr.provenance/1", **content})
 
     @property
     def held(self) -> tuple[tuple[float, float], Support]:
@@ -253,11 +292,12 @@ class CorrectedSurvey(Summary):
         progress: Callable | None = None,
         page: bool = True,
         trajectories: Sequence[str] = (),
+        targets: Sequence[str] = (),
     ) -> dict:
         """Write all but the clouds into a folder that is there, as ``write`` does."""
-        return self._files(progress, page, trajectories).write_beside(folder, written)
+        return self._files(progress, page, trajectories, targets).write_beside(folder, written)
 
-    def _files(self, progress, page, trajectories):
+    def _files(self, progress, page, trajectories, targets):
         """Trajectory, targets, weak stretches and report.json; report.html and the pictures."""
         from mlscorr.report import first_screen
 
@@ -265,8 +305,15 @@ class CorrectedSurvey(Summary):
         rows = [row.document() for row in self.targets]
         weak = [stretch.document() for stretch in self.estimate.support.weak]
         exports = {
-            name: lambda path: export_trajectory(path, self.trajectory, survey.crs)
+            name: lambda path: export_trajectory(
+                path, self.trajectory, survey.crs, self.estimate.correction.recorded
+            )
             for name in trajectories
+        }
+        surveyed = (survey.control, survey.check)
+        kinds = {n: k for points in surveyed for n, k in zip(points.name, points.kind, strict=True)}
+        exports |= {
+            name: lambda path: export_targets(path, rows, kinds, survey.crs) for name in targets
         }
         tables = {
             "trajectory.csv": lambda path: write_trajectory_csv(path, self.trajectory),
@@ -276,9 +323,9 @@ class CorrectedSurvey(Summary):
         }
 
         def report(written):
-            exported = [name for export in trajectories for name in written.tables[export]]
+            paths = [name for export in trajectories for name in written.tables[export]]
             report = self._report(
-                written.folder, written.clouds, exported, written.tables["weak.csv"]
+                written.folder, written.clouds, paths, targets, written.tables["weak.csv"]
             )
             pages = self._pages(report, progress or silent) if page else {}
             return Reported(first_screen(report) | report.document(), pages)
@@ -323,7 +370,7 @@ class CorrectedSurvey(Summary):
         survey = survey or self.survey
         return PointSigma.of(self.estimate.correction, survey.scanner, survey.mounting)
 
-    def _report(self, folder, written, exports, weak_names):
+    def _report(self, folder, written, exports, targets, weak_names):
         """The CorrectionReport, once all that it names stands in the folder."""
         from mlscorr.report import FileRow
 
@@ -331,7 +378,8 @@ class CorrectedSurvey(Summary):
             return FileRow(path.name, sha256(path), what, bytes=path.stat().st_size)
 
         names = ["trajectory.csv", *exports]
-        outputs = [*(("corrected trajectory", name) for name in names), ("targets", "targets.csv")]
+        outputs = [("corrected trajectory", name) for name in names]
+        outputs += [("targets", name) for name in ("targets.csv", *targets)]
         outputs += [("extrapolated stretches", name) for name in weak_names]
         return replace(
             self._draft,
@@ -372,3 +420,8 @@ class CorrectedSurvey(Summary):
             datum=self.datum,
             assumed=self.survey.assumed_pos if self.survey.has_assumed_position else (),
         )
+
+
+def _digest(text):
+    """SHA-256 of a text."""
+    return hashlib.sha256(text.encode()).hexdigest()

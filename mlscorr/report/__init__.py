@@ -8,6 +8,7 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
         "_calibration_page": ["calibration_page", "calibration_screen", "scanners_screen"],
         "_comparison_screen": ["comparison_screen", "method_warnings"],
         "_show": ["show"],
+        "_results_screen": ["results_screen"],
         "cloud": ["view_cloud"],
         "comparison_page": ["comparison_figure", "write_comparison"],
         "correction_page": ["write_report"],
@@ -17,6 +18,7 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(
         "headline": ["RATINGS", "StatementRow", "capped", "first_screen", "statements_section"],
         "maps": ["search_figure"],
         "project_page": ["write_project"],
+        "results_page": ["results_figure", "write_results"],
         "stage_figures": [
             "misclosure_figure",
             "pos_error_figure",

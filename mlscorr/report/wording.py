@@ -496,6 +496,70 @@ def _untied(name, other, why):
     return sentence
 
 
+def _finely(value):
+    """A difference of two results, to a tenth of a millimeter below a centimeter."""
+    if value < 0.0095:
+        return f"{1000 * value:.1f} mm"
+    return length_in_words(value)
+
+
+def _trajectories_differ(largest, time, rms, axes):
+    by_axis = ", ".join(_finely(axes[name]) for name in ("easting", "northing", "height"))
+    return (
+        f"The corrected positions differ by up to {_finely(largest)} in 3D (at {time:.1f} s), "
+        f"{_finely(rms)} RMS ({by_axis} in E, N, H)."
+    )
+
+
+def _epochs_differ(interpolated, first, second):
+    words = []
+    if interpolated:
+        words.append(
+            f"{counted(interpolated, 'epoch')} of the first result "
+            f"{'has' if interpolated == 1 else 'have'} no partner in the second, which is "
+            "interpolated there."
+        )
+    if first or second:
+        words.append(
+            f"Not compared, as the other trajectory does not cover them: {counted(first, 'epoch')} "
+            f"of the first, {second} of the second."
+        )
+    return " ".join(words)
+
+
+def _scores_of_results(name, first, second, difference, counts):
+    observed = " and ".join(counted(count, "observation") for count in dict.fromkeys(counts))
+    words = "no change" if abs(difference) < 5e-5 else f"{1000 * difference:+.1f} mm"
+    return (
+        f"3D RMSE at {name}: {_finely(first)} in the first, {_finely(second)} in the second "
+        f"({words}; {observed})."
+    )
+
+
+def _residuals_differ(name, change, count, all, least):
+    if not count:
+        return (
+            f"No residual differs by more than {length_in_words(least)}; largest difference "
+            f"{_finely(change)} at {name}."
+        )
+    return (
+        f"The residuals of {count} of {counted(all, 'observation')} differ by more than "
+        f"{length_in_words(least)}, most at {name} ({_finely(change)}):"
+    )
+
+
+def _values_differ(count, all):
+    if not count:
+        return f"All {all} values of model and coverage agree."
+    return f"{count} of {all} values of model and coverage differ (first → second):"
+
+
+def _inputs_differ(count, all):
+    if not count:
+        return f"All {all} inputs have the same contents."
+    return f"{count} of {counted(all, 'input')} differ:"
+
+
 SENTENCES: dict[str, Wording] = {
     "nothing to judge by": "There is no surveyed point that could tell how good the correction is.",
     "no target to judge by": "No target was found that could tell how good the correction is.",
@@ -581,6 +645,24 @@ SENTENCES: dict[str, Wording] = {
     "method with ties": _tied,
     "method without ties": _untied,
     "methods without a score": "{count} of {methods} methods have no score.",
+    "equal trajectories": "The corrected trajectories are equal at all {epochs} epochs.",
+    "trajectories differ": _trajectories_differ,
+    "epochs differ": _epochs_differ,
+    "scores of results": _scores_of_results,
+    "residuals differ": _residuals_differ,
+    "surveyed differently": lambda count: (
+        f"{counted(count, 'surveyed point')} "
+        f"{'has' if count == 1 else 'have'} other coordinates in the second result:"
+    ),
+    "same targets used": "Both results use the same {n} observations of targets.",
+    "targets used in one": lambda count: (
+        f"{counted(count, 'observation')} {'is' if count == 1 else 'are'} used in one result only:"
+    ),
+    "values differ": _values_differ,
+    "inputs differ": _inputs_differ,
+    "warnings of one": lambda count: (
+        f"{counted(count, 'warning')} {'stands' if count == 1 else 'stand'} in one result only:"
+    ),
 }
 
 

@@ -485,6 +485,84 @@ CATALOGUE = [
         "correct equals lsc here, for no ties were used.",
     ),
     ("methods without a score", {"count": 1, "methods": 3}, "1 of 3 methods have no score."),
+    (
+        "equal trajectories",
+        {"epochs": 801},
+        "The corrected trajectories are equal at all 801 epochs.",
+    ),
+    (
+        "trajectories differ",
+        {
+            "largest": 0.1003,
+            "time": 357703.08,
+            "rms": 0.0023,
+            "axes": {"easting": 0.0009, "northing": 0.0021, "height": 0.0},
+        },
+        "The corrected positions differ by up to 10.0 cm in 3D (at 357703.1 s), 2.3 mm RMS "
+        "(0.9 mm, 2.1 mm, 0.0 mm in E, N, H).",
+    ),
+    (
+        "epochs differ",
+        {"interpolated": 400, "first": 1, "second": 99},
+        "400 epochs of the first result have no partner in the second, which is interpolated "
+        "there. Not compared, as the other trajectory does not cover them: 1 epoch of the first, "
+        "99 of the second.",
+    ),
+    (
+        "epochs differ",
+        {"interpolated": 1, "first": 0, "second": 0},
+        "1 epoch of the first result has no partner in the second, which is interpolated there.",
+    ),
+    (
+        "scores of results",
+        {
+            "name": "check points",
+            "first": 0.0126,
+            "second": 0.0093,
+            "difference": -0.0033,
+            "counts": [5, 4],
+        },
+        "3D RMSE at check points: 1.3 cm in the first, 9.3 mm in the second (-3.3 mm; 5 "
+        "observations and 4 observations).",
+    ),
+    (
+        "scores of results",
+        {
+            "name": "check points",
+            "first": 0.002,
+            "second": 0.002,
+            "difference": 0.0,
+            "counts": [1, 1],
+        },
+        "3D RMSE at check points: 2.0 mm in the first, 2.0 mm in the second (no change; 1 "
+        "observation).",
+    ),
+    (
+        "residuals differ",
+        {"name": "T04", "change": 0.0025, "count": 2, "all": 4, "least": 0.002},
+        "The residuals of 2 of 4 observations differ by more than 2 mm, most at T04 (2.5 mm):",
+    ),
+    (
+        "residuals differ",
+        {"name": "T04", "change": 0.0005, "count": 0, "all": 4, "least": 0.002},
+        "No residual differs by more than 2 mm; largest difference 0.5 mm at T04.",
+    ),
+    (
+        "surveyed differently",
+        {"count": 1},
+        "1 surveyed point has other coordinates in the second result:",
+    ),
+    ("same targets used", {"n": 4}, "Both results use the same 4 observations of targets."),
+    ("targets used in one", {"count": 2}, "2 observations are used in one result only:"),
+    (
+        "values differ",
+        {"count": 9, "all": 21},
+        "9 of 21 values of model and coverage differ (first → second):",
+    ),
+    ("values differ", {"count": 0, "all": 21}, "All 21 values of model and coverage agree."),
+    ("inputs differ", {"count": 1, "all": 4}, "1 of 4 inputs differ:"),
+    ("inputs differ", {"count": 0, "all": 4}, "All 4 inputs have the same contents."),
+    ("warnings of one", {"count": 1}, "1 warning stands in one result only:"),
 ]
 
 

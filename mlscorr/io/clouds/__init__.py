@@ -26,7 +26,13 @@ from mlscorr.io.clouds.las import (
     timed_records,
 )
 from mlscorr.io.clouds.las_checks import read_layout
-from mlscorr.io.clouds.las_copy import CorrectedPart, add_sigma_fields, write_parts
+from mlscorr.io.clouds.las_copy import (
+    NOTHING_ADDED,
+    Additions,
+    CorrectedPart,
+    with_additions,
+    write_parts,
+)
 from mlscorr.io.clouds.las_crs import cloud_box, crs_conflict, stated_crs
 from mlscorr.io.clouds.las_layout import LasLayout
 from mlscorr.io.clouds.las_writer import cloud_writer

@@ -18,11 +18,51 @@ from mlscorr.io.clouds.las_writer import INTEGER_LIMIT, LasOutput, PlainWriter, 
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.store import PART, is_remote, open_file, output_file
 from mlscorr.io.trajectories import PLACEHOLDERS
-from mlscorr.survey import CloudFile, CloudInMemory, Correcting, PointCloud
+from mlscorr.survey import AXES, CloudFile, CloudInMemory, Correcting, PointCloud
 
-NAMES = ("sigma_easting", "sigma_northing", "sigma_height")
-UINT16 = 3  # number of the type, ASPRS LAS 1.4 R15, table 24
+SIGMAS = tuple(f"sigma_{axis}" for axis in AXES)
+DISPLACEMENTS = tuple(f"displacement_{axis}" for axis in AXES)
+UINT16, INT32 = 3, 6  # numbers of the types, ASPRS LAS 1.4 R15, table 24
+PROVENANCE = (b"mlscorr", 1)  # user and record of the VLR that names what corrected a file
+SOFTWARE = slice(58, 90)  # bytes of the header: generating software
 UNKNOWN = np.iinfo(np.uint16).max  # of a point without a pose
+
+
+@dataclass(frozen=True)
+class Additions:
+    """What a corrected file has beside its points' new places, nothing by default.
+
+    By default all but the places stays as it was, byte for byte, so that two files can be compared
+    and a correction by zero gives the file itself. Each of these breaks that promise, so each is
+    asked for.
+
+    Parameters
+    ----------
+    sigma : bool
+        Fields sigma_easting, sigma_northing, sigma_height of each point: uint16, 0.1 mm.
+    displacement : bool
+        Fields displacement_easting, displacement_northing, displacement_height of each point,
+        corrected - recorded: int32 of the file's own scale, so that the recorded integers come
+        back exactly. Zero for points that were left as they were.
+    provenance : str, optional
+        Text of a VLR (user id mlscorr, record id 1), which makes mlscorr the generating software,
+        too.
+    version : str
+        Of mlscorr, for the header; used with provenance alone.
+    """
+
+    sigma: bool = False
+    displacement: bool = False
+    provenance: str | None = None
+    version: str = ""
+
+    @property
+    def has_fields(self) -> bool:
+        """Whether points get longer."""
+        return self.sigma or self.displacement
+
+
+NOTHING_ADDED = Additions()
 
 
 @dataclass(frozen=True)
@@ -39,12 +79,20 @@ class CorrectedPart:
     watch : function, optional
         Called for each chunk that is done with the gps_time (n,) in the trajectory's system, and
         with which points are flagged as noise (n,).
+    additions : Additions
+        Displacement and provenance; sigmas go by ``sigma``. The same for all parts of a file.
     """
 
     file: CloudFile
     correction: Correcting
     sigma: PointSigma | None = None
     watch: Callable[[np.ndarray, np.ndarray], object] | None = None
+    additions: Additions = NOTHING_ADDED
+
+    @property
+    def added(self) -> Additions:
+        """Additions with the fields of sigmas, where it has them."""
+        return replace(self.additions, sigma=self.sigma is not None)
 
     def move(self, layout: LasLayout, records: np.ndarray, sigmas: np.ndarray | None) -> int:
         """Correct its points among records in place; returns those outside the trajectory.
@@ -83,6 +131,11 @@ def _write_points(part, file, target):
             f"{file.name} stands for points in memory, which are written without the fields of "
             "sigmas: point_sigma() of the result gives these."
         )
+    if part.added != NOTHING_ADDED:
+        raise ValueError(
+            f"{file.name} stands for points in memory, which are written without displacement and "
+            "provenance. Write the points as LAS first, and read the survey from files."
+        )
     outside = 0
     with cloud_writer(target, file.cloud.xyz[0], file.crs) as writer:
         for chunk in file.chunks(SETTINGS.chunk_points):
@@ -105,9 +158,9 @@ def write_parts(parts: Sequence[CorrectedPart], target: str | Path) -> list[int]
     """Copy a file with corrected coordinates; all else stays as it was, byte for byte.
 
     What changes: X, Y, Z of each point, the bounds in the header, and where it must, the
-    position of what follows the points. The target's suffix says whether it is compressed. It
-    appears whole or not at all: it is written beside its place as ``.part``, and read again
-    before it takes its name. A file there is replaced.
+    position of what follows the points; and what the parts' additions ask for. The target's suffix
+    says whether it is compressed. It appears whole or not at all: it is written beside its place as
+    ``.part``, and read again before it takes its name. A file there is replaced.
 
     Parameters
     ----------
@@ -180,16 +233,13 @@ class _Corrected:
         self._target = target
         self._parts = parts
         self.is_laz = target.suffix.lower() == ".laz"
-        self._has_sigmas = parts[0].sigma is not None
-        if self._has_sigmas:
-            self.written = add_sigma_fields(layout)
-        else:
-            self.written = layout
+        self._added = parts[0].added
+        self.written = with_additions(layout, self._added)
 
     def blocks(self, is_final):
         """All records, (n,) at a time, as bytes of each; those who watch are told the last time."""
         layout = self._layout
-        has_sigmas = self._has_sigmas
+        added = self._added
         if is_final:
             parts = self._parts
         else:
@@ -199,10 +249,11 @@ class _Corrected:
         self.bounds = np.array([np.full(3, -np.inf), np.full(3, np.inf)])
         for records in read_records(layout, SETTINGS.chunk_points):
             _check_channels(layout, self._target, records)
-            if has_sigmas:
+            sigmas = None
+            if added.sigma:
                 sigmas = np.full((len(records), 3), np.nan)
-            else:
-                sigmas = None
+            if added.displacement:
+                recorded = _integers(records)
             self.outside += [part.move(layout, records, sigmas) for part in parts]
             times = records["gps_time"]
             self.untimed[np.nan] += np.count_nonzero(~np.isfinite(times))
@@ -211,11 +262,18 @@ class _Corrected:
             xyz = [records[name] for name in "XYZ"]
             self.bounds[0] = np.maximum(self.bounds[0], [values.max() for values in xyz])
             self.bounds[1] = np.minimum(self.bounds[1], [values.min() for values in xyz])
-            if sigmas is None:
-                raw = records.view(np.uint8)
-            else:
-                raw = with_sigmas(records, sigmas)
+            columns = []
+            if sigmas is not None:
+                columns.append(_sigma_steps(sigmas))
+            if added.displacement:
+                columns.append((_integers(records) - recorded).astype("<i4"))
+            raw = _lengthened(records, columns)
             yield raw.view(f"V{self.written.record_length}")
+
+
+def _integers(records):
+    """Coordinates (n, 3) of point records as they are stored."""
+    return np.column_stack([records[name] for name in "XYZ"]).astype(np.int64)
 
 
 def _shift_integers(correction, xyz, scale, offset, gps_time, time_constant):
@@ -264,14 +322,15 @@ def _check_copy(layout, part):
         raise OSError(f"{part} was written with {copy.points} of {layout.points} points.")
 
 
-def add_sigma_fields(layout: LasLayout) -> LasLayout:
-    """The LasLayout with one sigma of E, N and H behind each point, as uint16.
+def with_additions(layout: LasLayout, additions: Additions) -> LasLayout:
+    """The LasLayout of a copy with more fields behind each point, or a VLR on its provenance.
 
-    Extra bytes that nobody described get a descriptor, as the new ones follow them.
+    Extra bytes that nobody described get a descriptor, as the new ones follow them. All VLRs stay.
 
     Parameters
     ----------
     layout : LasLayout
+    additions : Additions
 
     Returns
     -------
@@ -282,6 +341,19 @@ def add_sigma_fields(layout: LasLayout) -> LasLayout:
     ValueError
         When the points have these fields already, or fewer bytes than described.
     """
+    if additions.has_fields:
+        layout = _with_fields(layout, additions)
+    if additions.provenance is None:
+        return layout
+    text = additions.provenance.encode()
+    head = bytearray(layout.head_with(*PROVENANCE, text, b"correction by mlscorr"))
+    software = f"mlscorr {additions.version}".encode()[: SOFTWARE.stop - SOFTWARE.start]
+    head[SOFTWARE] = software.ljust(SOFTWARE.stop - SOFTWARE.start, b"\0")
+    return replace(layout, head=bytes(head))
+
+
+def _with_fields(layout, additions):
+    """The LasLayout with sigmas and displacements behind each point."""
     owner = (ExtraBytesVlr.official_user_id().encode(), ExtraBytesVlr.official_record_ids()[0])
     described = b"".join(variable_records(layout, *owner))
     size = ExtraBytesStruct.size()
@@ -290,10 +362,12 @@ def add_sigma_fields(layout: LasLayout) -> LasLayout:
         ExtraBytesStruct.from_buffer_copy(described, start)
         for start in range(0, len(described), size)
     ]
-    if twice := sorted({field.name.decode(errors="replace") for field in fields} & set(NAMES)):
+    new = SIGMAS * additions.sigma + DISPLACEMENTS * additions.displacement
+    if twice := sorted({field.name.decode(errors="replace") for field in fields} & set(new)):
+        kinds = "sigmas" if twice[0] in SIGMAS else "displacements"
         raise ValueError(
             f"The points of {layout.path} have the field {twice[0]} already. Correct the file as "
-            "it was recorded, or do so without sigmas."
+            f"it was recorded, or do so without {kinds}."
         )
     nameless = layout.extra_bytes - sum(field.dtype().itemsize for field in fields)
     if nameless < 0:
@@ -305,31 +379,34 @@ def add_sigma_fields(layout: LasLayout) -> LasLayout:
     for number, start in enumerate(range(0, nameless, longest)):
         size = min(longest, nameless - start)
         described += _descriptor(b"undescribed_%d" % number, data_type=0, options=size)
-    for name in NAMES:
-        scaled = {"scale": [SETTINGS.sigma_step], "no_data": [UNKNOWN]}
-        described += _descriptor(name.encode(), b"one sigma, m", data_type=UINT16, **scaled)
+    length = layout.record_length
+    if additions.sigma:
+        for name in SIGMAS:
+            scaled = {"scale": [SETTINGS.sigma_step], "no_data": [UNKNOWN]}
+            described += _descriptor(name.encode(), b"one sigma, m", data_type=UINT16, **scaled)
+            length += np.dtype(np.uint16).itemsize
+    if additions.displacement:
+        for name, scale in zip(DISPLACEMENTS, layout.scale, strict=True):
+            words = b"corrected - recorded, m"
+            described += _descriptor(name.encode(), words, data_type=INT32, scale=[scale])
+            length += np.dtype(np.int32).itemsize
     head = layout.head_with(*owner, described)
-    length = layout.record_length + len(NAMES) * np.dtype(np.uint16).itemsize
     return replace(layout, head=head).with_record_length(length)
 
 
-def with_sigmas(records: np.ndarray, sigma: np.ndarray) -> np.ndarray:
-    """Bytes of point records with their sigmas behind each.
-
-    Parameters
-    ----------
-    records : (n,) structured array
-    sigma : (n, 3) array
-        NaN where unknown; what exceeds 6.5534 m is given as that. Units: m.
-
-    Returns
-    -------
-    (k,) array of uint8
-    """
+def _sigma_steps(sigma):
+    """Sigmas (n, 3) in m as stored: NaN is unknown; what exceeds 6.5534 m is given as that."""
     steps = np.minimum(np.rint(sigma / SETTINGS.sigma_step), UNKNOWN - 1)
-    steps = np.where(np.isnan(steps), UNKNOWN, steps).astype("<u2")
-    raw = records.view(np.uint8).reshape(len(records), -1)
-    return np.hstack([raw, steps.view(np.uint8)]).ravel()
+    return np.where(np.isnan(steps), UNKNOWN, steps).astype("<u2")
+
+
+def _lengthened(records, columns):
+    """Bytes (k,) of point records with further columns (n, 3) behind each."""
+    if not columns:
+        return records.view(np.uint8)
+    raw = [records.view(np.uint8).reshape(len(records), -1)]
+    raw += [np.ascontiguousarray(values).view(np.uint8) for values in columns]
+    return np.hstack(raw).ravel()
 
 
 def _descriptor(name, description=b"", scale=None, no_data=None, **fields):
@@ -339,5 +416,6 @@ def _descriptor(name, description=b"", scale=None, no_data=None, **fields):
         setattr(field, key, value)
     if scale is not None:
         field.scale = scale
+    if no_data is not None:
         field.no_data = no_data
     return bytes(field)

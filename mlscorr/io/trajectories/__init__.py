@@ -2,6 +2,7 @@
 
 - trajectory, trajectory_sessions: one file, and several that are joined in time
 - sbet, pof, trj, trajectory_tables, poses, trajectory_exports: the formats, read and written
+- features: points and lines for a GIS, GeoPackage and GeoJSON
 - conventions, course, projection: attitudes and positions brought into the map
 - time_systems: the constant between the times of cloud and trajectory
 """
@@ -37,7 +38,14 @@ from mlscorr.io.trajectories.time_systems import (
     utc_lag,
 )
 from mlscorr.io.trajectories.trajectory import read_trajectory, write_trajectory_csv
-from mlscorr.io.trajectories.trajectory_exports import check_exports, export_trajectory, write_weak
+from mlscorr.io.trajectories.trajectory_exports import (
+    check_distinct,
+    check_exports,
+    check_target_exports,
+    export_targets,
+    export_trajectory,
+    write_weak,
+)
 from mlscorr.io.trajectories.trajectory_sessions import (
     SessionFile,
     Sessions,

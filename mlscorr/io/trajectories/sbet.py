@@ -31,10 +31,10 @@ from mlscorr.survey import WEEK, Trajectory
 SBET_FIELDS = (
     "gps_time",
     *("latitude", "longitude", "height"),  # rad, rad, m above the ellipsoid
-    *("velocity_x", "velocity_y", "velocity_z"),  # m/s, in the wander frame; not used
+    *("velocity_x", "velocity_y", "velocity_z"),  # m/s, in the wander frame; written alone
     *("roll", "pitch", "heading", "wander"),  # rad
-    *("acceleration_x", "acceleration_y", "acceleration_z"),  # not used
-    *("rate_x", "rate_y", "rate_z"),  # not used
+    *("acceleration_x", "acceleration_y", "acceleration_z"),  # m/s^2; written alone
+    *("rate_x", "rate_y", "rate_z"),  # rad/s; written alone
 )
 SMRMSG_FIELDS = (
     "gps_time",

@@ -1,4 +1,4 @@
-"""Trajectories for other programs, as SBET with its smrmsg and as TUM, and their weak stretches."""
+"""Results for other programs: SBET with its smrmsg, TUM, and layers for a GIS."""
 
 import json
 from collections.abc import Sequence
@@ -6,16 +6,26 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pyproj import Transformer
 
-from mlscorr.frames import angles_from_attitude
+from mlscorr.frames import angles_from_attitude, attitude_from_angles
 from mlscorr.io.store import output_file
 from mlscorr.io.tables import write_csv
+from mlscorr.io.trajectories._motion import motion_columns
+from mlscorr.io.trajectories.features import (
+    FEATURE_SUFFIXES,
+    GEOJSON,
+    target_layer,
+    to_lonlat,
+    trajectory_layers,
+    write_features,
+)
 from mlscorr.io.trajectories.projection import check_crs, to_geographic
 from mlscorr.io.trajectories.sbet import SBET_FIELDS, SMRMSG_FIELDS
 from mlscorr.survey import AXES, Trajectory
 
-SUFFIXES = (".sbet", ".out", ".tum")
+SUFFIXES = (".sbet", ".out", ".tum", *FEATURE_SUFFIXES)
+TUM = ".tum"
+TAKEN = "weak.geojson"  # is written anyway
 
 
 def check_exports(names: Sequence[str], crs: str | None = None, is_read: bool = False) -> None:
@@ -25,41 +35,128 @@ def check_exports(names: Sequence[str], crs: str | None = None, is_read: bool = 
     ----------
     names : sequence of str
     crs : str, optional
-        Of the survey, which an SBET needs.
+        Of the survey, which all but TUM need.
     is_read : bool
         Whether the survey is read, so that it has a crs or has none.
 
     Raises
     ------
     ValueError
-        For folders, unknown suffixes, and an SBET without a crs.
+        For folders, unknown suffixes, and all but TUM without a crs.
     """
     for name in names:
-        suffix = Path(name).suffix.lower()
-        if Path(name).name != name or suffix not in SUFFIXES:
-            raise ValueError(
-                f"--trajectory {name}: give the name of a file without a folder, which ends with "
-                f"{', '.join(SUFFIXES[:-1])} (SBET) or {SUFFIXES[-1]} (TUM)."
-            )
-        if is_read and suffix != SUFFIXES[-1]:
-            if crs is None:
-                raise ValueError(f"An SBET ({name}) is geographic: set crs in survey.toml.")
-            check_crs(crs)
+        suffix = _suffix(name, "--trajectory", SUFFIXES, ".sbet, .out (SBET), .tum (TUM)")
+        if is_read and suffix != TUM:
+            _require_crs(name, suffix, crs)
 
 
-def export_trajectory(path: str | Path, trajectory: Trajectory, crs: str | None) -> list[str]:
+def check_target_exports(
+    names: Sequence[str], crs: str | None = None, is_read: bool = False
+) -> None:
+    """Refuse names of files for targets that can't be written beside the results.
+
+    Parameters
+    ----------
+    names, crs, is_read
+        As of check_exports.
+
+    Raises
+    ------
+    ValueError
+        For folders, unknown suffixes, and a survey without a crs.
+    """
+    for name in names:
+        suffix = _suffix(name, "--targets", FEATURE_SUFFIXES)
+        if is_read:
+            _require_crs(name, suffix, crs)
+
+
+def check_distinct(names: Sequence[str]) -> None:
+    """Refuse names of exports of which one file would replace another.
+
+    Parameters
+    ----------
+    names : sequence of str
+        All that are asked for.
+
+    Raises
+    ------
+    ValueError
+    """
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise ValueError(
+            f"{twice[0]} is asked for twice, and one file would replace the other. Give each "
+            "export a name of its own."
+        )
+
+
+def _suffix(name, option, known, others=""):
+    """The suffix of an export's name, if it can be written."""
+    suffix = Path(name).suffix.lower()
+    if Path(name).name != name or suffix not in known or name.lower() == TAKEN:
+        kinds = ", ".join(filter(None, [others, "or .gpkg (GeoPackage)"]))
+        raise ValueError(
+            f"{option} {name}: give the name of a file without a folder, which ends with "
+            f"{kinds.removeprefix('or ')} or {GEOJSON} (GeoJSON), other than {TAKEN}."
+        )
+    return suffix
+
+
+def _require_crs(name, suffix, crs):
+    """Refuse what a survey without a CRS, or with a wrong one, can't be written as."""
+    if crs is None and suffix in FEATURE_SUFFIXES:
+        raise ValueError(f"A GIS needs the CRS of {name}: set crs in survey.toml.")
+    if crs is None:
+        raise ValueError(f"An SBET ({name}) is geographic: set crs in survey.toml.")
+    check_crs(crs)
+
+
+def export_targets(
+    path: str | Path, targets: Sequence[dict[str, Any]], kinds: dict[str, str], crs: str
+) -> list[str]:
+    """Write surveyed points as a GeoPackage or GeoJSON, as the suffix says.
+
+    Parameters
+    ----------
+    path : path
+    targets : sequence of dict
+        ``targets`` of report.json.
+    kinds : dict
+        Kind of each surveyed point by its name.
+    crs : str
+
+    Returns
+    -------
+    list of str
+        Name of the file.
+    """
+    write_features(path, [target_layer(targets, kinds)], crs)
+    return [Path(path).name]
+
+
+def export_trajectory(
+    path: str | Path,
+    trajectory: Trajectory,
+    crs: str | None,
+    recorded: Trajectory | None = None,
+) -> list[str]:
     """Write a trajectory as its suffix says; files appear whole or not at all.
 
-    Velocities, accelerations, rates and the wander angle of an SBET are zero. Beside it stands
-    smrmsg_NAME.out, where the trajectory has sigmas: at each epoch, for a second is long beside a
-    target. TUM's quaternions are of the body axes right, forward, up.
+    The wander angle of an SBET is zero: its velocities are north, west, up. Velocities, and
+    accelerations and rates about the body axes forward, right, down, are derivatives of the
+    trajectory, which cross no gap. Beside it stands smrmsg_NAME.out, where the trajectory has
+    sigmas: at each epoch, for a second is long beside a target. TUM's quaternions are of the body
+    axes right, forward, up.
 
     Parameters
     ----------
     path : path
     trajectory : Trajectory
     crs : str or None
-        Needed for an SBET.
+        Needed for all but TUM.
+    recorded : Trajectory, optional
+        With the same epochs: a GeoPackage or GeoJSON has the size of the correction, too.
 
     Returns
     -------
@@ -72,7 +169,10 @@ def export_trajectory(path: str | Path, trajectory: Trajectory, crs: str | None)
         For a crs that can't be left for latitude and longitude.
     """
     path = Path(path)
-    if path.suffix.lower() == SUFFIXES[-1]:
+    if path.suffix.lower() in FEATURE_SUFFIXES:
+        write_features(path, trajectory_layers(trajectory, recorded), crs)
+        return [path.name]
+    if path.suffix.lower() == TUM:
         table = trajectory.file_time, trajectory.position, trajectory.attitude.as_quat()
         with output_file(path) as part:
             np.savetxt(part, np.column_stack(table), fmt=["%.6f"] + ["%.5f"] * 3 + ["%.10f"] * 4)
@@ -81,7 +181,10 @@ def export_trajectory(path: str | Path, trajectory: Trajectory, crs: str | None)
     roll, pitch, heading = angles_from_attitude(trajectory.attitude)
     true_heading = np.mod(heading + convergence, 2 * np.pi)
     angles = dict(zip(("roll", "pitch", "heading"), (roll, pitch, true_heading), strict=True))
-    _write_records(path, SBET_FIELDS, {"gps_time": trajectory.file_time, **place, **angles})
+    true_attitude = attitude_from_angles(roll, pitch, true_heading)
+    motion = motion_columns(trajectory, place, true_attitude, check_crs(crs))
+    columns = {"gps_time": trajectory.file_time, **place, **angles, **motion}
+    _write_records(path, SBET_FIELDS, columns)
     if trajectory.position_sigma is None or trajectory.attitude_sigma is None:
         return [path.name]
     sigmas = np.hstack([trajectory.position_sigma, np.degrees(trajectory.attitude_sigma) * 60])
@@ -138,12 +241,11 @@ def write_weak(
 
 def _features(stretches, trajectory, crs):
     """A line for each stretch: RFC 7946, so longitude and latitude by WGS 84."""
-    to_degrees = Transformer.from_crs(check_crs(crs).to_2d(), "EPSG:4326", always_xy=True)
     features = []
     for row in stretches:
         count = 2 + int(row["length_m"])  # a vertex a metre
         position = trajectory.at(np.linspace(row["from"], row["to"], count)).position
-        line = np.round(np.column_stack(to_degrees.transform(*position[:, :2].T)), 8)  # 1 mm
+        line = to_lonlat(check_crs(crs), position)
         geometry = {"type": "LineString", "coordinates": line.tolist()}
         features.append({"type": "Feature", "properties": dict(row), "geometry": geometry})
     return {"type": "FeatureCollection", "features": features}

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mlscorr.io.clouds import Additions
 from mlscorr.io.store import (
     FileIdentity,
     TaskStore,
@@ -21,7 +22,7 @@ from mlscorr.io.store import (
     write_json,
 )
 from mlscorr.io.surveys import SHARED_TILES, ProjectParts, read_project
-from mlscorr.io.trajectories import check_exports
+from mlscorr.io.trajectories import check_distinct, check_exports, check_target_exports
 from mlscorr.pipeline.clouds import WrittenClouds
 from mlscorr.pipeline.correction import TieUse, without_control
 from mlscorr.pipeline.project import stages
@@ -52,7 +53,7 @@ class Options:
     ----------
     order, ties
         As of mlscorr.correct.
-    sigma, page, trajectories
+    sigma, page, trajectories, targets, displacement
         As of CorrectedSurvey.write.
     workers, scheduler
         As of mlscorr.pipeline.project.engine.engine.
@@ -67,10 +68,17 @@ class Options:
     sigma: bool = False
     page: bool = True
     trajectories: tuple[str, ...] = ()
+    targets: tuple[str, ...] = ()
+    displacement: bool = False
     workers: int = 1
     scheduler: str | None = None
     resume: bool = False
     overwrite: bool = False
+
+    @property
+    def additions(self) -> Additions:
+        """What clouds get beside new places."""
+        return Additions(self.sigma, self.displacement)
 
 
 def correct_project(
@@ -112,6 +120,8 @@ def correct_project(
     else:
         project = read_project(path)
     check_exports(options.trajectories, project.crs, is_read=True)
+    check_target_exports(options.targets, project.crs, is_read=True)
+    check_distinct([*options.trajectories, *options.targets])
     check_project_output(project, out, options)
     store = TaskStore(out / STORE)
     with store.locked(), logged(out / "log.txt", store.plan, tell) as progress:
@@ -259,7 +269,7 @@ class _Work:
 
     def _clouds(self, planned, keys):
         """WrittenClouds of each drive by its name."""
-        tasks = stages.cloud_tasks(self.run.store, planned, keys, self.out, self.options.sigma)
+        tasks = stages.cloud_tasks(self.run.store, planned, keys, self.out, self.options.additions)
         every = [task for task, _ in tasks]
         self.progress.begin("clouds", every)
         written = self.run.results(every)
@@ -274,11 +284,11 @@ class _Work:
         """What each drive's report wrote, by the drive's name."""
         store = self.run.store.folder
         page = self.options.page
-        exports = self.options.trajectories
+        exports = self.options.trajectories, self.options.targets
         tasks = []
         for drive in planned:
             name = drive.survey.name
-            inputs = ReportInput(store, keys[name], clouds[name], self.out / name, page, exports)
+            inputs = ReportInput(store, keys[name], clouds[name], self.out / name, page, *exports)
             tasks.append(stages.report_task(inputs, drive))
         self.progress.begin("reports", tasks)
         return self.run.results(tasks)

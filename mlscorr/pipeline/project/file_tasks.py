@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from mlscorr.io.clouds import cloud_box, count_sources, read_layout
+from mlscorr.io.clouds import Additions, cloud_box, count_sources, read_layout
 from mlscorr.io.store import FileIdentity, TaskStore, make_folder, publish
 from mlscorr.io.surveys import cloud_file
 from mlscorr.pipeline.clouds import WrittenClouds, write_counted
@@ -180,7 +180,7 @@ def write(
     path: Path,
     identity: FileIdentity,
     target: Path,
-    with_sigma: bool,
+    additions: Additions,
 ) -> Written:
     """Write the corrected copy of a file, whole or not at all.
 
@@ -195,13 +195,13 @@ def write(
         Of the file when its task was planned.
     target : Path
         Folder of the results.
-    with_sigma : bool
-        Whether each point gets its sigmas.
+    additions : Additions
+        What the files get beside new places.
     """
     kept = [_kept(folder, "motions", key) for key in motions]
     drives = [replace(each, survey=_of_file(each.survey, path)) for each in kept]
     with _moved_into(folder, target) as (part, outputs):
-        written = write_counted(drives, part, silent("", 0), with_sigma)
+        written = write_counted(drives, part, silent("", 0), additions)
         _check_same(path, identity)
     return Written(written, tuple(outputs))
 
@@ -260,7 +260,7 @@ class ReportInput:
     target : Path
         Folder of the drive's results.
     page : bool
-    trajectories : tuple of str
+    trajectories, targets : tuple of str
         As of CorrectedSurvey.write.
     """
 
@@ -270,6 +270,7 @@ class ReportInput:
     target: Path
     page: bool
     trajectories: tuple[str, ...]
+    targets: tuple[str, ...] = ()
 
 
 def report(inputs: ReportInput) -> Written:
@@ -282,6 +283,10 @@ def report(inputs: ReportInput) -> Written:
     corrected: CorrectedSurvey = TaskStore(inputs.folder).get("corrected", inputs.corrected)
     with _moved_into(inputs.folder, inputs.target) as (part, outputs):
         document = corrected.write_beside(
-            part, inputs.written, page=inputs.page, trajectories=inputs.trajectories
+            part,
+            inputs.written,
+            page=inputs.page,
+            trajectories=inputs.trajectories,
+            targets=inputs.targets,
         )
     return Written(document, tuple(outputs))

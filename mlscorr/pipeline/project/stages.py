@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mlscorr.io.clouds import Additions
 from mlscorr.io.store import FileIdentity, TaskStore, digest, resolved
 from mlscorr.io.surveys import SHARED_TILES, DriveParts, ProjectParts
 from mlscorr.pipeline.control_checks import check_control
@@ -237,7 +238,7 @@ def cloud_tasks(
     drives: Sequence[PlannedDrive],
     motions: Mapping[str, str],
     out: Path,
-    with_sigma: bool,
+    additions: Additions,
 ) -> list[tuple[Task, list[str]]]:
     """Tasks that write corrected clouds, each with the names of the drives whose points it holds.
 
@@ -249,7 +250,7 @@ def cloud_tasks(
         Keys of each drive's MovedClouds in the store.
     out : Path
         Folder of the project's results.
-    with_sigma : bool
+    additions : Additions
     """
     owners: dict[Path, list[PlannedDrive]] = {}
     for drive in drives:
@@ -269,9 +270,9 @@ def cloud_tasks(
             ]
             for some in files
         ]
-        key = digest(VERSION, used, parts, path.name, identity, with_sigma)
+        key = digest(VERSION, used, parts, path.name, identity, additions)
         points = sum(file.points for some in files for file in some)
-        inputs = store.folder, used, path, identity, out / folder, with_sigma
+        inputs = store.folder, used, path, identity, out / folder, additions
         named = key, folder, task_name(folder, path)
         task = Task("clouds", *named, points, file_tasks.write, inputs)
         tasks.append((task, [survey.name for survey in surveys]))
@@ -306,7 +307,9 @@ def report_task(inputs: file_tasks.ReportInput, drive: PlannedDrive) -> Task:
     inputs : ReportInput
     drive : PlannedDrive
     """
-    key = digest(VERSION, inputs.corrected, inputs.written, inputs.page, inputs.trajectories)
+    key = digest(
+        VERSION, inputs.corrected, inputs.written, inputs.page, inputs.trajectories, inputs.targets
+    )
     points = drive.survey.points if inputs.page else 0
     name = drive.survey.name
     return Task("reports", key, name, name, points, file_tasks.report, (inputs,))

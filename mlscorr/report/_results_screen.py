@@ -1,0 +1,204 @@
+"""Summary of two results compared: in the terminal, in compare_results.json and on its page."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from mlscorr.report.headline import StatementRow, capped, statements_section
+from mlscorr.report.settings import SETTINGS
+from mlscorr.survey import Severity, Statement
+from mlscorr.wording import length_in_words
+
+SIDES = ("first", "second")
+SCORES = {
+    "check": "check points",
+    "leave_one_out": "control points left out in turn",
+    "control": "control points (fit)",
+}
+
+
+def results_screen(document: dict[str, Any]) -> dict[str, object]:
+    """``rating`` and ``statements`` of compare_results.json.
+
+    Parameters
+    ----------
+    document : dict
+        Its other content.
+    """
+    return statements_section(results_statements(document))
+
+
+def results_statements(document: dict[str, Any]) -> list[StatementRow]:
+    """First screen of a comparison of two results, in its order.
+
+    Parameters
+    ----------
+    document : dict
+        The other content of compare_results.json.
+    """
+    return [
+        StatementRow.of("Trajectory", _trajectory(document["trajectory"])),
+        *_epochs(document["trajectory"]),
+        *_scores(document["scores"]),
+        *_targets(document["targets"]),
+        _use(document["targets"]),
+        _settings(document),
+        _inputs(document["files"]),
+        *_warnings(document["warnings"]),
+    ]
+
+
+def _severity(is_small: bool) -> Severity:
+    """What is larger than the smallest difference that counts is to be minded."""
+    if is_small:
+        return "note"
+    return "warning"
+
+
+def _trajectory(section):
+    """By how much the corrected positions differ."""
+    space = section["difference"]["3d"]
+    largest = space["largest"]
+    values = {
+        "largest": largest,
+        "time": space["time"],
+        "rms": space["rms"],
+        "axes": {name: row["rms"] for name, row in section["difference"].items() if name != "3d"},
+    }
+    if largest == 0.0:
+        return Statement("equal trajectories", values={"epochs": section["epochs"]})
+    return Statement("trajectories differ", _severity(largest <= SETTINGS.difference), values)
+
+
+def _epochs(section) -> Iterator[StatementRow]:
+    """Epochs that do not agree."""
+    only = section["epochs_only_in"]
+    if not section["interpolated"] and not any(only.values()):
+        return
+    values = {"interpolated": section["interpolated"], **only}
+    said = Statement("epochs differ", _severity(not any(only.values())), values)
+    yield StatementRow.of("Epochs", said)
+
+
+def _scores(scores) -> Iterator[StatementRow]:
+    """3D RMSE of both results, by the points that judge best."""
+    for key, name in SCORES.items():
+        row = scores[key]
+        if row["difference_3d"] is None:
+            continue
+        values = {
+            "name": name,
+            "difference": row["difference_3d"],
+            **{side: row[side]["rmse_3d"] for side in SIDES},
+            "counts": [row[side]["n"] for side in SIDES],
+        }
+        said = Statement("scores of results", _severity(_is_no_worse(row)), values)
+        yield StatementRow.of("RMSE", said)
+        return
+
+
+def _is_no_worse(row):
+    """Return True unless the second RMSE exceeds the first by what counts."""
+    return row["difference_3d"] <= SETTINGS.difference
+
+
+def _targets(rows) -> Iterator[StatementRow]:
+    """The targets whose residuals differ most, and surveyed points that were changed."""
+    changed = [row for row in rows if row["change_3d"] is not None]
+    if changed:
+        above = [row for row in changed if row["change_3d"] > SETTINGS.difference]
+        values = {
+            "name": changed[0]["name"],
+            "change": changed[0]["change_3d"],
+            "count": len(above),
+            "all": len(changed),
+            "least": SETTINGS.difference,
+        }
+        said = Statement("residuals differ", _severity(not above), values)
+        items = capped((_name(row), _change_in_words(row)) for row in above)
+        yield StatementRow.of("Targets", said, items=items)
+    moved = [row for row in rows if any(row["surveyed"]["difference"] or ())]
+    if moved:
+        said = Statement("surveyed differently", "warning", {"count": _points(moved)})
+        by_name = {row["name"]: _axes(row["surveyed"]["difference"]) for row in moved}
+        yield StatementRow.of("Coordinates", said, items=capped(by_name.items()))
+
+
+def _name(row):
+    """Name of a target, and the pass in which it was seen."""
+    if row["pass"] is None:
+        return str(row["name"])
+    return f"{row['name']} (pass {row['pass']})"
+
+
+def _axes(vector):
+    """A vector of E, N, H in words, to a tenth of a millimeter."""
+    return "E {:+.4f}, N {:+.4f}, H {:+.4f} m".format(*vector)
+
+
+def _change_in_words(row):
+    """A change of a residual, in space and by axis."""
+    return f"{length_in_words(row['change_3d'])}: {_axes(row['after']['difference'])}"
+
+
+def _points(rows):
+    """Number of surveyed points in rows of targets."""
+    return len({row["name"] for row in rows})
+
+
+def _use(rows):
+    """Targets that one result uses and the other does not, with the reason."""
+    one = [row for row in rows if bool(row["used"]["first"]) != bool(row["used"]["second"])]
+    if not one:
+        used = [row for row in rows if row["used"]["first"]]
+        return StatementRow.of("Use", Statement("same targets used", values={"n": len(used)}))
+    items = []
+    for row in one:
+        side = SIDES[not row["used"]["first"]]
+        other = SIDES[bool(row["used"]["first"])]
+        why = row["reason"][other] or "it is not among its targets"
+        items.append((_name(row), f"used in the {side} only; {other}: {why}"))
+    said = Statement("targets used in one", "warning", {"count": len(one)})
+    return StatementRow.of("Use", said, items=capped(items))
+
+
+def _settings(document):
+    """Order, covariance and coverage that differ."""
+    rows = [row for part in ("model", "coverage") for row in document[part] if row["differs"]]
+    count = len(document["model"]) + len(document["coverage"])
+    values = {"count": len(rows), "all": count}
+    items = [(row["what"].replace("_", " "), _both(row)) for row in rows]
+    return StatementRow.of("Model", Statement("values differ", values=values), items=capped(items))
+
+
+def _both(row):
+    """Two values beside each other."""
+    words = []
+    for side in SIDES:
+        value = row[side]
+        if isinstance(value, float):
+            words.append(f"{value:.4g}")
+        else:
+            words.append("none" if value is None else str(value))
+    return " → ".join(words)
+
+
+def _inputs(files):
+    """Inputs whose contents differ."""
+    inputs = [row for row in files if row["is_input"]]
+    other = [row for row in inputs if row["differs"]]
+    values = {"count": len(other), "all": len(inputs)}
+    items = []
+    for row in other:
+        there = [side for side in SIDES if row[side] is not None]
+        words = "other contents" if len(there) == 2 else f"in the {there[0]} only"
+        items.append((row["name"], f"{row['what']}, {words}"))
+    said = Statement("inputs differ", values=values)
+    return StatementRow.of("Inputs", said, items=capped(items))
+
+
+def _warnings(warnings) -> Iterator[StatementRow]:
+    """Warnings of one result alone."""
+    items = [(f"{side} only", text) for side in SIDES for text in warnings[side]]
+    if items:
+        said = Statement("warnings of one", "warning", {"count": len(items)})
+        yield StatementRow.of("Warnings", said, items=capped(items))
