@@ -43,6 +43,7 @@ bench: $(VENV)/ready
 	$(RUN)/python benchmarks/bench_tie_solver.py
 	$(RUN)/python benchmarks/bench_ties.py 2
 	$(RUN)/python benchmarks/bench_targets.py 2
+	$(RUN)/python benchmarks/bench_libraries.py
 	$(RUN)/python benchmarks/bench_matching.py
 	$(RUN)/python benchmarks/bench_gap.py
 	$(RUN)/python benchmarks/bench_render.py

@@ -1,4 +1,4 @@
-"""Speed and memory of the search for targets, and clustering beside Open3D and scikit-learn.
+"""Speed and memory of the search for targets, beside the decoding of its clouds.
 
     python benchmarks/bench_targets.py [millions of points ...]
 
@@ -19,19 +19,12 @@ import laspy
 import numpy as np
 from rich.console import Console
 from rich.table import Table
-from sklearn.cluster import DBSCAN
-from sklearn.metrics import adjusted_rand_score
 
 import mlscorr
-from mlscorr.io.clouds import read_chunks
 from mlscorr.io.tables.control import NO_POINTS
 from mlscorr.simulate import Scenario, simulate
-from mlscorr.survey import PointCloud
-from mlscorr.targets import collect
-from mlscorr.targets._clusters import connected
 
 CHUNK = 1_000_000  # points
-LINK = 0.12  # m, as for targets of 0.6 m
 RUNS = "decode", "extract", "decode", "extract without control", "decode"
 
 
@@ -149,57 +142,10 @@ def repeat(folder, times):
     (folder / "survey.toml").write_text(settings.replace('"pass-1.laz"', quoted))
 
 
-def cluster_table(folder):
-    """Clustering of the same candidates: the bright tenth of the points near control."""
-    import open3d
-
-    survey = mlscorr.read_survey(folder)
-    parts = []
-    nothing = [lambda *_: None] * 3
-    collect(survey, read_chunks, nothing[0], parts.append, *nothing[1:])
-    near = PointCloud.concatenate(parts)
-    bright = near.xyz[near.intensity >= np.percentile(near.intensity, 90)]
-    bright -= bright.mean(axis=0)
-    cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(bright))
-    tools = {
-        "mlscorr": lambda: connected(bright, LINK),
-        "scikit-learn DBSCAN": lambda: DBSCAN(eps=LINK, min_samples=1).fit_predict(bright),
-        "Open3D DBSCAN": lambda: np.asarray(cloud.cluster_dbscan(LINK, 1)),
-    }
-    table = Table(
-        "tool",
-        "ms",
-        "times mlscorr",
-        "clusters",
-        "adjusted Rand index",
-        title=f"Clusters of {len(bright):,} bright points, link {LINK} m",
-    )
-    taken = {}
-    labels = {}
-    for name, run in tools.items():
-        times = []
-        for _ in range(4):
-            start = perf_counter()
-            labels[name] = run()
-            times.append(perf_counter() - start)
-        taken[name] = np.median(times[1:])
-    for name in tools:
-        agreement = adjusted_rand_score(labels["scikit-learn DBSCAN"], labels[name])
-        table.add_row(
-            name,
-            f"{1e3 * taken[name]:.0f}",
-            f"{taken[name] / taken['mlscorr']:.1f}",
-            f"{len(np.unique(labels[name]))}",
-            f"{agreement:.4f}",
-        )
-    return table
-
-
 def main(millions):
     console = Console(width=110)
     with tempfile.TemporaryDirectory() as folder:
         console.print(speed_table(millions, Path(folder)))
-        console.print(cluster_table(Path(folder) / f"{millions[0]:g}"))
 
 
 if __name__ == "__main__":

@@ -155,8 +155,8 @@ def map_places(geometry: Any, origin: np.ndarray | None = None) -> np.ndarray:
     """
     if "positions" not in geometry.point:
         raise ValueError(
-            f"The {type(geometry).__name__} of Open3D has no positions: it is empty. Give it points "
-            "first, as geometry.point.positions."
+            f"The {type(geometry).__name__} of Open3D has no positions: it is empty. Give it "
+            "points first, as geometry.point.positions."
         )
     positions = geometry.point["positions"].cpu().numpy()
     if origin is not None:

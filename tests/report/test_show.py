@@ -95,7 +95,7 @@ def test_lines_are_whole_and_tell_their_colors(correction, tmp_path):
 
 def test_everything_that_goes_to_open3d_can_be_shown(correction, cloud, tmp_path):
     "Tensor and legacy geometries about origins of their own, and dicts of them, lie together"
-    origin = CORNER + [0.0, 300.0, 0.0]
+    origin = CORNER + np.array([0.0, 300.0, 0.0])
     geometry = cloud.to_open3d(origin)
     legacy = cloud.to_open3d(np.zeros(3)).to_legacy()
     path = mlscorr.show(
@@ -172,7 +172,7 @@ def test_what_cannot_be_shown_is_refused(cloud, correction, tmp_path):
         mlscorr.show(cloud, points=0, page=page)
     broken = cloud.xyz.copy()
     broken[3] = np.inf
-    with pytest.raises(ValueError, match="1 of 20000 points .* point 3"):
+    with pytest.raises(ValueError, match=r"1 of 20000 points .* point 3"):
         mlscorr.show(PointCloud(broken, cloud.gps_time, cloud.intensity), page=page)
     assert not page.exists()
 
@@ -198,7 +198,8 @@ async function examine(frame) {
   found.overflow = page.documentElement.scrollWidth - page.documentElement.clientWidth;
   const settle = async () => { await wait(300); };
   const pixels = canvas => { // of a copy, as reading a canvas again and again slows it down
-    const copy = Object.assign(page.createElement("canvas"), { width: canvas.width, height: canvas.height });
+    const copy = page.createElement("canvas");
+    [copy.width, copy.height] = [canvas.width, canvas.height];
     const pen = copy.getContext("2d");
     pen.drawImage(canvas, 0, 0);
     return pen.getImageData(0, 0, copy.width, copy.height).data;
@@ -214,7 +215,10 @@ async function examine(frame) {
   found.drawnBy = stage.dataset.drawn;
   found.boxes = page.querySelectorAll(".layers input").length;
   found.lines = [colored(marks)];
-  const points = () => pixels(stage.querySelector(".points")).filter((value, k) => k % 4 === 0 && value < 250).length;
+  const points = () => {
+    const data = pixels(stage.querySelector(".points"));
+    return data.filter((value, k) => k % 4 === 0 && value < 250).length;
+  };
   found.points = [points()];
   const looks = [marks.toDataURL()];
   const key = async (name, shift) => {
@@ -242,7 +246,8 @@ async function examine(frame) {
   await settle();
   looks.push(marks.toDataURL());
   stage.focus();
-  stage.dispatchEvent(new view.WheelEvent("wheel", { deltaY: -100, bubbles: true, cancelable: true }));
+  const nearer = { deltaY: -100, bubbles: true, cancelable: true };
+  stage.dispatchEvent(new view.WheelEvent("wheel", nearer));
   await settle();
   looks.push(marks.toDataURL());
   found.looks = new Set(looks).size;

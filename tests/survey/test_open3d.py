@@ -75,7 +75,8 @@ def test_parts_that_open3d_takes_come_back(cloud):
 def test_clouds_of_two_origins_are_put_together(cloud):
     "Each point is where it was, though a kilometer lies between both origins"
     early, late = cloud[:150], cloud[150:]
-    geometry = early.to_open3d(ORIGIN).append(late.to_open3d(ORIGIN + [1000.0, 0.0, -5.0]))
+    beside = ORIGIN + np.array([1000.0, 0.0, -5.0])
+    geometry = early.to_open3d(ORIGIN).append(late.to_open3d(beside))
     assert_same(PointCloud.from_open3d(geometry), cloud)
 
 
