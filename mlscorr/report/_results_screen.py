@@ -132,7 +132,8 @@ def _name(row):
 
 def _axes(vector):
     """A vector of E, N, H in words, to a tenth of a millimeter."""
-    return "E {:+.4f}, N {:+.4f}, H {:+.4f} m".format(*vector)
+    parts = [round(value, 4) + 0.0 for value in vector]  # no negative zero
+    return "E {:+.4f}, N {:+.4f}, H {:+.4f} m".format(*parts)
 
 
 def _change_in_words(row):
