@@ -15,7 +15,7 @@ test test-all: $(VENV)/ready
 	$(RUN)/mypy
 	$(RUN)/python -m pytest -n 2 --dist loadfile $(if $(filter test,$@),-m "not long")
 
-# The manual, build/manual/index.html; its notebook runs, and a warning is an error
+# The manual, build/manual/index.html; its notebooks and examples run, and a warning is an error
 docs: $(VENV)/ready
 	$(RUN)/sphinx-build -q -W --keep-going -c docs -d build/doctrees . build/manual
 

@@ -10,7 +10,7 @@ from small_surveys import output_folder, street
 
 import mlscorr
 
-out = output_folder(__file__)
+out = output_folder()
 survey = mlscorr.read_survey(street())
 targets = mlscorr.find_targets(survey)
 targets

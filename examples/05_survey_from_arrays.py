@@ -11,7 +11,7 @@ from small_surveys import output_folder, street
 
 import mlscorr
 
-out = output_folder(__file__)
+out = output_folder()
 folder = street()
 point = next(mlscorr.read_cloud(folder / "pass-1.laz"))
 epoch = np.genfromtxt(folder / "trajectory.csv", delimiter=",", skip_header=1)

@@ -12,7 +12,7 @@ from small_surveys import WRONG_MOUNTING, output_folder, wrong_mounting
 
 import mlscorr
 
-out = output_folder(__file__)
+out = output_folder()
 survey = mlscorr.read_survey(wrong_mounting())
 result = mlscorr.calibrate(survey)
 result

@@ -12,7 +12,7 @@ from small_surveys import output_folder, two_passes
 
 import mlscorr
 
-out = output_folder(__file__)
+out = output_folder()
 survey = mlscorr.read_survey(two_passes())
 ties = mlscorr.find_ties(survey)
 ties

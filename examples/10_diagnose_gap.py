@@ -10,7 +10,7 @@ from small_surveys import output_folder, wrong_clock
 
 import mlscorr
 
-out = output_folder(__file__)
+out = output_folder()
 survey = mlscorr.read_survey(wrong_clock())
 gap = mlscorr.diagnose(survey)
 gap

@@ -43,4 +43,4 @@ height = one.trajectory.position[:, 2] - other.trajectory.position[:, 2]
 figure, panel = plt.subplots(figsize=(8, 3), layout="constrained")
 panel.plot(one.trajectory.gps_time - one.trajectory.gps_time[0], 100 * height)
 panel.set(xlabel="Time since the start (s)", ylabel="Added height (cm)")
-figure.savefig(output_folder(__file__) / "squat.png", dpi=110)
+figure.savefig(output_folder() / "squat.png", dpi=110)

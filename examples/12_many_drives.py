@@ -14,7 +14,7 @@ import sys
 import matplotlib.pyplot as plt
 from small_surveys import output_folder, street, two_passes
 
-out = output_folder(__file__)
+out = output_folder()
 drives = {"monday": street(), "tuesday": two_passes()}
 blocks = [f'[[drive]]\nname = "{k}"\nsurvey = "{v / "survey.toml"}"\n' for k, v in drives.items()]
 head = f'name = "old town"\n[control]\nfile = "{drives["monday"] / "control.csv"}"\n'

@@ -47,9 +47,9 @@ def wrong_clock() -> Path:
     )
 
 
-def output_folder(script: str) -> Path:
+def output_folder() -> Path:
     """Folder for what a script writes: its argument, or build/examples/NAME."""
-    given = sys.argv[1:] or [BUILD / "examples" / Path(script).stem]
+    given = sys.argv[1:] or [BUILD / "examples" / Path(sys.argv[0]).stem]
     folder = Path(given[0])
     folder.mkdir(parents=True, exist_ok=True)
     return folder
