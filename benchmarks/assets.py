@@ -22,18 +22,18 @@ from PIL import Image
 ROOT = Path(__file__).parents[1]
 ASSETS = ROOT / "assets"
 SCRIPTS = {  # picture: (script, whether it is drawn without being named)
-    "correct_a_survey": ("examples/correct_a_survey.py", True),
-    "compare_methods": ("examples/compare_methods.py", True),
-    "render_before_after": ("examples/render_before_after.py", True),
-    "calibrate_mounting": ("examples/calibrate_mounting.py", True),
-    "diagnose": ("examples/diagnose_gap.py", True),
+    "correct_a_survey": ("benchmarks/pictures/correct_a_survey.py", True),
+    "compare_methods": ("benchmarks/pictures/compare_methods.py", True),
+    "render_before_after": ("benchmarks/pictures/render_before_after.py", True),
+    "calibrate_mounting": ("benchmarks/pictures/calibrate_mounting.py", True),
+    "diagnose": ("benchmarks/pictures/diagnose_gap.py", True),
     "decision_costs": ("benchmarks/decision_costs.py", False),
-    "pos_error": ("examples/pos_error.py", False),
-    "paper_car": ("examples/paper/car.py", False),
-    "paper_boat": ("examples/paper/boat.py", False),
-    "paper_calibration": ("examples/paper/calibration.py", False),
-    "real_pos_gap": ("examples/real/pos_gap.py", False),
-    "two_pass_gap": ("examples/real/two_pass_gap.py", False),
+    "pos_error": ("benchmarks/pictures/pos_error.py", False),
+    "paper_car": ("benchmarks/paper/car.py", False),
+    "paper_boat": ("benchmarks/paper/boat.py", False),
+    "paper_calibration": ("benchmarks/paper/calibration.py", False),
+    "real_pos_gap": ("benchmarks/real/pos_gap.py", False),
+    "two_pass_gap": ("benchmarks/real/two_pass_gap.py", False),
 }
 # of 255, of the pixels: see above
 CHANNEL = 16

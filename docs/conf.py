@@ -7,19 +7,34 @@ that of the links in docs/index.md; formulas become MathML, which needs no net a
 import logging
 import os
 import re
+import shutil
 from importlib import metadata
 from pathlib import Path
 
 from docutils import nodes
 from docutils.utils.math.latex2mathml import tex2mathml
+from sphinx_gallery.scrapers import figure_rst
 
 project = "mlscorr"
 author = "mlscorr's authors"
 release = metadata.version("mlscorr")
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton"]
+extensions = [
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx_copybutton",
+    "sphinx_gallery.gen_gallery",
+]
 root_doc = "docs/index"
-include_patterns = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "docs/**"]
-exclude_patterns = [".*", "assets", "benchmarks", "build", "examples", "mlscorr*", "tests"]
+include_patterns = [
+    "README.md",
+    "CHANGELOG.md",
+    "CONTRIBUTING.md",
+    "docs/**",
+    "build/gallery/*.rst",
+]
+exclude_patterns = [".*", "assets", "benchmarks", "examples", "mlscorr*", "tests"]
+exclude_patterns += ["build/manual", "build/doctrees", "build/examples", "build/surveys"]
 
 html_theme = "furo"
 html_title = "mlscorr"
@@ -42,6 +57,49 @@ PROFILE.mkdir(parents=True, exist_ok=True)
 os.environ["IPYTHONDIR"] = str(PROFILE.parent)
 logging.getLogger("traitlets").setLevel(logging.ERROR)  # dash, which open3d loads, is not there
 
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def start_example(gallery_conf, name):
+    """Let an example start without the files that an earlier build left of it."""
+    if name.startswith("0") or name.startswith("1"):
+        shutil.rmtree(ROOT / "build" / "examples" / Path(name).stem, ignore_errors=True)
+
+
+def new_pictures(block, variables, gallery_conf):
+    """Show the pictures that a cell of an example has written into its folder."""
+    folder = ROOT / "build" / "examples" / Path(variables["src_file"]).stem
+    shown = variables.setdefault("shown_pictures", set())
+    paths = []
+    for picture in sorted(set(folder.glob("*.png")) - shown):
+        shown.add(picture)
+        paths.append(next(variables["image_path_iterator"]))
+        shutil.copy(picture, paths[-1])
+    return figure_rst(paths, gallery_conf["src_dir"])
+
+
+sphinx_gallery_conf = {
+    "examples_dirs": str(ROOT / "examples"),
+    "gallery_dirs": str(ROOT / "build" / "gallery"),
+    "filename_pattern": r"/\d\d_",
+    "ignore_pattern": r"small_surveys\.py",
+    "copyfile_regex": r"small_surveys\.py",
+    "nested_sections": False,
+    "image_scrapers": (new_pictures,),
+    "reset_modules": (start_example, "matplotlib"),
+    "remove_config_comments": True,
+    "show_signature": False,
+    "show_memory": False,
+    "download_all_examples": False,
+    "notebook_extensions": set(),  # small_surveys is no module there
+    "min_reported_time": 1e6,  # s: pages don't change with the machine
+    "write_computation_times": False,
+    "abort_on_example_error": True,
+    "run_stale_examples": True,  # the package changes, and the examples don't
+}
+# functions can't be stored to notice that the configuration has changed
+suppress_warnings = ["config.cache"]
+
 autodoc_typehints = "none"  # the docstrings say them, with shapes and units
 autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True, "inherited-members": False}
@@ -59,11 +117,16 @@ def add_contents(app, docname, source):
         if heading:
             groups.append((heading, []))
         else:
-            page = re.sub(r"\.(md|ipynb)$", "", link).replace("../", "/")
+            page = re.sub(r"\.(md|ipynb|rst)$", "", link).replace("../", "/")
             groups[-1][1].append(f"{title} <{page}>")
     for caption, pages in groups:
         lines = ["", "```{toctree}", ":hidden:", f":caption: {caption}", *pages, "```", ""]
         source[0] += "\n".join(lines)
+
+
+def lead_to_gallery(app, docname, source):
+    """Let links to the examples lead to the pages that the build makes of them."""
+    source[0] = source[0].replace("examples/README.rst", "build/gallery/index.rst")
 
 
 def head_examples(app, what, name, obj, options, lines):
@@ -90,6 +153,7 @@ def lead_to_index(app, exception):
 
 def setup(app):
     """Connect the above."""
+    app.connect("source-read", lead_to_gallery, priority=400)  # before the contents
     app.connect("source-read", add_contents)
     app.connect("autodoc-process-docstring", head_examples, priority=1)  # before napoleon
     app.connect("build-finished", lead_to_index)

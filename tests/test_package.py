@@ -2,13 +2,18 @@
 
 import ast
 import inspect
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 import mlscorr
+from tests.beds.places import ROOT
 
+LOADED = [name for name in mlscorr.__all__ if hasattr(mlscorr, name)]  # a test asks for all
 VERBS = [
     name
     for name in mlscorr.__all__
@@ -52,3 +57,65 @@ def test_a_path_where_a_survey_belongs_is_told_how_to_read_it(name, given):
     words = re.escape(repr(str(given)))
     with pytest.raises(TypeError, match=f"{words}.*{type(given).__name__}.*mlscorr.read_survey"):
         getattr(mlscorr, name)(given, *others)
+
+
+@pytest.mark.parametrize("name", LOADED)
+def test_what_is_offered_has_an_example(name):
+    "In its docstring, or in that of one of its methods, where doctest runs it"
+    value = getattr(mlscorr, name)
+    texts = [value.__doc__]
+    if inspect.isclass(value):
+        texts += [inspect.getdoc(getattr(value, method)) or "" for method in vars(value)]
+    assert any(">>> " in text for text in texts)
+
+
+def test_what_is_offered_fits_a_screen():
+    "Fewer than 50 names"
+    assert len(dir(mlscorr)) < 50
+
+
+SCRIPT = """
+import mlscorr
+from tests.beds.places import ROOT
+
+survey = mlscorr.read_survey("survey.toml")
+targets = mlscorr.find_targets(survey)
+good = targets[targets.score > 0.8]
+matches = mlscorr.match_targets(good, survey)
+ties = mlscorr.find_ties(survey)
+estimate = mlscorr.estimate_pos_error(survey, matches, ties)
+for cloud in mlscorr.read_cloud(survey.clouds[0]):
+    moved = estimate.correction.apply(cloud)
+    reveal_type(cloud)
+scores = mlscorr.score(estimate, matches)
+result = mlscorr.correct(survey)
+written = result.write("corrected")
+reveal_type(survey)
+reveal_type(good)
+reveal_type(matches)
+reveal_type(ties)
+reveal_type(estimate)
+reveal_type(scores)
+reveal_type(result)
+"""
+
+
+@pytest.mark.long
+def test_a_script_with_the_stages_has_types(tmp_path):
+    "mypy --strict finds no fault in a user's script, and each value is of a class of mlscorr"
+    command = [sys.executable, "-m", "mypy", "--strict", "--follow-imports=silent", "-c", SCRIPT]
+    command += ["--config-file=", "--ignore-missing-imports", "--cache-dir", tmp_path]
+    environment = {**os.environ, "MYPYPATH": str(ROOT)}
+    done = subprocess.run(command, text=True, capture_output=True, cwd=tmp_path, env=environment)
+    assert done.returncode == 0, done.stdout
+    types = re.findall(r'Revealed type is "([\w.]+)"', done.stdout)
+    assert [name.rsplit(".", 1)[1] for name in types] == [
+        "PointCloud",
+        "Survey",
+        "FoundTargets",
+        "MatchedTargets",
+        "TiedSurvey",
+        "PosErrorEstimate",
+        "Scores",
+        "CorrectedSurvey",
+    ]

@@ -102,6 +102,10 @@ def doctor() -> Installation:
     -------
     Installation
         It takes seconds, for a picture is drawn.
+
+    >>> import mlscorr
+    >>> "mlscorr" in [part.name for part in mlscorr.doctor().parts]
+    True
     """
     findings = [InstalledPart("python", sys.version_info >= (3, 11), platform.python_version())]
     findings += [_package(name) for name in PACKAGES]

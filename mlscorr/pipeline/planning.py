@@ -40,6 +40,19 @@ def plan(survey: Survey, library: Iterable[type[Effect]] | None = None) -> Plann
     ------
     ValueError
         Without a mounting, or when nothing will be seen.
+
+    >>> import mlscorr, numpy as np, tempfile
+    >>> from mlscorr.simulate import Scenario, simulate
+    >>> folder = tempfile.mkdtemp()
+    >>> short = Scenario(
+    ...     drive={"duration": 8.0},
+    ...     targets={"control": 4, "check": 1},
+    ...     scanner=[{"lines_per_second": 75, "points_per_line": 400}],
+    ... )
+    >>> simulate(short, np.random.default_rng(1)).write(folder)
+    >>> planned = mlscorr.plan(mlscorr.read_survey(folder))
+    >>> "time_offset" in [row["effect"] for row in planned.to_frame().to_dict("records")]
+    True
     """
     check_survey(survey)
     survey.check_one_scanner("a plan")

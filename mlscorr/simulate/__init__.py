@@ -1,4 +1,11 @@
-"""Simulated surveys: a street, a drive, scanners, a POS, and their errors."""
+"""Simulated surveys: a street, a drive, scanners, a POS, and their errors.
+
+>>> import numpy as np
+>>> from mlscorr.simulate import Scenario, simulate
+>>> simulated = simulate(Scenario(drive={"duration": 5.0}), np.random.default_rng(1))
+>>> len(simulated.targets)
+24
+"""
 
 import lazy_loader
 

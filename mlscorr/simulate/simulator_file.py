@@ -92,7 +92,7 @@ def beliefs_of(survey: Survey) -> Simulator:
 
 
 def read_simulator(path: Path | str) -> Simulator:
-    """Simulator of a simulator.toml.
+    r"""Simulator of a simulator.toml.
 
     Sections [mounting], [scanner] and [pos] have the keys and units of survey.toml, [[effects]]
     those of scenario.toml; what is left out has the defaults of survey.toml.
@@ -103,6 +103,12 @@ def read_simulator(path: Path | str) -> Simulator:
     Parameters
     ----------
     path : path
+
+    >>> import mlscorr, pathlib, tempfile
+    >>> path = pathlib.Path(tempfile.mkdtemp(), "simulator.toml")
+    >>> _ = path.write_text("[scanner]\nrange_noise = 0.004\n")
+    >>> mlscorr.read_simulator(path).scanner.range_noise
+    0.004
     """
     file = read_toml(path, SimulatorFile, "a simulator")
     if file.mounting is None:

@@ -52,6 +52,10 @@ class Scanner:
     lines_per_second : float
     assumed : tuple of str
         Names of the noises that nobody stated.
+
+    >>> from mlscorr.survey import Scanner
+    >>> Scanner(range_noise=0.003, lines_per_second=200.0).range_noise
+    0.003
     """
 
     range_noise: float = 0.005  # m, typical of mobile line scanners (RIEGL VQ-250 data sheet)
@@ -77,6 +81,10 @@ class Pos:
         sigmas; shape ``rise`` grows to the end, ``hump`` to the middle.
     assumed : tuple of str
         Names of those that nobody stated.
+
+    >>> from mlscorr.survey import Pos
+    >>> Pos(position_sigma=0.05, correlation_time=60.0).correlation_time
+    60.0
     """
 
     position_sigma: float = 0.02  # m, nominal for the paper's SPAN-FSAS in good GNSS

@@ -1,4 +1,4 @@
-"""What the examples on real data claim: a POS that loses GNSS, two passes that don't meet."""
+"""What the studies on real data claim: a POS that loses GNSS, two passes that don't meet."""
 
 import os
 import subprocess
@@ -10,19 +10,19 @@ import numpy as np
 import pytest
 
 from mlscorr.survey import Pos
-from tests.beds.places import EXAMPLES
+from tests.beds.places import BENCHMARKS
 from tests.beds.shared import shared
 
 pytestmark = pytest.mark.long
 
-REAL = EXAMPLES / "real"
+REAL = BENCHMARKS / "real"
 BELIEVED = Pos(0.023, np.radians([0.0145, 0.0145, 0.065]))  # as the simulated unit states it
 REPLICAS = 20
 
 
 @pytest.fixture(scope="module")
 def real():
-    "Import a module of examples/real by its name; none of them stays imported"
+    "Import a module of benchmarks/real by its name; none of them stays imported"
     before = set(sys.modules)
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(REAL)

@@ -18,7 +18,7 @@ from mlscorr.io.surveys import read_survey
 from mlscorr.simulate import Scenario, simulate
 from tests.beds.copies import write_corrected
 from tests.beds.documents import undocumented
-from tests.beds.places import EXAMPLES, MLSCORR
+from tests.beds.places import BENCHMARKS, MLSCORR
 from tests.beds.shared import shared
 
 NAMES = ["raw", "shift", "transformation", "rigid", "affine", "icp"]
@@ -294,8 +294,8 @@ def test_a_cloud_of_no_method_is_refused(street, tmp_path, method, code, words):
 
 @pytest.mark.long
 def test_the_example_makes_its_picture(street, tmp_path):
-    "examples/compare_methods.py prints the table and draws it"
-    script = EXAMPLES / "compare_methods.py"
+    "The script of the picture prints the table and draws it"
+    script = BENCHMARKS / "pictures" / "compare_methods.py"
     picture = tmp_path / "picture.png"
     command = [sys.executable, "-W", "ignore", script, street, "--picture", picture]
     printed = subprocess.check_output(command, text=True)

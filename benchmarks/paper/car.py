@@ -1,6 +1,6 @@
 """Tables 1-4 and Figures 5-9 of Mao et al. 2015 on simulated clones of its car.
 
-    python examples/paper/car.py [--seeds 20] [--picture FILE.png]
+    python benchmarks/paper/car.py [--seeds 20] [--picture FILE.png]
 
 186 s in an urban canyon, 21 control points, scored on the true trajectory at 1 Hz. Literal mode is
 Eq. 13-15 as printed, with C0 tuned on that truth as in the paper, which the user of a survey can't

@@ -1,6 +1,6 @@
 """Tables 6-7 and Figure 12 of Mao et al. 2015 on simulated clones of its calibration site.
 
-    python examples/paper/calibration.py [--seeds 20] [--picture FILE.png]
+    python benchmarks/paper/calibration.py [--seeds 20] [--picture FILE.png]
 
 10 control and 54 check points, and a recorded mounting that lacks what the paper's LSC found in
 its Table 6: here the truth is known, so that errors can be told. Two passes in opposite directions

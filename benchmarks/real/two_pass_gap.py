@@ -1,6 +1,6 @@
 """Why two REAL passes of a UAV scanner don't meet: the mounting first, then what it leaves.
 
-    python examples/real/two_pass_gap.py [--seed S] [--out FOLDER] [--picture FILE.png]
+    python benchmarks/real/two_pass_gap.py [--seed S] [--out FOLDER] [--picture FILE.png]
 
 Real are the points, the sensor's positions and attitudes, and so the misfit of planes that both
 passes of a car and of a tent saw (coin-or/Gravity, LANL LA-UR-20-28196). These data were not
@@ -94,7 +94,7 @@ def parse():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("-o", "--out", type=Path, default=Path("two_pass_gap"))
     parser.add_argument(
-        "--picture", type=Path, default=ROOT / "build" / "examples" / "two_pass_gap.png"
+        "--picture", type=Path, default=ROOT / "build" / "pictures" / "two_pass_gap.png"
     )
     return parser.parse_args()
 

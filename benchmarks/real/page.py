@@ -1,4 +1,4 @@
-"""What the examples on real data share: where the data is, pictures, and the page."""
+"""What the studies on real data share: where the data is, pictures, and the page."""
 
 import io
 import os
@@ -16,7 +16,7 @@ SHARED = Path(os.environ.get("MLSCORR_SHARED") or ROOT.parent / "shared") / "dat
 
 
 def needed(folder, names, source):
-    """End the example with one sentence where a file that it can't do without is missing."""
+    """End the study with one sentence where a file that it can't do without is missing."""
     missing = [name for name in names if not (folder / name).exists()]
     if missing:
         print(

@@ -1,6 +1,6 @@
 """Compare all methods of correction on one survey, and draw the table.
 
-    python examples/compare_methods.py [SURVEY] [--out FOLDER] [--picture FILE.png]
+    python benchmarks/pictures/compare_methods.py [SURVEY] [--out FOLDER] [--picture FILE.png]
 
 SURVEY is a survey.toml or its folder. Without it the semi-real drive through Wuhan is taken where
 the shared surveys lie (MLSCORR_SHARED, or ../shared), else a small survey is simulated.
@@ -19,7 +19,7 @@ import mlscorr
 from mlscorr.report import comparison_figure
 from mlscorr.report.style import STYLE
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 SHARED = Path(os.environ.get("MLSCORR_SHARED") or ROOT.parent / "shared")
 DRIVE = SHARED / "surveys" / "wuhan_drive"
 
@@ -49,7 +49,7 @@ def parse():
     parser.add_argument("survey", nargs="?", type=Path)
     parser.add_argument("--out", type=Path, help="keep compare.html and compare.json here")
     parser.add_argument(
-        "--picture", type=Path, default=ROOT / "build" / "examples" / "compare_methods.png"
+        "--picture", type=Path, default=ROOT / "build" / "pictures" / "compare_methods.png"
     )
     arguments = parser.parse_args()
     arguments.picture.parent.mkdir(parents=True, exist_ok=True)

@@ -1,6 +1,6 @@
 """Draw a survey before and after its correction, and put three of the pictures together.
 
-    python examples/render_before_after.py [SURVEY] [--out FOLDER] [--picture FILE.png]
+    python benchmarks/pictures/render_before_after.py [SURVEY] [--out FOLDER] [--picture FILE.png]
 
 SURVEY is a survey.toml or its folder. Without it the survey wuhan_drive is taken where it is at
 hand (in ../shared/surveys or $MLSCORR_SHARED/surveys), else a small one is simulated.
@@ -20,7 +20,7 @@ from matplotlib.image import imread
 import mlscorr
 from mlscorr.report.render import PictureOptions, draw, panel_size
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 SHARED = Path(os.environ.get("MLSCORR_SHARED") or ROOT.parent / "shared")
 PAGE = (1600, 900)  # pixels
 
@@ -50,7 +50,7 @@ def parse():
     parser.add_argument("survey", nargs="?", type=Path)
     parser.add_argument("--out", type=Path, help="write every picture into this folder")
     parser.add_argument(
-        "--picture", type=Path, default=ROOT / "build/examples/render_before_after.png"
+        "--picture", type=Path, default=ROOT / "build/pictures/render_before_after.png"
     )
     arguments = parser.parse_args()
     arguments.picture.parent.mkdir(parents=True, exist_ok=True)

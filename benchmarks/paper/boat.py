@@ -1,6 +1,6 @@
 """Table 5 and Figure 11 of Mao et al. 2015 on simulated clones of its boat.
 
-    python examples/paper/boat.py [--seeds 20] [--picture FILE.png]
+    python benchmarks/paper/boat.py [--seeds 20] [--picture FILE.png]
 
 151 s along a river, a bump of the POS error that the POS knows nothing of, 9 control and 15 check
 points; scored at the check points. Literal LSC-4 has dt = 120 s as in the paper, and C0 tuned at

@@ -1,6 +1,6 @@
 """Find out, round by round, what a simulator does not know of a survey.
 
-    python examples/diagnose_gap.py [--picture FILE.png]
+    python benchmarks/pictures/diagnose_gap.py [--picture FILE.png]
 
 A street is simulated with a scanner clock that is 6 ms off and control in a height datum that is
 6 cm off. The diagnosis sees the survey alone: it names one effect, puts it into the simulator, and
@@ -20,7 +20,7 @@ from mlscorr.simulate import Scenario, simulate
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 
-PICTURES = Path(__file__).parents[1] / "build" / "examples"
+PICTURES = Path(__file__).parents[2] / "build" / "pictures"
 HIDDEN = [
     {"name": "time_offset", "magnitude": 0.006},
     {"name": "vertical_datum", "magnitude": 0.06},

@@ -1,6 +1,6 @@
 """Calibrate lever arm and boresight in Python, and draw what they do to the check points.
 
-    python examples/calibrate_mounting.py [SURVEY] [--out FOLDER] [--picture FILE.png]
+    python benchmarks/pictures/calibrate_mounting.py [SURVEY] [--out FOLDER] [--picture FILE.png]
 
 SURVEY is a survey.toml or its folder, with a [mounting]. Without it a small survey is simulated:
 two passes in opposite directions past 24 targets, of which 12 are check points, with the wrong
@@ -20,7 +20,7 @@ import mlscorr
 from mlscorr.estimate import MOUNTING_COMPONENTS as COMPONENTS
 from mlscorr.evaluate import misclosures
 
-PICTURES = Path(__file__).parents[1] / "build" / "examples"
+PICTURES = Path(__file__).parents[2] / "build" / "pictures"
 WRONG = (
     {"name": "lever_arm", "magnitude": [0.0004, 0.0145, -0.0642]},  # m: right, forward, up
     {"name": "boresight", "magnitude": [-0.0307, -0.0561, 0.2077]},  # deg

@@ -22,7 +22,7 @@ def parse(arguments, description, picture):
     """The scripts' arguments: number of seeds, and where the picture goes."""
     parser = argparse.ArgumentParser(description=description.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=20, help="simulated surveys (default: 20)")
-    parser.add_argument("--picture", type=Path, default=ROOT / "build" / "examples" / picture)
+    parser.add_argument("--picture", type=Path, default=ROOT / "build" / "pictures" / picture)
     given = parser.parse_args(arguments)
     given.picture.parent.mkdir(parents=True, exist_ok=True)
     return given

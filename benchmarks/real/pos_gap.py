@@ -1,6 +1,6 @@
 """The gap between a simulated and a REAL POS error: where it lies, which it is, how far it shrinks.
 
-    python examples/real/pos_gap.py [--windows N] [--layouts N] [--seed S] [--out FOLDER]
+    python benchmarks/real/pos_gap.py [--windows N] [--layouts N] [--seed S] [--out FOLDER]
                                     [--picture FILE.png]
 
 Real are the drive (GNSS_RTK.pos) and the error of a MEMS GNSS/INS on it (OB_GINS_TXT.err of
@@ -76,7 +76,7 @@ def parse():
     parser.add_argument("--layouts", type=int, default=1, help="of targets, to count verdicts over")
     parser.add_argument("-o", "--out", type=Path, default=Path("pos_gap"))
     parser.add_argument(
-        "--picture", type=Path, default=ROOT / "build" / "examples" / "real_pos_gap.png"
+        "--picture", type=Path, default=ROOT / "build" / "pictures" / "real_pos_gap.png"
     )
     return parser.parse_args()
 

@@ -1,6 +1,6 @@
 """Correct a survey in Python, and draw what it did to the check point that lay farthest off.
 
-    python examples/correct_a_survey.py [SURVEY] [--out FOLDER] [--picture FILE.png]
+    python benchmarks/pictures/correct_a_survey.py [SURVEY] [--out FOLDER] [--picture FILE.png]
 
 SURVEY is a survey.toml or its folder. Without it a small survey is simulated: a street, a drive
 in which GNSS fails for 11 s in a canyon and for 25 s, and 24 targets, of which 8 are check points.
@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 import mlscorr
 from mlscorr.io.clouds import read_chunks
 
-PICTURES = Path(__file__).parents[1] / "build" / "examples"
+PICTURES = Path(__file__).parents[2] / "build" / "pictures"
 REACH = 1.2  # m, drawn about the surveyed target
 
 

@@ -7,21 +7,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.beds.places import EXAMPLES
+from tests.beds.places import BENCHMARKS
 
-PAPER = EXAMPLES / "paper"
+PAPER = BENCHMARKS / "paper"
 
 
 @pytest.fixture(scope="module")
 def paper():
-    "Import a module of examples/paper by its name; none of them stays imported"
+    "Import a module of benchmarks/paper by its name; none of them stays imported"
     before = set(sys.modules)
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(PAPER)
         yield import_module
     for name in set(sys.modules) - before:
         path = Path(getattr(sys.modules[name], "__file__", None) or "/")
-        if path.parent in (PAPER, PAPER.parents[1] / "benchmarks"):
+        if path.parent in (PAPER, PAPER.parent):
             del sys.modules[name]
 
 

@@ -1,6 +1,6 @@
 """Simulated beside real POS error: how far it drifts without GNSS, and how it hangs together.
 
-    python examples/pos_error.py [SERIES.err] [--drives N] [--picture FILE.png]
+    python benchmarks/pictures/pos_error.py [SERIES.err] [--drives N] [--picture FILE.png]
 
 SERIES.err is the error of a MEMS unit on a real drive, with GNSS withheld for 60 s in every 150 s
 (OB_GINS_TXT.err of i2Nav-WHU/OB_GINS); without it only the simulation is drawn. That series is a
@@ -23,7 +23,7 @@ from mlscorr.simulate.pos import pos_error
 from mlscorr.simulate.scenario import PosScenario
 from mlscorr.survey import Trajectory
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 SERIES = Path("data", "real_pos_error", "OB_GINS_TXT.err")
 # s: outages of the real series
 FIRST = 357_900.0
@@ -69,7 +69,7 @@ def parse():
     parser.add_argument("series", nargs="?", type=Path, default=shared if shared.exists() else None)
     parser.add_argument("--drives", type=int, default=5, help="simulated drives of 1500 s")
     parser.add_argument(
-        "--picture", type=Path, default=ROOT / "build" / "examples" / "pos_error.png"
+        "--picture", type=Path, default=ROOT / "build" / "pictures" / "pos_error.png"
     )
     arguments = parser.parse_args()
     arguments.picture.parent.mkdir(parents=True, exist_ok=True)

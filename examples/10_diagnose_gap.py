@@ -1,0 +1,33 @@
+"""
+Diagnose why a survey differs from its simulation
+=================================================
+
+``diagnose`` weighs every error that is known against what the targets show, and names the cause
+with a probability. In this survey the clock of the scanner is 20 ms off.
+"""
+
+from small_surveys import output_folder, wrong_clock
+
+import mlscorr
+
+out = output_folder()
+survey = mlscorr.read_survey(wrong_clock())
+gap = mlscorr.diagnose(survey)
+gap
+
+# %%
+# Size of the cause, with its sigma and the smallest size that would show.
+
+gap.to_frame().head(3)
+
+# %%
+# The effect goes into the simulator: simulator.toml has it.
+
+gap.write(out / "gap", overwrite=True)
+simulator = mlscorr.read_simulator(out / "gap" / "simulator.toml")
+print(simulator.effects)
+
+# %%
+# Evidence of each effect.
+
+gap.plot("evidence").savefig(out / "evidence.png", dpi=110)
