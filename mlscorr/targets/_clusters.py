@@ -200,8 +200,8 @@ def connected(points: np.ndarray, link: float) -> np.ndarray:
     Notes
     -----
     Of real calls, ``benchmarks/bench_libraries.py`` measured against DBSCAN, which keeps the link
-    exactly: parts of flat patches take Open3D 3 times and scikit-learn 23 times as long, and 15 % of
-    them are parted otherwise; 626 000 points take Open3D 113 times as long (Rand index 0.998).
+    exactly: parts of flat patches take Open3D 3 times and scikit-learn 23 times as long, and 15 %
+    of them are parted otherwise; 626 000 points take Open3D 113 times as long (Rand index 0.998).
     """
     if len(points) == 0:
         return np.empty(0, int)
