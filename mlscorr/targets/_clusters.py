@@ -190,11 +190,18 @@ def connected(points: np.ndarray, link: float) -> np.ndarray:
     points : (n, d) array
         In two dimensions or three. Units: m.
     link : float
-        Points as near as this belong together. Units: m.
+        Points about as near as this belong together: in the plane the limit is between 0.67 and
+        1.41 of it, in space between 0.47 and 1.45, as they lie in their voxels. Units: m.
 
     Returns
     -------
     (n,) int array
+
+    Notes
+    -----
+    Of real calls, ``benchmarks/bench_libraries.py`` measured against DBSCAN, which keeps the link
+    exactly: parts of flat patches take Open3D 3 times and scikit-learn 23 times as long, and 15 %
+    of them are parted otherwise; 626 000 points take Open3D 113 times as long (Rand index 0.998).
     """
     if len(points) == 0:
         return np.empty(0, int)
