@@ -36,7 +36,7 @@ class Squat(Effect):
 # %%
 # The same drive, with a stop, is simulated with the effect and without it.
 register(Squat)
-drive = {"duration": 12.0, "stops": [[4.0, 2.0]]}
+drive = {"duration": 40.0, "stops": [[15.0, 5.0]]}
 squatting = Scenario(drive=drive, effects=[{"name": "squat", "magnitude": 5e-4}])
 one, other = (simulate(s, np.random.default_rng(1)) for s in (squatting, Scenario(drive=drive)))
 height = one.trajectory.position[:, 2] - other.trajectory.position[:, 2]
