@@ -84,6 +84,7 @@ sphinx_gallery_conf = {
     "filename_pattern": r"/\d\d_",
     "ignore_pattern": r"small_surveys\.py",
     "copyfile_regex": r"small_surveys\.py",
+    "within_subsection_order": "FileNameSortKey",
     "nested_sections": False,
     "image_scrapers": (new_pictures,),
     "reset_modules": (start_example, "matplotlib"),

@@ -26,7 +26,7 @@ for panel, effect, unit in zip(panels, WRONG_MOUNTING, ("m", "deg"), strict=True
     part = table[table.unit == unit]
     panel.errorbar(range(3), part.lsc_correction, 2 * part.lsc_sigma, fmt="o", capsize=4)
     panel.plot(effect["magnitude"], "k_", markersize=24, label="truth")
-    panel.set_xticks(range(3), part.component)
-    panel.set_ylabel(f"correction ({unit})")
+    panel.set_xticks(range(3), ["right", "forward", "up"])
+    panel.set(title=effect["name"], ylabel=f"correction ({unit})", xlim=(-0.5, 2.5))
     panel.legend()
 figure.savefig(out / "mounting.png", dpi=110)

@@ -21,6 +21,12 @@ def street() -> Path:
     return _made("street", drive={"duration": 10.0, "speed": 6.0}, pos=_outage())
 
 
+def street_next_day() -> Path:
+    """The same street and targets, driven the other way a day later."""
+    drive = {"duration": 10.0, "speed": 6.0, "passes": [{"direction": "back"}]}
+    return _made("next-day", drive=drive, pos=_outage(), start_time=444_100.0)
+
+
 def two_passes() -> Path:
     """The same street there and back, 8 s each."""
     drive = {"duration": 8.0, "speed": 6.0, "passes": [{}, {"direction": "back"}]}
@@ -29,12 +35,8 @@ def two_passes() -> Path:
 
 def wrong_mounting() -> Path:
     """Two passes whose mounting was recorded with a wrong lever arm and boresight."""
-    return _made(
-        "wrong-mounting",
-        drive={"duration": 12.0, "speed": 6.0, "passes": [{}, {"direction": "back"}]},
-        targets={"control": 6, "check": 3, "hidden": 0.0},
-        effects=WRONG_MOUNTING,
-    )
+    drive = {"duration": 8.0, "speed": 6.0, "passes": [{}, {"direction": "back"}]}
+    return _made("wrong-mounting", drive=drive, effects=WRONG_MOUNTING)
 
 
 def wrong_clock() -> Path:

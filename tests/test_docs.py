@@ -112,6 +112,22 @@ def test_the_api_page_has_every_name():
     assert {name for name in mlscorr.__all__ if hasattr(mlscorr, name)} <= set(names)
 
 
+def test_no_property_of_the_api_page_opens_with_a_colon():
+    "The parser of docstrings takes what stands before it for the property's type"
+    text = (ROOT / "docs" / "api.md").read_text()
+    room = "mlscorr"
+    for directive, name in re.findall(r"\.\. (currentmodule|autoclass):: (\S+)", text):
+        if directive == "currentmodule":
+            room = name
+            continue
+        for base in resolve_name(f"{room}:{name}").__mro__[:-1]:
+            for attribute, value in vars(base).items():
+                function = getattr(value, "fget", None) or getattr(value, "func", None)
+                if function is not None and function.__doc__ and not attribute.startswith("_"):
+                    first = function.__doc__.strip().splitlines()[0]
+                    assert ":" not in first, f"{name}.{attribute}: {first}"
+
+
 def test_every_effect_is_listed_with_its_unit_and_usual_size():
     "docs/effects.md says what the library does"
     text = (ROOT / "docs" / "effects.md").read_text()

@@ -107,7 +107,7 @@ class Correction(Summary):
 
     @cached_property
     def table(self) -> np.ndarray:
-        """Per epoch (n, 15): T - origin, shift, and turn row by row; float64."""
+        """T - origin, shift, and turn row by row of each epoch (n, 15), float64."""
         old = self.recorded
         new = self.corrected
         turned = new.attitude
@@ -123,14 +123,14 @@ class Correction(Summary):
 
     @property
     def attitude_change(self) -> np.ndarray:
-        """Corrected - recorded roll, pitch and heading (n, 3). Units: rad."""
+        """Corrected - recorded roll, pitch and heading (n, 3), in rad."""
         recorded = np.column_stack(angles_from_attitude(self.recorded.attitude))
         corrected = np.column_stack(angles_from_attitude(self.corrected.attitude))
         return (corrected - recorded + np.pi) % (2 * np.pi) - np.pi
 
     @property
     def origin(self) -> np.ndarray:
-        """Local origin (3,) that keeps products of coordinates small. Units: m."""
+        """Local origin (3,) in m that keeps products of coordinates small."""
         return np.round(self.recorded.position[0])
 
     def increments(self, xyz: np.ndarray, gps_time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -357,7 +357,7 @@ class Correction(Summary):
 
     @cached_property
     def is_gap(self) -> np.ndarray:
-        """Whether the step after each epoch is a gap: (n,) bool."""
+        """Whether the step after each epoch is a gap, (n,) bool."""
         gap = np.isin(self.recorded.gps_time, self.recorded.gaps[:, 0])
         gap[-1] = True
         return gap

@@ -135,7 +135,7 @@ class Estimate(Summary):
 
     @property
     def span(self) -> tuple[float, float]:
-        """First and last control epoch. Units: s."""
+        """First and last control epoch, in s."""
         return self.equations.span
 
     @property

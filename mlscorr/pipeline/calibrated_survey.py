@@ -154,7 +154,7 @@ class CalibratedSurvey(CalibrationResult):
 
     @property
     def components(self) -> list[dict]:
-        """Rows of the parts of lever arm (m) and boresight (deg): what the recorded ones lack."""
+        """Rows of what the recorded lever arm (m) and boresight (deg) lack, by component."""
         units = ["m"] * 3 + ["deg"] * 3
         scale = np.where(np.array(units) == "m", 1.0, np.degrees(1.0))
         columns = {"component": MOUNTING_COMPONENTS, "unit": units}

@@ -63,7 +63,7 @@ class ComparedSurvey(Summary):
 
     @property
     def scored_by(self) -> str:
-        """What the methods are ranked by: check, cross_validated, or the mere fit to control."""
+        """Role by which the methods are ranked, one of check, cross_validated and control."""
         if "cross_validated" in self.rows[0] and self.groups:
             return "cross_validated"
         if len(self.matched_check):

@@ -114,7 +114,7 @@ class CorrectedSurvey(Summary):
 
     @property
     def accuracy(self) -> dict[str, object]:
-        """Accuracy by ASPRS 2023, as report.json has it: mlscorr.evaluate._accuracy."""
+        """Accuracy by ASPRS 2023, as report.json has it."""
         return accuracy(
             self.matched_check,
             self.matched_control,

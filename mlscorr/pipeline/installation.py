@@ -104,7 +104,7 @@ def doctor() -> Installation:
         It takes seconds, for a picture is drawn.
 
     >>> import mlscorr
-    >>> "mlscorr" in [part.name for part in mlscorr.doctor().parts]
+    >>> "python" in [part.name for part in mlscorr.doctor().parts]
     True
     """
     findings = [InstalledPart("python", sys.version_info >= (3, 11), platform.python_version())]

@@ -2,9 +2,9 @@
 
 >>> import numpy as np
 >>> from mlscorr.simulate import Scenario, simulate
->>> simulated = simulate(Scenario(drive={"duration": 5.0}), np.random.default_rng(1))
->>> len(simulated.targets)
-24
+>>> short = Scenario(drive={"duration": 8.0}, targets={"control": 4, "check": 1})
+>>> len(simulate(short, np.random.default_rng(1)).targets)
+5
 """
 
 import lazy_loader

@@ -366,7 +366,7 @@ class Survey(Summary):
 
     @cached_property
     def by_scanner(self) -> dict[str, Survey]:
-        """The survey of each scanner by its name: its files, its mounting, what is believed of it.
+        """The survey of each scanner by its name, with its files, mounting and prior.
 
         The survey itself, without a name, where there is one scanner.
         """

@@ -212,17 +212,17 @@ class Matched(Columns):
 
     @property
     def gps_time(self) -> np.ndarray:
-        """Times (n,) of the observations. Units: s."""
+        """Times (n,) of the observations, in s."""
         return self.observations.gps_time
 
     @property
     def misclosure(self) -> np.ndarray:
-        """Surveyed - observed (n, 3): what must be added to the cloud. Units: m."""
+        """Surveyed - observed (n, 3) in m, which must be added to the cloud."""
         return self.surveyed.position - self.observations.position
 
     @property
     def variance(self) -> np.ndarray:
-        """Of the misclosure (n, 3): survey and extraction  (Eq. 19). Units: m^2."""
+        """Variance of the misclosure (n, 3) in m^2 by survey and extraction  (Eq. 19)."""
         return self.surveyed.sigma**2 + np.einsum("nii->ni", self.observations.covariance)
 
     @property

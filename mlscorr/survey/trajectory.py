@@ -188,14 +188,14 @@ class Trajectory(Summary):
 
     @property
     def file_time(self) -> np.ndarray:
-        """Times (n,) as a file has them, whose seconds of week start again. Units: s."""
+        """Times (n,) in s as a file has them, whose seconds of week start again."""
         if self.weeks is None:
             return self.gps_time
         return self.gps_time - WEEK * self.weeks
 
     @cached_property
     def gaps(self) -> np.ndarray:
-        """Start and end (k, 2) of the steps longer than ten times the median step. Units: s.
+        """Start and end (k, 2) in s of the steps longer than ten times the median step.
 
         With sessions it is the median of each, and from one to the next is a gap, however short.
         """
@@ -213,7 +213,7 @@ class Trajectory(Summary):
 
     @cached_property
     def passes(self) -> np.ndarray:
-        """Start and end (k, 2) of the parts without a gap. Units: s."""
+        """Start and end (k, 2) in s of the parts without a gap."""
         starts = np.append(self.gps_time[0], self.gaps[:, 1])
         return np.column_stack([starts, np.append(self.gaps[:, 0], self.gps_time[-1])])
 
@@ -240,7 +240,7 @@ class Trajectory(Summary):
 
     @property
     def scanned_passes(self) -> np.ndarray:
-        """Start and end (k, 2) of what was scanned in the parts without a gap. Units: s."""
+        """Start and end (k, 2) in s of what was scanned in the parts without a gap."""
         time = self.gps_time[self.scanned_rows]
         first = np.flatnonzero(np.diff(self.segment(time), prepend=-1))
         return np.column_stack([time[first], time[np.append(first[1:], len(time)) - 1]])
@@ -263,12 +263,12 @@ class Trajectory(Summary):
 
     @property
     def duration(self) -> float:
-        """Time that was recorded, without the gaps. Units: s."""
+        """Time that was recorded, in s, without the gaps."""
         return self.recorded_time(*self.gps_time[[0, -1]])
 
     @property
     def length(self) -> float:
-        """Length of the recorded path, without what lies across the gaps. Units: m."""
+        """Length of the recorded path, in m, without what lies across the gaps."""
         steps = np.linalg.norm(np.diff(self.position, axis=0), axis=1)
         return float(steps[np.diff(self.segment(self.gps_time)) == 0].sum())
 
