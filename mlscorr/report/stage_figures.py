@@ -144,6 +144,8 @@ def score_figure(scores: Mapping[str, Score]) -> Figure:
             at = np.arange(4) + (place - (len(drawn) - 1) / 2) * width
             panel.bar(at, statistics.rmse[axes], width, color=STATES[state], label=state)
         panel.set_yscale("log")
+        panel.yaxis.set_major_formatter("{x:g}")
+        panel.yaxis.set_minor_formatter("{x:g}")
         panel.set_xticks(range(4), ["E", "N", "H", "3D"])
         panel.set_title(f"{name}: {score.before.n} observations")
     panels[0].set_ylabel("RMSE (m)")
