@@ -10,6 +10,7 @@ from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from mlscorr.estimate import Estimate
 from mlscorr.evaluate import Score
@@ -144,6 +145,9 @@ def score_figure(scores: Mapping[str, Score]) -> Figure:
             at = np.arange(4) + (place - (len(drawn) - 1) / 2) * width
             panel.bar(at, statistics.rmse[axes], width, color=STATES[state], label=state)
         panel.set_yscale("log")
+        panel.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        panel.yaxis.set_major_formatter("{x:g}")
+        panel.yaxis.set_minor_formatter(NullFormatter())
         panel.set_xticks(range(4), ["E", "N", "H", "3D"])
         panel.set_title(f"{name}: {score.before.n} observations")
     panels[0].set_ylabel("RMSE (m)")
