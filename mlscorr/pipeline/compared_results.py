@@ -310,8 +310,8 @@ class ComparedResults(KnownResult):
         """The difference of the corrected trajectories over time, E, N and H."""
         from mlscorr.report import results_figure
 
-        found = self.difference
-        return results_figure(found.gps_time, found.position, found.sigmas, found.gaps)
+        curves = self.difference
+        return results_figure(curves.gps_time, curves.position, curves.sigmas, curves.gaps)
 
     def _overview(self):
         """What terminal and notebook show."""
@@ -333,11 +333,13 @@ class ComparedResults(KnownResult):
         from mlscorr.report import write_results
 
         inputs = [*self.first.inputs, *self.second.inputs]
-        found = self.difference
+        curves = self.difference
 
         def page(path, document):
             write_results(
-                path, document, (found.gps_time, found.position, found.sigmas, found.gaps)
+                path,
+                document,
+                (curves.gps_time, curves.position, curves.sigmas, curves.gaps),
             )
 
         return ResultFiles.of(self._name, inputs, self.document, {}, {"compare_results.html": page})
@@ -446,17 +448,17 @@ def _pairs(
     others = defaultdict(list)
     for row in second:
         others[row["name"]].append(row)
-    alone = []
+    singles = []
     for row in first:
         times = [_apart(row, other) for other in others[row["name"]]]
         if times and min(times) <= SAME_EPOCH:
             yield row, others[row["name"]].pop(int(np.argmin(times)))
         else:
-            alone.append(row)
-    for row in alone:  # seen in one result alone, which the other one lists as unseen
+            singles.append(row)
+    for row in singles:  # seen in one result alone, which the other one lists as unseen
         rest = others[row["name"]]
-        unseen = [i for i, other in enumerate(rest) if None in (row["gps_time"], other["gps_time"])]
-        yield row, rest.pop(unseen[0]) if unseen else None
+        places = [i for i, other in enumerate(rest) if None in (row["gps_time"], other["gps_time"])]
+        yield row, rest.pop(places[0]) if places else None
     for rest in others.values():
         yield from ((None, row) for row in rest)
 

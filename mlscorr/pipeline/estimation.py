@@ -283,10 +283,10 @@ class Scores(Summary):
 
     def _overview(self):
         """RMSE of each role; kinds where there are several."""
-        several = len({kind for _, kind in self.by_kind}) > 1
+        has_kinds = len({kind for _, kind in self.by_kind}) > 1
         rows = [("RMSE (m)", "kind", "state", "n", "east", "north", "height", "3D")]
         for role, kind, state, statistics in self._rows():
-            if kind == "all" or several:
+            if kind == "all" or has_kinds:
                 rmse = (f"{value:.4f}" for value in statistics.rmse[[0, 1, 2, 4]])
                 rows.append((role, kind, state, statistics.n, *rmse))
         return rows

@@ -91,20 +91,23 @@ def extract(
             of_file += targets
             yield chunk
 
-    found = fit_while_reading(survey, searched, rng, done)
+    near_control = fit_while_reading(survey, searched, rng, done)
     everywhere = [
-        (found.candidates.passes[file, int(survey.trajectory.segment(target.gps_time))], target)
+        (
+            near_control.candidates.passes[file, int(survey.trajectory.segment(target.gps_time))],
+            target,
+        )
         for file, targets in objects.items()
         for target in distinct(targets)
     ]
-    result = _without_doubles(list(found.targets), everywhere)
+    result = _without_doubles(list(near_control.targets), everywhere)
     sentences = _sentences(survey, np.flatnonzero(present), result)
     for sentence in sentences:
         warnings.warn(sentence, stacklevel=2)
     if result and len(surveyed):
-        finding = match_fitted(survey, result, found.candidates)
+        finding = match_fitted(survey, result, near_control.candidates)
     else:
-        finding = unmatched(survey, result, found.candidates, NO_CONTROL)
+        finding = unmatched(survey, result, near_control.candidates, NO_CONTROL)
     return ExtractedSurvey(survey, finding, sentences)
 
 

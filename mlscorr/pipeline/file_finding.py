@@ -66,15 +66,15 @@ def find_in_file(survey: Survey, origin: np.ndarray, with_ties: bool = True) -> 
         read = read_into(collector.add)
     else:
         read = read_chunks
-    found = fit_while_reading(survey, read)
-    candidates = found.candidates
-    near = found.near
+    near_control = fit_while_reading(survey, read)
+    candidates = near_control.candidates
+    near = near_control.near
     segments = {number: segment for (_, segment), number in candidates.passes.items()}
     features = collector.features()
     numbers = [segments[number] for number in features.pass_number.tolist()]
     return FileFinding(
         starts={segment: start for (_, segment), start in candidates.starts.items()},
-        targets=[(segments[number], target) for number, target in found.targets],
+        targets=[(segments[number], target) for number, target in near_control.targets],
         unplaced=candidates.unplaced,
         scanned=near.scanned,
         warnings=tuple(near.warnings()),

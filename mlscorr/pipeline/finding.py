@@ -639,9 +639,9 @@ def match_silently(targets: FoundTargets, survey: Survey) -> MatchedTargets:
     near = targets.near
     if len(targets) == 0:
         raise ValueError(nothing_found(survey, targets.candidates, near))
-    found = match_fitted(survey, targets.targets, targets.candidates)
-    if len(found) == 0:
-        reasons = " ".join(refusal.reason for refusal in found.matches.refusals[:3])
+    matches = match_fitted(survey, targets.targets, targets.candidates)
+    if len(matches) == 0:
+        reasons = " ".join(refusal.reason for refusal in matches.matches.refusals[:3])
         places = len(np.unique(survey.surveyed.position, axis=0))
         is_twice = 2 * places <= len(survey.surveyed)  # and then the CRS isn't what is wrong
         questions = "Are control and cloud in the same CRS?", "Is each point named twice?"
@@ -650,7 +650,7 @@ def match_silently(targets: FoundTargets, survey: Survey) -> MatchedTargets:
             f"were found ({near.intensity_range} there). {reasons} {questions[is_twice]}"
         )
     return replace(
-        found,
+        matches,
         scanned=near.scanned,
         warnings=tuple(near.warnings()),
         uncovered=tuple(near.beams.outside()),

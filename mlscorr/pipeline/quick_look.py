@@ -71,23 +71,23 @@ def look_near_control(survey: Survey) -> QuickLook:
     windows = {file: list(_near(survey, file)) for file in survey.clouds}
     survey = replace(survey, control=_affordable(survey, windows))
     start = perf_counter()
-    found = _fit(survey, windows)
+    near_control = _fit(survey, windows)
     seconds = (perf_counter() - start) / len(survey.control)
-    matched, refusal = _decided(whole, found)
+    matched, refusal = _decided(whole, near_control)
     matched = matched[np.isin(matched.name, survey.control.name)]
     fault = doubt = ""
     if 2 * len(set(matched.name)) < len(survey.control):
         fault = _with_sizes_doubled(survey, windows, matched) or _with_other_heights(
             survey, windows, matched
         )
-        doubt = "" if fault else _doubt(survey, matched, found)
+        doubt = "" if fault else _doubt(survey, matched, near_control)
     return QuickLook(survey.control, matched, fault, refusal, doubt, seconds)
 
 
-def _decided(survey, found):
+def _decided(survey, near_control):
     """What of all surveyed points is matched, and the sentence where a correction refuses that."""
     try:
-        matches = match_silently(found, survey)
+        matches = match_silently(near_control, survey)
     except ValueError as error:
         return Matched.none(), str(error)
     try:
@@ -160,8 +160,8 @@ def _fit(survey, windows) -> FoundTargets:
 
 def _find(survey, windows) -> Matched:
     """Surveyed targets that are found in what was read."""
-    found = _fit(survey, windows)
-    return match_fitted(survey, found.targets, found.candidates).control
+    near_control = _fit(survey, windows)
+    return match_fitted(survey, near_control.targets, near_control.candidates).control
 
 
 def _with_sizes_doubled(survey, windows, matched):
@@ -224,11 +224,11 @@ def _count(matched):
     return len(set(matched.name))
 
 
-def _doubt(survey, matched, found):
+def _doubt(survey, matched, near_control):
     """A sentence on what a quick look does not find."""
-    near = found.near
+    near = near_control.near
     if not len(matched):
-        return nothing_found(survey, found.candidates, near)
+        return nothing_found(survey, near_control.candidates, near)
     return (
         f"A quick look finds {_count(matched)} of the {len(survey.control)} surveyed points that "
         f"it looks at, among {near.points} points ({near.intensity_range}) near them: check kind, "

@@ -75,8 +75,8 @@ def _epochs(section) -> Iterator[StatementRow]:
     if not section["interpolated"] and not any(only.values()):
         return
     values = {"interpolated": section["interpolated"], **only}
-    said = Statement("epochs differ", _severity(not any(only.values())), values)
-    yield StatementRow.of("Epochs", said)
+    statement = Statement("epochs differ", _severity(not any(only.values())), values)
+    yield StatementRow.of("Epochs", statement)
 
 
 def _scores(scores) -> Iterator[StatementRow]:
@@ -91,8 +91,8 @@ def _scores(scores) -> Iterator[StatementRow]:
             **{side: row[side]["rmse_3d"] for side in SIDES},
             "counts": [row[side]["n"] for side in SIDES],
         }
-        said = Statement("scores of results", _severity(_is_no_worse(row)), values)
-        yield StatementRow.of("RMSE", said)
+        statement = Statement("scores of results", _severity(_is_no_worse(row)), values)
+        yield StatementRow.of("RMSE", statement)
         return
 
 
@@ -113,14 +113,14 @@ def _targets(rows) -> Iterator[StatementRow]:
             "all": len(changed),
             "least": SETTINGS.difference,
         }
-        said = Statement("residuals differ", _severity(not above), values)
+        statement = Statement("residuals differ", _severity(not above), values)
         items = capped((_name(row), _change_in_words(row)) for row in above)
-        yield StatementRow.of("Targets", said, items=items)
+        yield StatementRow.of("Targets", statement, items=items)
     moved = [row for row in rows if any(row["surveyed"]["difference"] or ())]
     if moved:
-        said = Statement("surveyed differently", "warning", {"count": _points(moved)})
+        statement = Statement("surveyed differently", "warning", {"count": _points(moved)})
         by_name = {row["name"]: _axes(row["surveyed"]["difference"]) for row in moved}
-        yield StatementRow.of("Coordinates", said, items=capped(by_name.items()))
+        yield StatementRow.of("Coordinates", statement, items=capped(by_name.items()))
 
 
 def _name(row):
@@ -148,18 +148,18 @@ def _points(rows):
 
 def _use(rows):
     """Targets that one result uses and the other does not, with the reason."""
-    one = [row for row in rows if bool(row["used"]["first"]) != bool(row["used"]["second"])]
-    if not one:
+    differing = [row for row in rows if bool(row["used"]["first"]) != bool(row["used"]["second"])]
+    if not differing:
         used = [row for row in rows if row["used"]["first"]]
         return StatementRow.of("Use", Statement("same targets used", values={"n": len(used)}))
     items = []
-    for row in one:
+    for row in differing:
         side = SIDES[not row["used"]["first"]]
         other = SIDES[bool(row["used"]["first"])]
         why = row["reason"][other] or "it is not among its targets"
         items.append((_name(row), f"used in the {side} only; {other}: {why}"))
-    said = Statement("targets used in one", "warning", {"count": len(one)})
-    return StatementRow.of("Use", said, items=capped(items))
+    statement = Statement("targets used in differing", "warning", {"count": len(differing)})
+    return StatementRow.of("Use", statement, items=capped(items))
 
 
 def _settings(document):
@@ -193,13 +193,13 @@ def _inputs(files):
         there = [side for side in SIDES if row[side] is not None]
         words = "other contents" if len(there) == 2 else f"in the {there[0]} only"
         items.append((row["name"], f"{row['what']}, {words}"))
-    said = Statement("inputs differ", values=values)
-    return StatementRow.of("Inputs", said, items=capped(items))
+    statement = Statement("inputs differ", values=values)
+    return StatementRow.of("Inputs", statement, items=capped(items))
 
 
 def _warnings(warnings) -> Iterator[StatementRow]:
     """Warnings of one result alone."""
     items = [(f"{side} only", text) for side in SIDES for text in warnings[side]]
     if items:
-        said = Statement("warnings of one", "warning", {"count": len(items)})
-        yield StatementRow.of("Warnings", said, items=capped(items))
+        statement = Statement("warnings of one", "warning", {"count": len(items)})
+        yield StatementRow.of("Warnings", statement, items=capped(items))

@@ -89,8 +89,8 @@ class Layer:
             low, high = self.intensity_limits
             share = np.clip((self.intensity[rows] - low) / (high - low), 0.0, 1.0)
             return colour_table("intensity")[np.rint(255 * share).astype(np.uint8)]
-        one = np.rint(255 * np.array(to_rgb(color))).astype(np.uint8)
-        return np.tile(one, (len(np.arange(len(self))[rows]), 1))
+        shade = np.rint(255 * np.array(to_rgb(color))).astype(np.uint8)
+        return np.tile(shade, (len(np.arange(len(self))[rows]), 1))
 
     def key(self, color: str) -> tuple[str, str]:
         """The color of a legend's mark, and what colors mean.
@@ -290,10 +290,10 @@ def _common_origin(layers):
     apart = np.linalg.norm(middles[:, None] - middles[None], axis=2)
     extent = float(np.linalg.norm(ends.max(axis=(0, 1)) - ends.min(axis=(0, 1))))
     if extent > SETTINGS.shown_extent:
-        one, other = np.unravel_index(apart.argmax(), apart.shape)
+        first, second = np.unravel_index(apart.argmax(), apart.shape)
         raise ValueError(
             f"What is to be shown extends over {extent / 1000:.0f} km, and one view holds "
-            f"{SETTINGS.shown_extent / 1000:.0f} km ({there[one].name} and {there[other].name} are "
+            f"{SETTINGS.shown_extent / 1000:.0f} km ({there[first].name} and {there[second].name} are "
             f"{apart.max() / 1000:.0f} km apart). One of them may be about a local origin or in "
             "another CRS: an Open3D geometry in the map needs its attribute origin."
         )
@@ -427,8 +427,8 @@ def _thinned(layers, points):
     return chosen
 
 
-def _are_states(one, other):
+def _are_states(first, second):
     """Whether two clouds are the same points before and after something."""
-    if one.gps_time is None or other.gps_time is None:
+    if first.gps_time is None or second.gps_time is None:
         return False
-    return np.array_equal(one.gps_time, other.gps_time)
+    return np.array_equal(first.gps_time, second.gps_time)

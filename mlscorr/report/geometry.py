@@ -42,8 +42,8 @@ def target_lines(
         colors.append(BLUE)
         values, axes = np.linalg.eigh(observations.covariance[row])
         half = enlarged * np.sqrt(np.maximum(values, 0.0)) * axes
-        for one, other in ((0, 1), (1, 2), (2, 0)):
-            loops.append(centre + _circle() @ np.stack([half[:, one], half[:, other]]))
+        for first, second in ((0, 1), (1, 2), (2, 0)):
+            loops.append(centre + _circle() @ np.stack([half[:, first], half[:, second]]))
             colors.append(VERMILLION)
     return _loops(loops, colors, origin)
 

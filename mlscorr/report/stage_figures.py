@@ -32,8 +32,9 @@ def targets_figure(targets: Sequence[PassTarget]) -> Figure:
     ----------
     targets : sequence of (pass number, FittedTarget)
     """
-    columns, most = SHEET[0], SHEET[0] * SHEET[1]
-    best = sorted(range(len(targets)), key=lambda row: -targets[row][1].score)[:most]
+    columns = SHEET[0]
+    room = SHEET[0] * SHEET[1]
+    best = sorted(range(len(targets)), key=lambda row: -targets[row][1].score)[:room]
     lines = max(1, -(-len(best) // columns))
     width, height = SETTINGS.target_figure
     with matplotlib.rc_context(style.STYLE):
@@ -75,8 +76,8 @@ def misclosure_figure(control: Matched, check: Matched, trajectory: Trajectory) 
     panels[0].set_title("Misclosures: surveyed − observed")
     panels[-1].set_xlabel(f"Time since gps_time {start:.0f} s (s)")
     words = {"control": "Control point, 1 sigma", "check": "Check point, 1 sigma"}
-    seen = {name for name, matched in groups.items() if len(matched)}
-    style.legend_above(figure, style.mark_handles(words, seen))
+    roles = {name for name, matched in groups.items() if len(matched)}
+    style.legend_above(figure, style.mark_handles(words, roles))
     return figure
 
 

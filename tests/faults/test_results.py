@@ -49,9 +49,9 @@ def test_overwriting_exchanges_the_folder_at_once(tmp_path, monkeypatch):
     (out / "notes.txt").write_text("mine")
     (out / "link").symlink_to("nowhere")
     seen = []
-    exchange = output.exchange
+    exchange = output._exchange
     monkeypatch.setattr(
-        output, "exchange", lambda *pair: (seen.append(texts(out)), exchange(*pair))
+        output, "_exchange", lambda *pair: (seen.append(texts(out)), exchange(*pair))
     )
     write(out, "new", overwrite=True, names=("a.txt",))
     old = {"a.txt": "old", "sub/b.txt": "old", "notes.txt": "mine"}

@@ -131,7 +131,7 @@ def _write_points(part, file, target):
             f"{file.name} stands for points in memory, which are written without the fields of "
             "sigmas: point_sigma() of the result gives these."
         )
-    if part.added != NOTHING_ADDED:
+    if part.added.displacement or part.added.provenance is not None:
         raise ValueError(
             f"{file.name} stands for points in memory, which are written without displacement and "
             "provenance. Write the points as LAS first, and read the survey from files."

@@ -51,7 +51,7 @@ CREATE TABLE gpkg_geometry_columns (
 
 
 @dataclass(frozen=True)
-class Layer:
+class FeatureLayer:
     """Features of one kind, with the same attributes each.
 
     Parameters
@@ -74,7 +74,7 @@ class Layer:
     rows: Sequence[dict[str, Any]]
 
 
-def write_features(path: str | Path, layers: Sequence[Layer], crs: str) -> None:
+def write_features(path: str | Path, layers: Sequence[FeatureLayer], crs: str) -> None:
     """Write layers as the suffix says; the file appears whole or not at all.
 
     A GeoPackage has one table a layer, with E, N, H in the survey's CRS. A GeoJSON has the first
@@ -85,7 +85,7 @@ def write_features(path: str | Path, layers: Sequence[Layer], crs: str) -> None:
     ----------
     path : path
         ``.gpkg`` or ``.geojson``.
-    layers : sequence of Layer
+    layers : sequence of FeatureLayer
     crs : str
         See check_crs.
     """
@@ -189,7 +189,7 @@ def _blob(kind, place, number):
     return head + np.ascontiguousarray(place, "<f8").tobytes()
 
 
-def target_layer(rows: Sequence[dict[str, Any]], kinds: dict[str, str]) -> Layer:
+def target_layer(rows: Sequence[dict[str, Any]], kinds: dict[str, str]) -> FeatureLayer:
     """Surveyed points as a layer: where they were surveyed, a point for each pass.
 
     Parameters
@@ -216,10 +216,12 @@ def target_layer(rows: Sequence[dict[str, Any]], kinds: dict[str, str]) -> Layer
             values |= dict(zip(names, map(_finite, parts), strict=True))
         places.append(np.array([place], float))
         features.append(values)
-    return Layer("targets", "POINT", places, types, features)
+    return FeatureLayer("targets", "POINT", places, types, features)
 
 
-def trajectory_layers(trajectory: Trajectory, recorded: Trajectory | None = None) -> list[Layer]:
+def trajectory_layers(
+    trajectory: Trajectory, recorded: Trajectory | None = None
+) -> list[FeatureLayer]:
     """A line for each part between gaps with a vertex a meter, and a point each second.
 
     Parameters
@@ -245,10 +247,10 @@ def trajectory_layers(trajectory: Trajectory, recorded: Trajectory | None = None
     values = np.column_stack([trajectory.gps_time, sigma, change])[first]
     points = [dict(zip(names, map(_finite, row), strict=True)) for row in values.tolist()]
     return [
-        Layer(
+        FeatureLayer(
             "trajectory", "LINESTRING", [place for place, _ in lines], LINE, [r for _, r in lines]
         ),
-        Layer(
+        FeatureLayer(
             "seconds",
             "POINT",
             list(trajectory.position[first][:, None]),

@@ -25,7 +25,7 @@ from mlscorr.survey import AXES, Trajectory
 
 SUFFIXES = (".sbet", ".out", ".tum", *FEATURE_SUFFIXES)
 TUM = ".tum"
-TAKEN = "weak.geojson"  # is written anyway
+WEAK_STRETCHES = "weak.geojson"  # is written anyway
 
 
 def check_exports(names: Sequence[str], crs: str | None = None, is_read: bool = False) -> None:
@@ -94,11 +94,11 @@ def check_distinct(names: Sequence[str]) -> None:
 def _suffix(name, option, known, others=""):
     """The suffix of an export's name, if it can be written."""
     suffix = Path(name).suffix.lower()
-    if Path(name).name != name or suffix not in known or name.lower() == TAKEN:
+    if Path(name).name != name or suffix not in known or name.lower() == WEAK_STRETCHES:
         kinds = ", ".join(filter(None, [others, "or .gpkg (GeoPackage)"]))
         raise ValueError(
             f"{option} {name}: give the name of a file without a folder, which ends with "
-            f"{kinds.removeprefix('or ')} or {GEOJSON} (GeoJSON), other than {TAKEN}."
+            f"{kinds.removeprefix('or ')} or {GEOJSON} (GeoJSON), other than {WEAK_STRETCHES}."
         )
     return suffix
 
