@@ -158,7 +158,7 @@ def _use(rows):
         other = SIDES[bool(row["used"]["first"])]
         why = row["reason"][other] or "it is not among its targets"
         items.append((_name(row), f"used in the {side} only; {other}: {why}"))
-    statement = Statement("targets used in differing", "warning", {"count": len(differing)})
+    statement = Statement("targets used in one", "warning", {"count": len(differing)})
     return StatementRow.of("Use", statement, items=capped(items))
 
 

@@ -293,9 +293,10 @@ def _common_origin(layers):
         first, second = np.unravel_index(apart.argmax(), apart.shape)
         raise ValueError(
             f"What is to be shown extends over {extent / 1000:.0f} km, and one view holds "
-            f"{SETTINGS.shown_extent / 1000:.0f} km ({there[first].name} and {there[second].name} are "
-            f"{apart.max() / 1000:.0f} km apart). One of them may be about a local origin or in "
-            "another CRS: an Open3D geometry in the map needs its attribute origin."
+            f"{SETTINGS.shown_extent / 1000:.0f} km ({there[first].name} and "
+            f"{there[second].name} are {apart.max() / 1000:.0f} km apart). "
+            "One of them may be about a local origin or in another CRS: an Open3D geometry in the "
+            "map needs its attribute origin."
         )
     return chosen_origin(ends.reshape(-1, 3), None)
 
