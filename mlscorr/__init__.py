@@ -11,31 +11,30 @@ from typing import TYPE_CHECKING, Any
 from mlscorr.compiled_loops import choose_folder
 
 if TYPE_CHECKING:  # what editors and type checkers see of the names that are loaded when used
-    # from the modules themselves, as a face that loads them when used has no types; and as they
-    # are called, by which a type checker knows them for public
+    # as they are called, by which a type checker knows them for public
     from mlscorr import simulate as simulate
     from mlscorr.correction import Correction as Correction
     from mlscorr.io.clouds import read_cloud as read_cloud
     from mlscorr.io.surveys import read_survey as read_survey
+    from mlscorr.pipeline import apply as apply
+    from mlscorr.pipeline import calibrate as calibrate
+    from mlscorr.pipeline import check as check
+    from mlscorr.pipeline import compare as compare
     from mlscorr.pipeline import compare_results as compare_results
-    from mlscorr.pipeline.applying import apply as apply
-    from mlscorr.pipeline.calibration import calibrate as calibrate
-    from mlscorr.pipeline.checking import check as check
-    from mlscorr.pipeline.comparison import compare as compare
-    from mlscorr.pipeline.correction import correct as correct
-    from mlscorr.pipeline.diagnosis import diagnose as diagnose
-    from mlscorr.pipeline.estimation import estimate_pos_error as estimate_pos_error
-    from mlscorr.pipeline.estimation import score as score
-    from mlscorr.pipeline.extraction import extract as extract
-    from mlscorr.pipeline.finding import find_targets as find_targets
-    from mlscorr.pipeline.finding import match_targets as match_targets
-    from mlscorr.pipeline.installation import doctor as doctor
-    from mlscorr.pipeline.planning import plan as plan
-    from mlscorr.pipeline.rendering import render as render
-    from mlscorr.pipeline.starting import init as init
-    from mlscorr.pipeline.ties import find_ties as find_ties
+    from mlscorr.pipeline import correct as correct
+    from mlscorr.pipeline import diagnose as diagnose
+    from mlscorr.pipeline import doctor as doctor
+    from mlscorr.pipeline import estimate_pos_error as estimate_pos_error
+    from mlscorr.pipeline import extract as extract
+    from mlscorr.pipeline import find_targets as find_targets
+    from mlscorr.pipeline import find_ties as find_ties
+    from mlscorr.pipeline import init as init
+    from mlscorr.pipeline import match_targets as match_targets
+    from mlscorr.pipeline import plan as plan
+    from mlscorr.pipeline import render as render
+    from mlscorr.pipeline import score as score
     from mlscorr.report import show as show
-    from mlscorr.simulate.simulator_file import read_simulator as read_simulator
+    from mlscorr.simulate import read_simulator as read_simulator
     from mlscorr.survey import ControlPoints as ControlPoints
     from mlscorr.survey import Mounting as Mounting
     from mlscorr.survey import PointCloud as PointCloud

@@ -9,23 +9,5 @@
 
 import lazy_loader
 
-__getattr__, __dir__, __all__ = lazy_loader.attach(
-    __name__,
-    submod_attrs={
-        "_mechanisms": [
-            "Described",
-            "DisplacedSurvey",
-            "Mechanism",
-            "RecordedPoints",
-            "described",
-            "load_mechanisms",
-            "mechanisms",
-            "training_mechanisms",
-        ],
-        "_random_survey": ["random_scenario", "random_survey"],
-        "scenario": ["DEMO", "Scenario", "SceneScenario", "read_scenario", "scenario_files"],
-        "settings": ["SETTINGS"],
-        "simulator_file": ["Simulator", "beliefs_of", "read_simulator", "write_simulator"],
-        "survey": ["SimulatedSurvey", "simulate"],
-    },
-)
+# __init__.pyi lists what is offered, for type checkers too
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
