@@ -36,6 +36,7 @@ def without_first(survey, targets):
     return targets[away > 5.0]  # m
 
 
+@pytest.mark.long
 def test_stages_equal_the_command(survey, matches):
     "Stages by hand, ties with their own reading of the clouds, move points as correct does"
     with pytest.warns(UserWarning, match="No tie was found"):  # in one pass
@@ -83,6 +84,7 @@ def test_matches_have_misclosures_by_role(survey, matches):
         assert np.allclose(frame.loc[name, columns].astype(float), misclosure)
 
 
+@pytest.mark.long
 def test_scores_are_those_of_the_result(survey, matches, estimate):
     "Without ties, score and CorrectedSurvey state the same RMSE, over all and by kind"
     result = mlscorr.correct(survey, ties="off")
@@ -151,6 +153,7 @@ def test_geometries_lie_where_their_stages_say(survey, targets, matches, estimat
         estimate.to_open3d(origin, color="red")
 
 
+@pytest.mark.long
 def test_a_survey_of_arrays_is_corrected_as_its_files(survey, tmp_path):
     "The same points from memory give the same trajectory, and a LAZ with the corrected points"
     cloud = PointCloud.concatenate(list(mlscorr.read_cloud(survey.clouds[0])))
