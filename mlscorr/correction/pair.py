@@ -206,10 +206,7 @@ class Correction(Summary):
         if is_las(cloud):
             return self._moved_las(cloud)
         points, back = as_cloud(cloud)
-        self._require_near(points.xyz)
-        moved, inside = self._moved(points)
-        self._require_inside(np.count_nonzero(~inside), points.gps_time)
-        return back(moved)
+        return back(self._moved_if_here(points))
 
     def before_after(self, cloud: Any, origin: ArrayLike | None = None) -> dict[str, Any]:
         """A cloud as it was and corrected, as two geometries of Open3D about one origin.
@@ -246,15 +243,19 @@ class Correction(Summary):
         [0.0, 0.0, 0.5]
         """
         points, _ = as_cloud(cloud)
-        self._require_near(points.xyz)
-        moved, inside = self._moved(points)
-        self._require_inside(np.count_nonzero(~inside), points.gps_time)
-        return geometry_pair(points, moved, origin)
+        return geometry_pair(points, self._moved_if_here(points), origin)
 
     def _moved(self, cloud):
         """A PointCloud corrected, and which points lie within the trajectory."""
         moved, inside = self.increments(cloud.xyz, cloud.gps_time)
         return replace(cloud, xyz=np.add(cloud.xyz, moved, out=moved)), inside
+
+    def _moved_if_here(self, cloud):
+        """A PointCloud corrected; refused where it is of another place or time."""
+        self._require_near(cloud.xyz)
+        moved, inside = self._moved(cloud)
+        self._require_inside(np.count_nonzero(~inside), cloud.gps_time)
+        return moved
 
     def _moved_las(self, points):
         """Points of laspy, corrected in a copy by whole steps of their scale."""

@@ -215,7 +215,7 @@ def compare(
     """
     check_survey(survey)
     matches, features = observe_survey(survey, tie_use(survey, None), rng, progress)
-    survey = matches.scanned_survey
+    survey = matches.as_scanned(survey)
     control = matches.control
     check = matches.check
     for sentence in reuse_warnings(survey):

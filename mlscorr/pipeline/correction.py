@@ -100,7 +100,7 @@ def correct(
 
     result = CorrectedSurvey(
         **corrected_fields(
-            matches.scanned_survey, matches.control, matches.check, matches, estimate
+            matches.as_scanned(survey), matches.control, matches.check, matches, estimate
         )
     )
     datum = (difference.sentence for difference in result.datum)

@@ -94,7 +94,7 @@ class PosErrorEstimate(Estimate):
         Raises
         ------
         ValueError
-            For another colour.
+            For another color.
         """
         from mlscorr.report import correction_lines
 
@@ -172,8 +172,7 @@ def estimate_pos_error(
             "the POS error. Match some control points, or give what mlscorr.find_ties returns."
         )
     features = ties.features if isinstance(ties, TiedSurvey) else ties
-    trajectory = survey.trajectory.scanned_at(matches.candidates.seconds)
-    scanned = replace(survey, trajectory=trajectory)
+    scanned = matches.as_scanned(survey)
     return PosErrorEstimate(**vars(estimate_together(scanned, control, features, order)))
 
 

@@ -130,11 +130,15 @@ class MatchedTargets(Summary):
         numbers = self.survey.scanner_numbers
         return {number: int(numbers[key[0]]) for key, number in self.candidates.passes.items()}
 
-    @property
-    def scanned_survey(self) -> Survey:
-        """The survey, with a trajectory that knows the seconds in which points lie."""
-        trajectory = self.survey.trajectory.scanned_at(self.candidates.seconds)
-        return replace(self.survey, trajectory=trajectory)
+    def as_scanned(self, survey: Survey) -> Survey:
+        """The survey, with a trajectory that knows the seconds in which points lie.
+
+        Parameters
+        ----------
+        survey : Survey
+        """
+        trajectory = survey.trajectory.scanned_at(self.candidates.seconds)
+        return replace(survey, trajectory=trajectory)
 
     def to_frame(self) -> pandas.DataFrame:
         """A row for each matched observation, misclosures in m; pandas is needed for it."""
@@ -163,7 +167,7 @@ class MatchedTargets(Summary):
         return misclosure_figure(self.control, self.check, self.survey.trajectory)
 
     def to_open3d(self, origin: np.ndarray | None = None) -> Any:
-        """Lines from each observed centre to its surveyed place.
+        """Lines from each observed center to its surveyed place.
 
         Parameters
         ----------
@@ -230,7 +234,7 @@ class FoundTargets(Summary):
     @cached_property
     def observations(self) -> TargetObservations:
         """Centres with covariances, kinds and sizes, a row for each target and pass."""
-        return as_observations(list(self.targets))
+        return as_observations(self.targets)
 
     @property
     def cloud(self) -> PointCloud:
@@ -253,7 +257,7 @@ class FoundTargets(Summary):
         return targets_figure(self.targets)
 
     def to_open3d(self, origin: np.ndarray | None = None, enlarged: float = 100.0) -> Any:
-        """Outlines of the targets, and about each centre the ellipsoid of one sigma.
+        """Outlines of the targets, and about each center the ellipsoid of one sigma.
 
         Parameters
         ----------

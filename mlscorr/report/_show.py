@@ -302,7 +302,7 @@ def _common_origin(layers):
 
 
 def _has_display():
-    """Whether a window can be opened."""
+    """Return True if a window can be opened."""
     return sys.platform in ("win32", "darwin") or any(map(os.environ.get, DISPLAYS))
 
 
@@ -429,7 +429,7 @@ def _thinned(layers, points):
 
 
 def _are_states(first, second):
-    """Whether two clouds are the same points before and after something."""
+    """Return True for two clouds of the same points, before and after something."""
     if first.gps_time is None or second.gps_time is None:
         return False
     return np.array_equal(first.gps_time, second.gps_time)

@@ -19,7 +19,7 @@ ROUND = ("circle", "hole")  # kinds with a circular outline
 def target_lines(
     observations: TargetObservations, origin: np.ndarray | None, enlarged: float
 ) -> Any:
-    """Outlines of targets, and about each centre the ellipsoid of one sigma.
+    """Outlines of targets, and about each center the ellipsoid of one sigma.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def target_lines(
 
 
 def misclosure_lines(control: Matched, check: Matched, origin: np.ndarray | None) -> Any:
-    """Lines from observed centres to surveyed places, control black and check points red.
+    """Lines from observed centers to surveyed places, control black and check points red.
 
     Parameters
     ----------

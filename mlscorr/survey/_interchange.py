@@ -71,7 +71,7 @@ def geometry_pair(
 
 
 def is_las(points: Any) -> bool:
-    """Whether a value is a record of points of laspy, or a file that it has read.
+    """Return True for a record of points of laspy, or a file that it has read.
 
     Parameters
     ----------

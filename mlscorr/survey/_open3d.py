@@ -1,6 +1,6 @@
 """Points and lines as Open3D's tensor geometries, about an origin that travels with them.
 
-Open3D draws in float32, which at map coordinates holds half a metre: positions are therefore about
+Open3D draws in float32, which at map coordinates holds half a meter: positions are therefore about
 an origin near them, in float64, and each point has it as its attribute ``origin``. That attribute
 takes no memory of its own until Open3D makes a new geometry, and survives what Open3D does with
 points: selecting, cropping, appending.
@@ -18,7 +18,7 @@ GREY = (2.0, 98.0)  # percent of the values between black and white: single poin
 
 
 def is_geometry(value: object) -> bool:
-    """Whether a value is a geometry of Open3D, which is not loaded for it."""
+    """Return True for a geometry of Open3D, which is not loaded for it."""
     return type(value).__module__.startswith("open3d") or any(
         kind.__module__.startswith("open3d") for kind in type(value).__mro__
     )
@@ -41,7 +41,7 @@ def cloud_geometry(
     further : mapping
         Arrays (n,) or (n, k).
     origin : (3,) array or None
-        The whole metre below the middle of the points without one. Units: m.
+        A whole meter near the middle of the points without one. Units: m.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def line_geometry(
 
 
 def chosen_origin(xyz: np.ndarray, origin: np.ndarray | None) -> np.ndarray:
-    """The origin (3,) that is asked for, or a whole metre near the middle of points. Units: m.
+    """The origin (3,) that is asked for, or a whole meter near the middle of points. Units: m.
 
     Raises
     ------
@@ -109,7 +109,7 @@ def chosen_origin(xyz: np.ndarray, origin: np.ndarray | None) -> np.ndarray:
 
 
 def geometry_columns(geometry: Any, origin: np.ndarray | None) -> tuple[np.ndarray, dict]:
-    """Positions (n, 3) in the map, and the attributes of a tensor or legacy point cloud.
+    """Positions (n, 3) in the map, and the attributes of a tensor point cloud.
 
     Parameters
     ----------

@@ -100,7 +100,7 @@ class PointCloud(Columns):
         Parameters
         ----------
         origin : (3,) array, optional
-            From which ``positions`` count, float64; a whole metre near the middle by default. The
+            From which ``positions`` count, float64; a whole meter near the middle by default. The
             geometry's attribute ``origin`` has it. Units: m.
 
         Returns

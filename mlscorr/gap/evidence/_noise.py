@@ -312,7 +312,11 @@ def _metric(rows, observations, kind, size):
     residual = observations.columns(rows.residual[:, None])
     calm = _best(observations, residual)
     own = size**2 * kind.variance[observations.row] * observations.half
-    acting, extra = (replace(calm, fixes=size), 0.0) if kind.is_common else (calm, own)
+    acting = calm
+    extra = own
+    if kind.is_common:
+        acting = replace(calm, fixes=size)
+        extra = 0.0
     drawn = observations.whitener(acting, extra).draw(rng, DRAWS)
     other = _best(observations, drawn)
     with_it = model_likelihood(observations, acting, drawn, extra)

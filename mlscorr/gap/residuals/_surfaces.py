@@ -258,7 +258,11 @@ def _pairs(patches):
     early = early[order]
     late = late[order]
     for forward in (True, False):  # the nearest partner in each pass, of both
-        a, b = (early, late) if forward else (late, early)
+        a = early
+        b = late
+        if not forward:
+            a = late
+            b = early
         key = a * (patches.pass_number.max(initial=0) + 1) + patches.pass_number[b]
         nearest = np.sort(np.unique(key, return_index=True)[1])
         early = early[nearest]

@@ -139,19 +139,17 @@ def _write_points(part, file, target):
     outside = 0
     with cloud_writer(target, file.cloud.xyz[0], file.crs) as writer:
         for chunk in file.chunks(SETTINGS.chunk_points):
-            moved = part.correction.apply(chunk)
             if hasattr(part.correction, "increments"):
-                outside += int(np.count_nonzero(~part.correction.increments(*_places(chunk))[1]))
-            levels = np.clip(np.rint(moved.intensity), 0, UNKNOWN).astype(np.uint16)
-            writer.write(replace(moved, intensity=levels, attributes={}))
+                added, inside = part.correction.increments(chunk.xyz, chunk.gps_time)
+                places = chunk.xyz + added
+                outside += int(np.count_nonzero(~inside))
+            else:
+                places = part.correction.apply(chunk).xyz
+            levels = np.clip(np.rint(chunk.intensity), 0, UNKNOWN).astype(np.uint16)
+            writer.write(replace(chunk, xyz=places, intensity=levels, attributes={}))
             if part.watch is not None:
                 part.watch(chunk.gps_time, np.zeros(len(chunk), bool))
     return outside
-
-
-def _places(cloud):
-    """What an increment goes by."""
-    return cloud.xyz, cloud.gps_time
 
 
 def write_parts(parts: Sequence[CorrectedPart], target: str | Path) -> list[int]:
