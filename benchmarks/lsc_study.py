@@ -144,7 +144,7 @@ def tuned(seeds):
                 drift_time=time * chosen.drift_time,
                 bias_time=time * chosen.bias_time,
             )
-            pose, _ = predict_under(found.equations, tried, epochs)
+            pose, _ = predict_under(found.adjustment, tried, epochs)
             left.append(rms(error[epochs] - pose[:, :3]))
         alone = rms(survey.position_left(found.correction)[epochs])
         rows.append((name, alone, min(left), *left))

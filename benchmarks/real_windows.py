@@ -9,7 +9,7 @@ from scipy.optimize import minimize
 from mlscorr.estimate import (
     SignalParameters,
     estimate_correction,
-    position_equations,
+    position_adjustment,
     position_prior,
 )
 from mlscorr.estimate._prediction import predict_under
@@ -137,7 +137,7 @@ def _stationary(trajectory, matched):
     """Position error (n, 3) by one exponential covariance of constant sigma, as in the paper, with
     scale and correlation time by restricted likelihood."""
     constant = replace(trajectory, position_sigma=np.full((len(trajectory), 3), 0.3))
-    equations = position_equations(constant, matched, Pos(), 1, position_prior)
+    adjustment = position_adjustment(constant, matched, Pos(), 1, position_prior)
 
     def parameters(x):
         scale, time = np.exp(x)
@@ -145,7 +145,7 @@ def _stationary(trajectory, matched):
         return SignalParameters("exponential", scale, time, *[1.0] * 6, time, any_size)
 
     def negative(x):
-        return -equations.solve(parameters(x)).log_likelihood
+        return -adjustment.solve(parameters(x)).log_likelihood
 
     best = minimize(negative, [0.0, np.log(60.0)], method="Nelder-Mead").x
-    return predict_under(equations, parameters(best))[0][:, :3]
+    return predict_under(adjustment, parameters(best))[0][:, :3]

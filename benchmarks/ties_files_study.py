@@ -27,7 +27,7 @@ from scipy.spatial.transform import Rotation
 
 import mlscorr
 from mlscorr.estimate import believed_correction, estimate_correction
-from mlscorr.estimate._tie_equations import TieEquations
+from mlscorr.estimate._tied_adjustment import TieEquations
 from mlscorr.io.clouds import read_chunks
 from mlscorr.pipeline.finding import find_control
 from mlscorr.simulate import read_scenario, simulate
@@ -122,7 +122,7 @@ def measure(true, estimate):
         return rms(left), float(within), np.nan, np.nan
     there, back = _meetings(true, corrected.gps_time)
     apart = left[there] - left[back]
-    if estimate.equations.ties is None:
+    if estimate.adjustment.ties is None:
         return rms(left), float(within), rms(apart), np.nan
     rows = np.unique(np.linspace(0, len(there) - 1, PLACES).round().astype(int))
     sigma = _sigma_apart(estimate, there[rows], back[rows])
@@ -147,9 +147,9 @@ def _sigma_apart(estimate, there, back):
 
     By the most probable parameters, as that of ties which nobody saw.
     """
-    equations = estimate.equations
-    trajectory = equations.trajectory
-    ties = equations.ties
+    adjustment = estimate.adjustment
+    trajectory = adjustment.trajectory
+    ties = adjustment.ties
     number = 3 * len(there)
     rows = np.repeat(np.column_stack([there, back]), 3, axis=0)
     probes = Ties(
@@ -163,7 +163,7 @@ def _sigma_apart(estimate, there, back):
         scanner=np.zeros((number, 2), int),
         feature=np.arange(2 * number).reshape(-1, 2),
     )
-    probes = TieEquations.of(trajectory, equations.pos, probes, ties.stated)
+    probes = TieEquations.of(trajectory, adjustment.pos, probes, ties.stated)
     if ties.mounting is not None:  # which moves no pose
         probes = replace(probes, mounting=np.zeros((number, ties.mounting.shape[1])))
 
@@ -178,7 +178,7 @@ def _sigma_apart(estimate, there, back):
     )
     names = ["gps_time", "misclosure", "variance", "partials", "weight"]
     names += [] if ties.mounting is None else ["mounting"]
-    asked = replace(equations, ties=replace(ties, stated=stated, **joined(ties, probes, *names)))
+    asked = replace(adjustment, ties=replace(ties, stated=stated, **joined(ties, probes, *names)))
     solved = asked.solve(estimate.parameters)
     _, covariance = solved.leave_out(len(solved.misclosure) - number + np.arange(number))
     return np.sqrt(np.maximum(np.diag(covariance) - PROBE**2, 0.0)).reshape(-1, 3)

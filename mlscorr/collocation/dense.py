@@ -32,7 +32,7 @@ def collocate_rows_dense(
     Parameters
     ----------
     rows : sequence of SparseRows
-    believed : (k, p) array, optional
+    believed : (k, p + 1) array, optional
         Of the trend, as of a Collocation.
 
     Raises
@@ -83,7 +83,7 @@ def covariance_given(
     ----------
     observations, sought : sequences of SparseRows
         Of the same signals and trend.
-    believed : (k, p) array, optional
+    believed : (k, p + 1) array, optional
         Of the trend, as of a Collocation.
 
     Raises
@@ -170,7 +170,7 @@ def likelihood_changes(
 
 def _variance(believed):
     """Of each coefficient (p,); zero where nothing is believed, so that it is always the same."""
-    precision = np.sum(believed**2, axis=0)
+    precision = np.sum(believed[:, :-1] ** 2, axis=0)
     return np.divide(1.0, precision, out=np.zeros_like(precision), where=precision > 0)
 
 

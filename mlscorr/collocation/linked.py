@@ -44,7 +44,7 @@ from mlscorr.collocation.sparse_rows import (
 LARGEST_SHARE = 0.3  # of a signal's sigma; for larger ones Q_11 is no power of the step any more
 
 
-def collocate_rows(
+def collocate_by_knots(
     rows: Sequence[SparseRows],
     like: InformationSolver | None = None,
     tolerance: float = 0.0,
@@ -53,11 +53,8 @@ def collocate_rows(
     r"""Separate the misclosures of sparse rows into trend, signal and noise.
 
     Solves l = A x + B s + n as ``collocate`` does, to 1e-5 m and 1 % of sigma where signals have a
-    sigma of some metres. This one is for rows that see the signals at two epochs (ties) and for
-    targets seen in more than one pass, dozens of them or thousands: work and memory grow with rows
-    and knots, and an error that passes share costs no more than a knot. For rows of one epoch each
-    that share nothing ``collocate`` is exact to 1e-9, and five times as fast. Observations in the
-    order of time are solved twice as fast as others.
+    sigma of some metres. Work and memory grow with rows and knots, and an error that passes share
+    costs no more than a knot. Observations in the order of time are solved twice as fast as others.
 
     Parameters
     ----------
@@ -69,7 +66,7 @@ def collocate_rows(
     tolerance : float
         What knots may leave over what the observations of an interval between two of them leave
         open together: fewer knots, where those for all digits would only cost time.
-    believed : (k, p) array, optional
+    believed : (k, p + 1) array, optional
         Of the trend, as of a Collocation.
 
     Returns
@@ -86,14 +83,15 @@ def collocate_rows(
     --------
     A step of 0.3 m that a tie sees between two passes, of which the first is held to 1 mm:
 
-    >>> from mlscorr.collocation import Noise, Signal, SparseRows, collocate_rows
+    >>> from mlscorr.collocation import Noise, Signal, SparseRows, collocate_by_knots
     >>> from mlscorr.collocation.covariance import Covariance
     >>> drift, none = Covariance("matern32", 30.0), np.zeros((1, 1, 0))
     >>> noise, unit = Noise(np.full((1, 1, 1), 1e-6)), np.ones((1, 1, 1))
     >>> held = SparseRows(np.array([[0.0]]), np.zeros((1, 1)), noise, none, [Signal(unit, drift)])
     >>> sides = Signal(np.array([-1.0, 1.0])[:, None, None], drift)
     >>> tie = SparseRows(np.array([[0.0, 900.0]]), np.full((1, 1), 0.3), noise, none, [sides])
-    >>> mean, covariance = collocate_rows([held, tie]).predict(np.array([900.0]), none, [unit])
+    >>> solved = collocate_by_knots([held, tie])
+    >>> mean, covariance = solved.predict(np.array([900.0]), none, [unit])
     >>> mean.round(4), np.sqrt(covariance).round(4)
     (array([[0.3]]), array([[[0.0014]]]))
     """
@@ -109,7 +107,7 @@ def reweight(solved: Collocation, weights: Sequence[np.ndarray]) -> Collocation:
     Parameters
     ----------
     solved : Collocation
-        By ``collocate_rows``.
+        By ``collocate_by_knots``.
     weights : sequence of (n,) arrays
         Of the observations of each SparseRows, positive; one for the noise they have.
 
@@ -154,7 +152,7 @@ def leave_each_out(solved: Collocation) -> list[LeftOut]:
     Parameters
     ----------
     solved : Collocation
-        By ``collocate_rows``.
+        By ``collocate_by_knots``.
     """
     solver = solved.solver
     projected = solver.by_rows(solved.projected)
@@ -196,7 +194,7 @@ class InformationSolver:
     def of(
         cls, rows: Sequence[SparseRows], like: InformationSolver | None, tolerance: float = 0.0
     ) -> InformationSolver:
-        """The solver of rows; see ``collocate_rows``."""
+        """The solver of rows; see ``collocate_by_knots``."""
         signals = rows[0].signals
         layout = Layout.of(signals)
         if like is None:

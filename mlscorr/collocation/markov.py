@@ -33,6 +33,7 @@ def collocate(
     design: np.ndarray,
     signals: Sequence[Signal],
     believed: np.ndarray | None = None,
+    second_views: np.ndarray | None = None,
 ) -> Collocation:
     r"""Separate misclosures into trend, signal and noise.
 
@@ -42,8 +43,8 @@ def collocate(
     Work and memory grow with epochs times the square of the states (the processes' 1, 2 or 3
     each). What the passes of a target share costs r columns for each target seen more than once,
     filtered along with the misclosures, and a dense factor of all these columns: fit for dozens
-    of such targets, 8 n c (r + 3 d) bytes with c columns and d states. For more of them, and for
-    rows that see two epochs, ``collocate_rows`` is there.
+    of such targets, 8 n c (r + 3 d) bytes with c columns and d states. For rows that see two
+    epochs ``collocate_rows`` is there.
 
     Parameters
     ----------
@@ -56,8 +57,10 @@ def collocate(
     design : (n, r, p) array
         A. May have no column.
     signals : sequence of Signal
-    believed : (k, p) array, optional
+    believed : (k, p + 1) array, optional
         Of the trend, as of a Collocation.
+    second_views : (h, r) array, optional
+        Sigmas of the places that the last h epochs share with others, see ``collocate_rows``.
 
     Raises
     ------
@@ -93,9 +96,14 @@ def collocate(
     filtered = filter_covariance(layout, layout.size, _steps(clocks), mixing, own)
     if np.isnan(filtered[2]).any():
         raise np.linalg.LinAlgError(NOT_POSITIVE.format(n * r))
-    solver = MarkovSolver(order, gps_time, clocks, layout, mixing, *filtered, noise.common)
-    design = design.reshape(n * r, design.shape[2])
-    return solve_trend(solver, np.reshape(misclosure, -1), design, believed)
+    if second_views is None:
+        second_views = np.zeros((0, r))
+    solver = MarkovSolver(
+        order, gps_time, clocks, layout, mixing, *filtered, noise.common, second_views
+    )
+    observed = n * r - second_views.size
+    design = design.reshape(n * r, design.shape[2])[:observed]
+    return solve_trend(solver, np.reshape(misclosure, -1)[:observed], design, believed)
 
 
 def check_finite(gps_time: np.ndarray, *arrays: np.ndarray) -> None:
@@ -146,6 +154,9 @@ class MarkovSolver:
         As of filter_covariance.
     shared : (n r, c) array
         U, in the caller's order.
+    second_views : (h, r) array
+        Of the last h epochs in the caller's order, as of ``collocate_rows``: their rows are no
+        observations of their own, and hidden from whoever asks.
     """
 
     order: np.ndarray
@@ -158,9 +169,11 @@ class MarkovSolver:
     whiteners: np.ndarray
     covariances: np.ndarray
     shared: np.ndarray
+    second_views: np.ndarray
 
     def whiten(self, columns: np.ndarray) -> np.ndarray:
         """Columns of which W^T W = c^T V^-1 c, in the order of time."""
+        columns = self._padded(columns)
         whitened = self._filter(columns)[0].reshape(columns.shape)
         if not self.shared.size:
             return whitened
@@ -174,11 +187,12 @@ class MarkovSolver:
         total = -2 * np.log(np.einsum("nii->ni", self.whiteners)).sum()
         if self.shared.size:
             total += 2 * np.log(np.abs(np.diag(self._woodbury[1]))).sum()
-        return total
+        return total - 2 * np.log(self.second_views).sum()  # of the places, which nobody asked for
 
     def solve(self, columns: np.ndarray) -> np.ndarray:
         """V^-1 c."""
-        return self._smooth(self._without_shared(columns))[0]
+        solved = self._smooth(self._without_shared(self._padded(columns)))[0]
+        return solved[: len(columns)]
 
     def precision(self, rows: np.ndarray) -> np.ndarray:
         """A block of V^-1."""
@@ -213,11 +227,15 @@ class MarkovSolver:
         trend, trend_root : (p,), (p, p) array
             The root is None where only means are asked for.
         """
-        nodes = self._smooth(self._without_shared(columns))[1]
+        nodes = self._smooth(self._without_shared(self._padded(columns)))[1]
         table = (self.gps_time, self.clocks, self.layout, nodes, *self._node_covariances)
         return predictor_by(
             lambda epochs: interpolate(*table, epochs), self.layout, trend, trend_root
         )
+
+    def _padded(self, columns):
+        """Columns with zeros in the rows of second views."""
+        return np.vstack([columns, np.zeros((self.second_views.size, columns.shape[1]))])
 
     @cached_property
     def _position(self):

@@ -130,7 +130,7 @@ class Noise:
         sigma = np.where(members[:, :, None], self.shared[self.repeated], 0.0)
         return np.einsum("ngk,jk->njgk", sigma, np.eye(r)).reshape(n * r, members.shape[1] * r)
 
-    @property
+    @cached_property
     def repeated(self) -> np.ndarray:
         """Groups that have several epochs and an error to share."""
         if self.group is None:
@@ -211,9 +211,9 @@ class Collocation:
     sigma0 : float
         Square root of the weighted residual sum of squares over the redundancy, m - p and what is
         believed of the trend; one if the model is right.
-    believed : (k, p) array
-        What is believed of the trend, as further rows of A, a coefficient each: its misclosure is
-        zero, with a sigma of one.
+    believed : (k, p + 1) array
+        What is believed of the trend: further rows of A, a coefficient each, and their misclosures,
+        all with a sigma of one.
     """
 
     solver: Any
@@ -283,7 +283,7 @@ class Collocation:
     @cached_property
     def _leverage(self):
         """Orthonormal basis (m + k, p) of the columns of A and of what is believed of the trend."""
-        return np.linalg.qr(np.vstack([self.design, self.believed]))[0]
+        return np.linalg.qr(np.vstack([self.design, self.believed[:, :-1]]))[0]
 
     @cached_property
     def projected(self) -> np.ndarray:
@@ -348,7 +348,7 @@ def solve_trend(
         ``solve(columns)``, V^-1 c; ``precision(rows)``, a block of V^-1; ``predictor(columns,
         trend, root)``, of means alone where the root is None.
     misclosure, design : (m,), (m, p) array
-    believed : (k, p) array, optional
+    believed : (k, p + 1) array, optional
         As of a Collocation.
 
     Raises
@@ -357,9 +357,9 @@ def solve_trend(
         Where the rank of A is less than its columns.
     """
     p = design.shape[1]
-    believed = np.zeros((0, p)) if believed is None else believed
-    whitened = solver.whiten(np.column_stack([design, misclosure]))
-    whitened = np.vstack([whitened, np.column_stack([believed, np.zeros(len(believed))])])
+    if believed is None:
+        believed = np.zeros((0, p + 1))
+    whitened = np.vstack([solver.whiten(np.column_stack([design, misclosure])), believed])
     basis, triangle = np.linalg.qr(whitened[:, :p])
     values = np.linalg.svd(triangle, compute_uv=False)
     smallest = len(whitened) * np.finfo(float).eps  # of a rank, as numpy's matrix_rank has it
@@ -374,7 +374,7 @@ def solve_trend(
     residual = whitened[:, p] - whitened[:, :p] @ trend
     squares = float(residual @ residual)
     determinants = solver.log_determinant + 2 * np.log(np.abs(np.diag(triangle))).sum()
-    determinants -= 2 * np.log(believed.sum(axis=1)).sum()
+    determinants -= 2 * np.log(believed[:, :p].sum(axis=1)).sum()
     log_likelihood = -0.5 * (squares + determinants + redundancy * np.log(2 * np.pi))
     sigma0 = np.nan
     if redundancy:

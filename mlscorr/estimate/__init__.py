@@ -21,6 +21,7 @@ from mlscorr.estimate.added_unknowns import (
     scanner_warnings,
     with_scanner_errors,
 )
+from mlscorr.estimate.adjustment import Adjustment, position_adjustment, with_reacquisitions
 from mlscorr.estimate.calibration import (
     MOUNTING_COMPONENTS,
     SCANNER_COMPONENTS,
@@ -29,7 +30,7 @@ from mlscorr.estimate.calibration import (
     mounted_corrections,
     sigma_note,
 )
-from mlscorr.estimate.equations import Equations, position_equations, with_mountings
+from mlscorr.estimate.factors import KINDS, TARGET, TIE, Factor, target_factor, tie_factor
 from mlscorr.estimate.guards import COMPONENTS, few_targets, guards_of
 from mlscorr.estimate.inputs import check_order, checked_inputs, filled_sigmas
 from mlscorr.estimate.mounting import (
@@ -51,7 +52,6 @@ from mlscorr.estimate.pos_error import (
 )
 from mlscorr.estimate.posterior import Objective, position_prior
 from mlscorr.estimate.settings import SETTINGS
-from mlscorr.estimate.signals import SignalParameters
 from mlscorr.estimate.support import (
     DRIFT,
     HELD,

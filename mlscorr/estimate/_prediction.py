@@ -7,11 +7,10 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 from mlscorr.collocation import Collocation
-from mlscorr.estimate.equations import Equations
+from mlscorr.estimate.adjustment import Adjustment
 from mlscorr.estimate.posterior import Posterior
 from mlscorr.estimate.settings import SETTINGS
-from mlscorr.estimate.signals import SignalParameters, pose_signals
-from mlscorr.pos import Steps
+from mlscorr.pos import SignalParameters, Steps
 from mlscorr.survey import Trajectory
 
 
@@ -23,14 +22,14 @@ class GridPredictions:
 
     Parameters
     ----------
-    equations : Equations
+    adjustment : Adjustment
     poses : dict
     mode : SignalParameters, optional
         Whose Collocation is kept once it is added, until it is taken.
     kept : dict
     """
 
-    equations: Equations
+    adjustment: Adjustment
     poses: dict[SignalParameters, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
     mode: SignalParameters | None = None
     kept: dict[SignalParameters, Collocation] = field(default_factory=dict)
@@ -41,13 +40,13 @@ class GridPredictions:
 
         Regular in time: sessions may differ in rate.
         """
-        trajectory = self.equations.trajectory
-        n = len(self.equations.trajectory)
-        history = self.equations.stated.history
+        trajectory = self.adjustment.trajectory
+        n = len(self.adjustment.trajectory)
+        history = self.adjustment.errors.history
         starts = history.edges[1:-1]
         steps = np.concatenate([history.steps.before, history.steps.after, starts])
         edges = np.searchsorted(trajectory.gps_time, [*trajectory.gaps.ravel(), *steps])
-        control = np.searchsorted(trajectory.gps_time, self.equations.observed)
+        control = np.searchsorted(trajectory.gps_time, self.adjustment.observed)
         time = trajectory.gps_time
         begins = np.isin(trajectory.gps_time, trajectory.gaps[:, 1])
         passed = np.cumsum(np.where(begins, 0.0, np.diff(time, prepend=time[0])))
@@ -63,7 +62,7 @@ class GridPredictions:
         parameters : SignalParameters
         solved : Collocation
         """
-        pose, spread = solved.predict(*pose_rows(self.equations, parameters, self.rows))
+        pose, spread = solved.predict(*pose_rows(self.adjustment, parameters, self.rows))
         self.poses[parameters] = pose, np.einsum("qii->qi", spread)
         if parameters == self.mode:
             self.kept[parameters] = solved
@@ -75,7 +74,7 @@ class GridPredictions:
         ----------
         parameters : SignalParameters
         """
-        return self.kept.pop(parameters, None) or self.equations.solve(parameters)
+        return self.kept.pop(parameters, None) or self.adjustment.solve(parameters)
 
     def under(self, parameters: SignalParameters) -> tuple[np.ndarray, np.ndarray]:
         """The POS errors and variances under parameters.
@@ -85,12 +84,12 @@ class GridPredictions:
         parameters : SignalParameters
         """
         if parameters not in self.poses:
-            self.add(parameters, self.equations.solve(parameters))
+            self.add(parameters, self.adjustment.solve(parameters))
         return self.poses[parameters]
 
 
 def predict_pose_error(
-    equations: Equations,
+    adjustment: Adjustment,
     posterior: Posterior,
     predictions: GridPredictions | None = None,
     solved: Collocation | None = None,
@@ -104,19 +103,19 @@ def predict_pose_error(
 
     Parameters
     ----------
-    equations : Equations
+    adjustment : Adjustment
     posterior : Posterior
     predictions : GridPredictions, optional
         By these equations, where some are known.
     solved : Collocation, optional
         Of these equations under the most probable parameters, where somebody holds it.
     """
-    trajectory = equations.trajectory
+    trajectory = adjustment.trajectory
     mode = posterior.modes[0][0]
-    solved = solved or equations.solve(mode)
-    pose, covariance = solved.predict(*pose_rows(equations, mode))
+    solved = solved or adjustment.solve(mode)
+    pose, covariance = solved.predict(*pose_rows(adjustment, mode))
     sigma = np.sqrt(np.maximum(np.einsum("qii->qi", covariance), 0.0))
-    predictions = predictions or GridPredictions(equations)
+    predictions = predictions or GridPredictions(adjustment)
     rows = predictions.rows
     mean = 0.0
     square = 0.0
@@ -133,7 +132,7 @@ def predict_pose_error(
     pose += sigma * _interpolated(trajectory.gps_time, rows, moved)
     wider = _interpolated(trajectory.gps_time, rows, wider)
     covariance *= wider[:, :, None] * wider[:, None, :]
-    return bridge_steps(trajectory, equations.stated.history.steps, pose, covariance)
+    return bridge_steps(trajectory, adjustment.errors.history.steps, pose, covariance)
 
 
 def bridge_steps(
@@ -183,32 +182,31 @@ def _interpolated(gps_time, rows, values):
 
 
 def predict_under(
-    equations: Equations, parameters: SignalParameters, rows: slice | np.ndarray = slice(None)
+    adjustment: Adjustment, parameters: SignalParameters, rows: slice | np.ndarray = slice(None)
 ) -> tuple[np.ndarray, np.ndarray]:
     """Pose error (k, 6) and covariance (k, 6, 6) at some epochs under given parameters.
 
     Parameters
     ----------
-    equations : Equations
+    adjustment : Adjustment
     parameters : SignalParameters
     rows : slice or (k,) int array
         Of the trajectory's epochs; all by default.
     """
-    return equations.solve(parameters).predict(*pose_rows(equations, parameters, rows))
+    return adjustment.solve(parameters).predict(*pose_rows(adjustment, parameters, rows))
 
 
 def pose_rows(
-    equations: Equations, parameters: SignalParameters, rows: slice | np.ndarray = slice(None)
+    adjustment: Adjustment, parameters: SignalParameters, rows: slice | np.ndarray = slice(None)
 ) -> tuple:
     """What a Collocation is asked for the pose at some epochs: times, design, mixings, clocks.
 
     Parameters
     ----------
-    equations, parameters, rows
+    adjustment, parameters, rows
         As of predict_under.
     """
-    gps_time = equations.trajectory.gps_time[rows]
-    partials = np.broadcast_to(np.eye(6), (len(gps_time), 6, 6))
-    signals = pose_signals(equations.stated_epochs.at(rows), parameters, partials)
+    gps_time = adjustment.trajectory.gps_time[rows]
+    signals = adjustment.errors.pose_signals(parameters, rows)
     mixings = [signal.mixing for signal in signals]
-    return gps_time, equations.pose_design(gps_time), mixings, [s.clock for s in signals]
+    return gps_time, adjustment.pose_design(gps_time), mixings, [s.clock for s in signals]

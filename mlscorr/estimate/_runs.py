@@ -16,14 +16,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mlscorr.estimate.equations import Equations
+from mlscorr.estimate.adjustment import Adjustment
 from mlscorr.estimate.posterior import choose_parameters
 from mlscorr.estimate.settings import SETTINGS
-from mlscorr.estimate.signals import SignalParameters
 from mlscorr.estimate.target_tests import Screening, TargetTest, all_tests, gross_evidence
 from mlscorr.matching import log_share
 from mlscorr.pos import SETTINGS as POS_SETTINGS
-from mlscorr.pos import runs
+from mlscorr.pos import SignalParameters, runs
 from mlscorr.survey import Statement, Trajectory
 
 
@@ -69,29 +68,29 @@ class DriftWindow:
         return Statement("unstated drift", "warning", values)
 
 
-def find_windows(equations: Equations, screening: Screening) -> tuple[DriftWindow, ...]:
+def find_windows(adjustment: Adjustment, screening: Screening) -> tuple[DriftWindow, ...]:
     """Stretches in which neighbours in time were rejected and deviate the same way.
 
     Parameters
     ----------
-    equations : Equations
+    adjustment : Adjustment
         Of all targets.
     screening : Screening
         Of these equations.
     """
     rejected = {test.name: test for test in screening.outliers}
-    order = np.argsort(equations.observed, kind="stable")
-    names = equations.names[order]
-    times = equations.observed[order]
+    order = np.argsort(adjustment.observed, kind="stable")
+    names = adjustment.names[order]
+    times = adjustment.observed[order]
     is_out = np.isin(names, list(rejected))
-    passes = np.flatnonzero(np.diff(equations.trajectory.segment(times))) + 1
+    passes = np.flatnonzero(np.diff(adjustment.trajectory.segment(times))) + 1
     windows = []
     for start, end in runs(is_out, passes):
         rows = order[start:end]
         run = dict.fromkeys(names[start:end].tolist())
-        deviations = [_Deviation.of(equations, rejected[name], rows) for name in run]
+        deviations = [_Deviation.of(adjustment, rejected[name], rows) for name in run]
         if _is_drift(deviations):
-            windows.append(_window(equations.trajectory, times, start, end, deviations))
+            windows.append(_window(adjustment.trajectory, times, start, end, deviations))
     return tuple(w for w in windows if w.first < w.last)  # others passed there at the same time
 
 
@@ -104,8 +103,8 @@ class _Deviation(NamedTuple):
     beyond: np.ndarray
 
     @classmethod
-    def of(cls, equations, test: TargetTest, rows):
-        inside = np.isin(np.flatnonzero(equations.names == test.name), rows)
+    def of(cls, adjustment, test: TargetTest, rows):
+        inside = np.isin(np.flatnonzero(adjustment.names == test.name), rows)
         return cls(test.name, test.left_out[inside], test.sigma[inside], test.left_out[~inside])
 
 
@@ -158,15 +157,15 @@ def with_windows(trajectory: Trajectory, windows: tuple[DriftWindow, ...]) -> Tr
 
 
 def weighed_refusals(
-    equations: Equations, plain: Equations, screening: Screening, windows: int
+    adjustment: Adjustment, plain: Adjustment, screening: Screening, windows: int
 ) -> Screening:
     """A Screening that refuses no more targets than are likely to be wrong.
 
     Parameters
     ----------
-    equations : Equations
+    adjustment : Adjustment
         Of all targets.
-    plain : Equations
+    plain : Adjustment
         The same before anything was raised in windows.
     screening : Screening
         Of the former.
@@ -175,12 +174,12 @@ def weighed_refusals(
     """
     rejected = screening.outliers
     refused = {test.name for test in rejected}
-    names = [name for name in equations.target_rows if name in refused]
-    odds = drift_odds(equations, names, screening.posterior.modes[0][0], windows)
+    names = [name for name in adjustment.target_rows if name in refused]
+    odds = drift_odds(adjustment, names, screening.posterior.modes[0][0], windows)
     if not names or odds <= 0.0:
         return screening
     size = max(np.linalg.norm(test.left_out, axis=1).max() for test in rejected)
-    values = {"names": tuple(names), "targets": len(equations.target_rows), "size": float(size)}
+    values = {"names": tuple(names), "targets": len(adjustment.target_rows), "size": float(size)}
     if odds < np.log(SETTINGS.strong_evidence):
         doubt = Statement("wrong or drift", "warning", values | {"odds": float(np.exp(odds))})
         return replace(screening, warnings=(*screening.warnings, doubt))
@@ -190,7 +189,7 @@ def weighed_refusals(
 
 
 def drift_odds(
-    equations: Equations, names: Collection[str], parameters: SignalParameters, windows: int
+    adjustment: Adjustment, names: Collection[str], parameters: SignalParameters, windows: int
 ) -> float:
     """Log odds of drift beside each of some targets against a gross error of each.
 
@@ -199,7 +198,7 @@ def drift_odds(
 
     Parameters
     ----------
-    equations : Equations
+    adjustment : Adjustment
         Of all targets.
     names : collection of str
         Of those that were refused.
@@ -211,7 +210,7 @@ def drift_odds(
     odds = 0.0
     drifts = windows
     for name in names:
-        others = equations.without(set(names) - {name})
+        others = adjustment.without(set(names) - {name})
         solved = others.solve(parameters)
         passes = np.flatnonzero(others.names == name).tolist()
         misread = gross_evidence(solved, {name: others.target_rows[name]})[name]
@@ -220,9 +219,9 @@ def drift_odds(
         odds += sum(drift) - max(misread, sum(mistaken))
         drifts += len(drift)
     if windows:  # with none the POS may as well never drift so
-        odds -= log_share(windows, len(equations.names), 0.5)
-    odds += log_share(drifts, len(equations.names), 0.5)
-    return odds - log_share(len(names), len(equations.target_rows), SETTINGS.gross_share)
+        odds -= log_share(windows, len(adjustment.names), 0.5)
+    odds += log_share(drifts, len(adjustment.names), 0.5)
+    return odds - log_share(len(names), len(adjustment.target_rows), SETTINGS.gross_share)
 
 
 def _positive(solved, rows_of):
@@ -230,9 +229,9 @@ def _positive(solved, rows_of):
     return [gain for gain in gross_evidence(solved, rows_of).values() if gain > 0.0]
 
 
-def _beside(equations, number):
+def _beside(adjustment, number):
     """Numbers of all observations within a second of one."""
-    times = equations.observed
+    times = adjustment.observed
     return np.flatnonzero(np.abs(times - times[number]) <= POS_SETTINGS.sigma_interval)
 
 

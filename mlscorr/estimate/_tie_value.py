@@ -8,6 +8,7 @@ from threadpoolctl import threadpool_limits
 
 from mlscorr.collocation import leave_each_out
 from mlscorr.estimate._prediction import pose_rows
+from mlscorr.estimate.factors import TARGET, TIE
 from mlscorr.estimate.pos_error import Estimate
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.survey import TIE_KINDS
@@ -40,39 +41,40 @@ def tie_value(estimate: Estimate) -> TieValue:
     estimate : Estimate
         With ties.
     """
-    equations = estimate.equations
+    adjustment = estimate.adjustment
     residuals = estimate.ties
-    if equations.ties is None or residuals is None:
+    if adjustment.ties is None or residuals is None:
         return TieValue({"control": 1.0}, None)
-    solved = equations.solve(estimate.parameters)
-    control, ties = leave_each_out(solved)
-    absorbed = (1.0 - ties.redundancy).ravel()
+    solved = adjustment.solve(estimate.parameters)
+    kinds = [factor.kind for factor in adjustment.observing]
+    left_out = dict(zip(kinds, leave_each_out(solved), strict=True))
+    absorbed = (1.0 - left_out[TIE].redundancy).ravel()
     kind = residuals.ties.kind[residuals.used]
     parts = {name: float(absorbed[kind == name].sum()) for name in TIE_KINDS}
-    parts = {"control": float((1.0 - control.redundancy[: len(equations.names)]).sum()), **parts}
+    parts = {"control": float((1.0 - left_out[TARGET].redundancy).sum()), **parts}
     total = sum(parts.values())
     share = {name: part / total for name, part in parts.items()}
-    return TieValue(share, _sufficient(equations, estimate.parameters, solved))
+    return TieValue(share, _sufficient(adjustment, estimate.parameters, solved))
 
 
-def _sufficient(equations, parameters, solved):
+def _sufficient(adjustment, parameters, solved):
     """The least number of evenly chosen control points that reach the sigma of all, about."""
-    names = list(equations.target_rows)
+    names = list(adjustment.target_rows)
     if len(names) < 2:
         return len(names) or None
-    limit = SETTINGS.sufficient_ratio * _median_sigma(equations, parameters, solved)
+    limit = SETTINGS.sufficient_ratio * _median_sigma(adjustment, parameters, solved)
 
     def suffices(number):
         chosen = {names[i] for i in np.linspace(0, len(names) - 1, number).round().astype(int)}
-        part = equations.without([name for name in names if name not in chosen])
+        part = adjustment.without([name for name in names if name not in chosen])
         return _median_sigma(part, parameters, part.solve(parameters)) <= limit
 
     return 1 + bisect_left(range(1, len(names)), True, key=suffices)
 
 
-def _median_sigma(equations, parameters, solved):
+def _median_sigma(adjustment, parameters, solved):
     """Median 3D sigma of the corrected position along the drive. Units: m."""
-    last = len(equations.trajectory) - 1
+    last = len(adjustment.trajectory) - 1
     rows = np.unique(np.linspace(0, last, SETTINGS.prediction_epochs).round().astype(int))
-    covariance = solved.predict(*pose_rows(equations, parameters, rows))[1]
+    covariance = solved.predict(*pose_rows(adjustment, parameters, rows))[1]
     return float(np.median(np.sqrt(np.einsum("qii->q", covariance[:, :3, :3]))))

@@ -23,26 +23,24 @@ from threadpoolctl import threadpool_limits
 
 from mlscorr.correction import Correction
 from mlscorr.estimate._prediction import predict_pose_error
-from mlscorr.estimate._tie_equations import along_ties, mounting_columns
+from mlscorr.estimate.adjustment import Adjustment
 from mlscorr.estimate.calibration import (
     MOUNTING_COMPONENTS,
-    SCANNER_COMPONENTS,
     Calibration,
     MountingEstimate,
     ScannerErrors,
     combined_correction,
 )
-from mlscorr.estimate.equations import Equations
+from mlscorr.estimate.factors import TARGET, TIE, along_ties, mounting_columns, target_columns
 from mlscorr.estimate.mounting import is_determined, prior_sigma, with_shift
 from mlscorr.estimate.pos_error import Estimate
 from mlscorr.estimate.settings import SETTINGS
-from mlscorr.estimate.signals import SignalParameters
 from mlscorr.frames import (
     georeferenced_anew,
-    mounting_partials,
     partials_by_scanner,
     scanner_partials,
 )
+from mlscorr.pos import SignalParameters
 from mlscorr.survey import Matched, Mounting, Statement
 
 
@@ -72,7 +70,7 @@ class AddedUnknowns:
     @classmethod
     def of(
         cls,
-        equations: Equations,
+        adjustment: Adjustment,
         parameters: SignalParameters,
         columns: np.ndarray,
         prior_sigma: np.ndarray,
@@ -81,15 +79,14 @@ class AddedUnknowns:
 
         Parameters
         ----------
-        equations : Equations
-            Of n + h epochs and m ties, or none.
+        adjustment : Adjustment
         parameters : SignalParameters
-        columns : (3 (n + h) + m, k) array
+        columns : (m, k) array
             Partial derivatives of the misclosures by the unknowns.
         prior_sigma : (k,) array
             One sigma of what is known of them without the survey.
         """
-        solved = equations.solve(parameters)
+        solved = adjustment.solve(parameters)
         white = solved.solver.whiten(np.column_stack([solved.design, columns]))
         trend, added = np.split(white, [solved.design.shape[1]], axis=1)
         response = solved.trend_covariance @ trend.T @ added  # Eq. 13 of each column
@@ -119,23 +116,6 @@ class AddedUnknowns:
         return is_large & (self.statistic > self.critical)
 
 
-def with_added(equations: Equations, added: np.ndarray) -> Equations:
-    """The same equations with something added to their misclosures.
-
-    Parameters
-    ----------
-    equations : Equations
-    added : (3 (n + h) + m,) array
-        To those of epochs, then of ties. Units: m.
-    """
-    epochs, of_ties = np.split(added, [equations.misclosure.size])
-    ties = equations.ties
-    if ties is not None:
-        ties = replace(ties, misclosure=ties.misclosure + of_ties)
-    misclosure = equations.misclosure + epochs.reshape(-1, 3)
-    return replace(equations, misclosure=misclosure, ties=ties)
-
-
 @threadpool_limits.wrap(limits=1, user_api="blas")
 def with_scanner_errors(calibration: Calibration, matched: Matched) -> Calibration:
     """The calibration with what ranges and encoder lack, and free of it where that is significant.
@@ -148,11 +128,11 @@ def with_scanner_errors(calibration: Calibration, matched: Matched) -> Calibrati
         Its control points, as georeferenced with the recorded mounting.
     """
     columns = _columns(calibration, matched[calibration.used])
-    equations = calibration.equations
+    adjustment = calibration.adjustment
     parameters = calibration.parameters[0][0]
     known = SETTINGS.unmeasured_scanner, SETTINGS.least_scanner_error
     prior, least = (np.tile(sigma, len(calibration.recorded)) for sigma in known)
-    lacks = AddedUnknowns.of(equations, parameters, columns, prior)
+    lacks = AddedUnknowns.of(adjustment, parameters, columns, prior)
     is_wrong = lacks.is_wrong(least)
     correction = lacks.correction
     sigma = lacks.sigma
@@ -162,16 +142,16 @@ def with_scanner_errors(calibration: Calibration, matched: Matched) -> Calibrati
     columns = columns[:, is_wrong]
     # An error that data sheets rule out is no draw from what they state: it is not held to that
     free = np.full(is_wrong.sum(), np.inf)
-    lacks = AddedUnknowns.of(equations, parameters, columns, free)
-    shifted = AddedUnknowns.of(with_shift(equations), parameters, columns, free).trend_variance
+    lacks = AddedUnknowns.of(adjustment, parameters, columns, free)
+    shifted = AddedUnknowns.of(with_shift(adjustment), parameters, columns, free).trend_variance
     determined = calibration.determined & is_determined(shifted[: len(calibration.determined)])
     correction[is_wrong] = lacks.correction
     sigma[is_wrong] = lacks.sigma
-    equations = with_added(equations, -columns @ lacks.correction)
-    pose_error = predict_pose_error(equations, calibration.posterior)
+    adjustment = adjustment.with_added(-columns @ lacks.correction)
+    pose_error = predict_pose_error(adjustment, calibration.posterior)
     freed = replace(
         calibration,
-        equations=equations,
+        adjustment=adjustment,
         drift=Correction.by_pose_error(calibration.trajectory, *pose_error),
         determined=determined,
         lsc=_without(calibration.recorded, calibration.lsc, lacks),
@@ -185,25 +165,21 @@ def with_scanner_errors(calibration: Calibration, matched: Matched) -> Calibrati
 
 def _columns(calibration, targets):
     """Partial derivatives of all misclosures by ranges and encoder: of targets, then of ties."""
-    equations = calibration.equations
+    adjustment = calibration.adjustment
     mountings = calibration.lsc.mountings
-    trajectory = equations.trajectory
+    trajectory = adjustment.trajectory
     numbered = dict(enumerate(mountings))
 
     def partials(place, *sighting):
         place = georeferenced_anew(trajectory, calibration.recorded, mountings, place, *sighting)
         return partials_by_scanner(scanner_partials, trajectory, numbered, place, *sighting)
 
-    number = len(SCANNER_COMPONENTS) * len(mountings)
-    control = np.zeros((*equations.misclosure.shape, number))
-    sightings = targets.observations.position, targets.gps_time, targets.scanner
-    control[: len(targets)] = partials(*sightings)
-    control = control.reshape(-1, number)
-    if equations.ties is None:
-        return control
-    ties = calibration.ties.ties[calibration.ties.used]
-    views = partials(ties.place.reshape(-1, 3), ties.gps_time.ravel(), ties.scanner.ravel())
-    return np.vstack([control, along_ties(ties.direction, views).sum(axis=1)])
+    columns = {TARGET: partials(targets.observations.position, targets.gps_time, targets.scanner)}
+    if adjustment.ties is not None:
+        ties = calibration.ties.ties[calibration.ties.used]
+        views = partials(ties.place.reshape(-1, 3), ties.gps_time.ravel(), ties.scanner.ravel())
+        columns[TIE] = along_ties(ties.direction, views).sum(axis=1)[:, None]
+    return adjustment.stacked(columns)
 
 
 def _without(recorded, estimate, lacks):
@@ -232,23 +208,22 @@ def find_mounting_error(
     mountings : sequence of Mounting
         Of all scanners, as recorded.
     """
-    equations = estimate.equations
+    adjustment = estimate.adjustment
     residuals = estimate.ties
-    if equations.ties is None or residuals is None:
+    if adjustment.ties is None or residuals is None:
         return None
     used = residuals.ties[residuals.used]
     targets = matched[estimate.used]
-    trajectory = equations.trajectory
+    trajectory = adjustment.trajectory
     numbered = dict(enumerate(mountings))
-    ties = mounting_columns(trajectory, numbered, used)
-    control = np.zeros((len(equations.gps_time), 3, ties.shape[1]))
-    sightings = targets.observations.position, targets.gps_time, targets.scanner
-    control[: len(targets)] = partials_by_scanner(
-        mounting_partials, trajectory, numbered, *sightings
+    columns = adjustment.stacked(
+        {
+            TARGET: target_columns(trajectory, mountings, targets),
+            TIE: mounting_columns(trajectory, numbered, used)[:, None],
+        }
     )
-    columns = np.vstack([control.reshape(-1, ties.shape[1]), ties])
     sums = columns.reshape(len(columns), len(mountings), 6).sum(axis=1)
-    return AddedUnknowns.of(equations, estimate.parameters, sums, prior_sigma(mountings[0]))
+    return AddedUnknowns.of(adjustment, estimate.parameters, sums, prior_sigma(mountings[0]))
 
 
 def mounting_warnings(check: AddedUnknowns | None, scanners: int = 1) -> tuple[Statement, ...]:
@@ -288,7 +263,7 @@ def scanner_warnings(estimate: Estimate, names: Sequence[str]) -> Iterator[State
     names : sequence of str
         Of all scanners.
     """
-    solved = estimate.equations.solve(estimate.parameters)
+    solved = estimate.adjustment.solve(estimate.parameters)
     least = np.repeat(SETTINGS.determined_sigma, 3)
     for number, name in enumerate(names[1:] or names):
         of_it = slice(6 * number, 6 * number + 6)

@@ -12,13 +12,13 @@ from scipy.spatial.transform import Rotation
 
 from mlscorr.correction import Correction
 from mlscorr.estimate._wording import sentences_of
-from mlscorr.estimate.equations import Equations
+from mlscorr.estimate.adjustment import Adjustment
 from mlscorr.estimate.guards import Guards, few_targets, global_test_warnings
 from mlscorr.estimate.posterior import Posterior
 from mlscorr.estimate.settings import SETTINGS
-from mlscorr.estimate.signals import SignalParameters
 from mlscorr.estimate.target_tests import Screening, TargetTest
 from mlscorr.estimate.tied import TieResiduals
+from mlscorr.pos import SignalParameters
 from mlscorr.survey import Mounting, Statement, Summary, Ties, Trajectory
 
 MOUNTING_COMPONENTS = (
@@ -225,7 +225,7 @@ class Calibration(Summary):
     used : (n,) bool array
         Which observations took part.
     guards : Guards
-    equations : Equations
+    adjustment : Adjustment
         Of the observations that took part.
     drift : Correction
         Of the POS error beside the mountings, which all scanners share  (Eq. 14-15). It is zero on
@@ -247,7 +247,7 @@ class Calibration(Summary):
     screening: Screening
     used: np.ndarray
     guards: Guards
-    equations: Equations
+    adjustment: Adjustment
     drift: Correction
     notes: tuple[Statement, ...] = ()
     ties: TieResiduals | None = None
@@ -293,7 +293,7 @@ class Calibration(Summary):
     @property
     def shared_warnings(self) -> tuple[str, ...]:
         """Those of the sentences that concern all scanners."""
-        targets = len(self.equations.target_rows)
+        targets = len(self.adjustment.target_rows)
         statements = list(self.notes)
         if targets == 0:
             statements.append(Statement("mounting by ties alone", "warning"))
@@ -354,12 +354,12 @@ class Calibration(Summary):
         number : int
             Of the other scanner, from 1.
         """
-        if self.ties is None or self.equations.ties is None:
+        if self.ties is None or self.adjustment.ties is None:
             return None
         ties = self.ties.ties[self.ties.used]
         first, last = self.trajectory.segment(ties.gps_time.ravel()).reshape(-1, 2).T
         is_both = (np.sort(ties.scanner) == [0, number]).all(axis=1) & (first == last)
-        rows = self.equations.ties.mounting[is_both]
+        rows = self.adjustment.ties.columns[is_both, 0]
         variance = np.einsum("ni,ij,nj->n", rows, self.lsc.covariance, rows)
         if len(rows):
             return float(np.sqrt(variance.mean()))

@@ -8,11 +8,11 @@ import numpy as np
 from scipy.special import chdtri
 
 from mlscorr.collocation import INTEGRATED
-from mlscorr.estimate.equations import Equations
+from mlscorr.estimate.adjustment import Adjustment
 from mlscorr.estimate.posterior import Objective
 from mlscorr.estimate.settings import SETTINGS
-from mlscorr.estimate.signals import SignalParameters, pose_signals
 from mlscorr.frames import angle_sigma
+from mlscorr.pos import SignalParameters
 from mlscorr.survey import Statement, Trajectory, control_epochs
 
 COMPONENTS = ("easting", "northing", "height", "roll", "pitch", "heading")
@@ -79,24 +79,24 @@ class Guards:
 
 
 def find_guards(
-    equations: Equations, parameters: SignalParameters, corrected: Trajectory
+    adjustment: Adjustment, parameters: SignalParameters, corrected: Trajectory
 ) -> Guards:
     """Guards of an estimate.
 
     Parameters
     ----------
-    equations : Equations
+    adjustment : Adjustment
     parameters : SignalParameters
     corrected : Trajectory
         With its sigmas.
     """
-    ratio = _variance_ratio(equations, parameters, corrected)
-    if equations.ties is not None:
+    ratio = _variance_ratio(adjustment, parameters, corrected)
+    if adjustment.ties is not None:
         test = None
     else:
-        test = _global_test(equations, parameters)
+        test = _global_test(adjustment, parameters)
     everywhere = Guards((0.0, 0.0), (), ratio, test)
-    return guards_of(equations.trajectory.scanned_passes, equations.observed, everywhere)
+    return guards_of(adjustment.trajectory.scanned_passes, adjustment.observed, everywhere)
 
 
 def guards_of(passes: np.ndarray, observed: np.ndarray, guards: Guards) -> Guards:
@@ -127,35 +127,34 @@ def guards_of(passes: np.ndarray, observed: np.ndarray, guards: Guards) -> Guard
     )
 
 
-def _variance_ratio(equations, parameters, corrected):
+def _variance_ratio(adjustment, parameters, corrected):
     """Median over the control epochs of posterior over prior variance (6,), at most one."""
-    trajectory = equations.trajectory
-    if len(equations.observed) == 0:
+    trajectory = adjustment.trajectory
+    if len(adjustment.observed) == 0:
         return np.ones(6)
     last = len(trajectory) - 1
-    rows = np.clip(np.searchsorted(corrected.gps_time, equations.observed), 0, last)
-    stated = equations.stated_epochs.at(rows)
-    partials = np.broadcast_to(np.eye(6), (len(rows), 6, 6))
-    trend = parameters.trend_sigma * equations.pose_design(trajectory.gps_time[rows])
-    parts = trend, *(signal.mixing for signal in pose_signals(stated, parameters, partials))
+    rows = np.clip(np.searchsorted(corrected.gps_time, adjustment.observed), 0, last)
+    rotation = adjustment.errors.epochs.at(rows).rotation
+    trend = parameters.trend_sigma * adjustment.pose_design(trajectory.gps_time[rows])
+    parts = trend, *(signal.mixing for signal in adjustment.errors.pose_signals(parameters, rows))
     prior = sum(part @ part.swapaxes(1, 2) for part in parts)
-    turned = angle_sigma(stated.rotation, prior[:, 3:, 3:])
+    turned = angle_sigma(rotation, prior[:, 3:, 3:])
     before = np.hstack([np.einsum("qii->qi", prior[:, :3, :3]), turned**2])
     after = np.hstack([corrected.position_sigma[rows], corrected.attitude_sigma[rows]]) ** 2
     ratio = np.divide(after, before, out=np.ones_like(after), where=before > 0)
     return np.minimum(np.median(ratio, axis=0), 1.0)
 
 
-def _global_test(equations, parameters):
+def _global_test(adjustment, parameters):
     """GlobalTest by w' N w of w = P l, whose covariance is P; None without redundancy."""
-    if len(equations.target_rows) == 0:
+    if len(adjustment.target_rows) == 0:
         return None
     moments = np.zeros(3)  # what it is, its expectation and its variance
-    for block in Objective.of(equations).blocks:
+    for block in Objective.of(adjustment).blocks:
         solved = block.solve(parameters)
         rows = np.arange(3 * len(block.names))
         projected = solved.projected[rows]
-        noise = block.noise.block(rows)
+        noise = block.targets.noise.block(rows)
         weights = solved.weights[rows]
         precision = solved.solver.precision(rows)
         shares = (precision - projected @ projected.T) @ noise
@@ -168,26 +167,26 @@ def _global_test(equations, parameters):
     return GlobalTest(float(statistic * redundancy / expected), float(redundancy), float(upper))
 
 
-def sparse_warnings(equations: Equations, order: int) -> Iterator[Statement]:
+def sparse_warnings(adjustment: Adjustment, order: int) -> Iterator[Statement]:
     """Statements about control points that are few, all at one epoch, or a lowered order.
 
     Parameters
     ----------
-    equations : Equations
+    adjustment : Adjustment
     order : int
         Of the trend, as asked for.
     """
-    targets = len(equations.target_rows)
-    epochs = len(control_epochs(equations.observed))
-    if equations.order < order:
-        values = {"targets": targets, "epochs": epochs, "asked": order, "order": equations.order}
+    targets = len(adjustment.target_rows)
+    epochs = len(control_epochs(adjustment.observed))
+    if adjustment.order < order:
+        values = {"targets": targets, "epochs": epochs, "asked": order, "order": adjustment.order}
         yield Statement("lowered order", "warning", values)
     yield from few_targets(targets)
     if epochs == 1 and targets > 1:
         values = {
             "targets": targets,
-            "seconds": float(np.ptp(equations.observed)),
-            "start": float(equations.observed.min()),
+            "seconds": float(np.ptp(adjustment.observed)),
+            "start": float(adjustment.observed.min()),
         }
         yield Statement("one epoch", "warning", values)
 
@@ -206,26 +205,26 @@ def few_targets(targets: int) -> Iterator[Statement]:
 
 
 def guard_warnings(
-    guards: Guards, equations: Equations, parameters: SignalParameters
+    guards: Guards, adjustment: Adjustment, parameters: SignalParameters
 ) -> Iterator[Statement]:
     """Statements about time without control points, and about the global test.
 
     Parameters
     ----------
     guards : Guards
-    equations : Equations
+    adjustment : Adjustment
     parameters : SignalParameters
     """
-    if len(equations.names) == 0:
+    if len(adjustment.names) == 0:
         yield Statement("relative only", "warning")
         return
     time = parameters.bias_time
     if parameters.family != INTEGRATED:
         time = max(time, parameters.drift_time)
-    ties = equations.ties
+    ties = adjustment.ties
     if ties is None:  # they hold what control doesn't, and Support says where nothing does
-        yield from _extrapolated(equations, time)
-        yield from _faded(equations, time, *guards.gap)
+        yield from _extrapolated(adjustment, time)
+        yield from _faded(adjustment, time, *guards.gap)
     for first, last in guards.passes_without_control:
         if ties is None or not np.any((ties.gps_time >= first) & (ties.gps_time <= last)):
             yield Statement("pass without control", "warning", {"first": first, "last": last})
@@ -244,15 +243,15 @@ def global_test_warnings(guards: Guards) -> Iterator[Statement]:
         yield Statement("global test", "warning", asdict(test))
 
 
-def _scanned_times(equations):
+def _scanned_times(adjustment):
     """Times (k,) of the trajectory with points of the clouds. Units: s."""
-    return equations.trajectory.gps_time[equations.trajectory.scanned_rows]
+    return adjustment.trajectory.gps_time[adjustment.trajectory.scanned_rows]
 
 
-def _extrapolated(equations, time):
+def _extrapolated(adjustment, time):
     """Statements about both ends beyond the control span."""
-    first, last = equations.span
-    ends = _scanned_times(equations)[[0, -1]]
+    first, last = adjustment.span
+    ends = _scanned_times(adjustment)[[0, -1]]
     for length, side in ((first - ends[0], "before the first"), (ends[1] - last, "past the last")):
         if length > time:
             values = {
@@ -264,10 +263,10 @@ def _extrapolated(equations, time):
             yield Statement("extrapolated", "warning", values)
 
 
-def _faded(equations, time, start, end):
+def _faded(adjustment, time, start, end):
     """A Statement about the longest gap between control points where signals fade in it."""
-    first, last = equations.span
-    scanned = _scanned_times(equations)
+    first, last = adjustment.span
+    scanned = _scanned_times(adjustment)
     length = end - start
     away = np.minimum(scanned - start, end - scanned).max(initial=0.0)
     if 2 * away > SETTINGS.faded_times * time and first <= start and end <= last:

@@ -18,7 +18,7 @@ from threadpoolctl import threadpool_limits
 
 from mlscorr.correction import Correction
 from mlscorr.estimate._prediction import pose_rows, predict_pose_error
-from mlscorr.estimate._tie_equations import TieEquations
+from mlscorr.estimate.adjustment import Adjustment, mounting_adjustment, position_adjustment
 from mlscorr.estimate.calibration import (
     Calibration,
     MountingEstimate,
@@ -26,7 +26,7 @@ from mlscorr.estimate.calibration import (
     corrected_mountings,
     mounted_corrections,
 )
-from mlscorr.estimate.equations import Equations, mounting_equations, position_equations
+from mlscorr.estimate.factors import TARGET, Factor, tie_factor
 from mlscorr.estimate.guards import find_guards
 from mlscorr.estimate.inputs import checked_inputs, filled_sigmas
 from mlscorr.estimate.posterior import mounting_prior
@@ -34,6 +34,7 @@ from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.target_tests import Screening, screen
 from mlscorr.estimate.tied import WeighedTies, graduated, screen_with_ties
 from mlscorr.frames import georeferenced_anew
+from mlscorr.pos import PosErrors
 from mlscorr.survey import SAME_EPOCH, Matched, Mounting, Pos, Statement, Ties, Trajectory
 
 
@@ -66,10 +67,10 @@ def estimate_mounting(
     if all(faults):
         raise ValueError(faults[0])
     filled, notes = checked_inputs(trajectory, matched, pos, 0)
-    equations = position_equations(filled, matched, pos, 0, mounting_prior)
-    screening = screen(_least_squares(equations, matched, mountings)[0])
-    used = ~np.isin(equations.names, [outlier.name for outlier in screening.outliers])
-    kept, start, ls = _least_squares(equations.select(used), matched[used], mountings)
+    adjustment = position_adjustment(filled, matched, pos, 0, mounting_prior)
+    screening = screen(_least_squares(adjustment, matched, mountings)[0])
+    used = ~np.isin(adjustment.names, [outlier.name for outlier in screening.outliers])
+    kept, start, ls = _least_squares(adjustment.select(used), matched[used], mountings)
     return calibration_by(trajectory, mountings, kept, screening, (start, ls), used, notes)
 
 
@@ -95,8 +96,8 @@ def believed_mounting(
     """
     pos = pos or Pos()
     filled, notes = filled_sigmas(trajectory)
-    equations = position_equations(filled, matched, pos, 0, mounting_prior)
-    kept, start, ls = _least_squares(equations, matched, mountings)
+    adjustment = position_adjustment(filled, matched, pos, 0, mounting_prior)
+    kept, start, ls = _least_squares(adjustment, matched, mountings)
     screening = Screening.believed(kept)
     used = np.ones(len(matched), dtype=bool)
     return calibration_by(trajectory, mountings, kept, screening, (start, ls), used, notes)
@@ -117,17 +118,16 @@ def calibration_with_ties(calibration: Calibration, matched: Matched, ties: Ties
     ties : Ties
         The places likewise; the directions are those of the things themselves.
     """
-    tied, correction = _converged(calibration, matched, ties)
-    rows = replace(tied.ties, weight=np.ones(len(ties)))  # without those of robust estimation
-    bare = replace(tied.equations, ties=None)
-    predictions, screening, is_used = screen_with_ties(bare, calibration.screening, rows)
+    weighed, correction = _converged(calibration, matched, ties)
+    tied = weighed.adjustment.with_factor(weighed.ties.scaled(1.0))  # without robust weights
+    predictions, screening, is_used = screen_with_ties(tied, calibration.screening)
     if not is_used.any():
         return calibration.with_residuals(ties, is_used)
     used = calibration.used & ~np.isin(matched.name, [o.name for o in screening.outliers])
     changed = calibration_by(
         calibration.trajectory,
         calibration.recorded,
-        predictions.equations,
+        predictions.adjustment,
         screening,
         (correction, calibration.ls),
         used,
@@ -154,7 +154,7 @@ def previewed_mounting(
     tied, correction = _converged(calibration, matched, ties)
     recorded = calibration.recorded
     mountings = corrected_mountings(recorded, correction)
-    pose = tied.solved.predict_mean(*pose_rows(tied.equations, tied.parameters))
+    pose = tied.solved.predict_mean(*pose_rows(tied.adjustment, tied.parameters))
     drift = Correction.by_pose_error(calibration.trajectory, pose)
     return mounted_corrections(drift, recorded, mountings)
 
@@ -189,7 +189,7 @@ def control_fault(matched: Matched, number: int) -> str:
 def calibration_by(
     trajectory: Trajectory,
     recorded: Sequence[Mounting],
-    equations: Equations,
+    adjustment: Adjustment,
     screening: Screening,
     least_squares: tuple[np.ndarray, MountingEstimate],
     used: np.ndarray,
@@ -200,7 +200,7 @@ def calibration_by(
     Parameters
     ----------
     trajectory, recorded : Trajectory, sequence of Mounting
-    equations : Equations
+    adjustment : Adjustment
         About the mountings with a correction.
     screening : Screening
     least_squares : (6 k,) array and MountingEstimate
@@ -209,9 +209,9 @@ def calibration_by(
     notes : tuple of Statement
     """
     posterior = screening.posterior
-    lsc, determined = _collocation(equations, posterior, recorded, least_squares[0])
+    lsc, determined = _collocation(adjustment, posterior, recorded, least_squares[0])
     parameters = posterior.modes[0][0]
-    drift = Correction.by_pose_error(trajectory, *predict_pose_error(equations, posterior))
+    drift = Correction.by_pose_error(trajectory, *predict_pose_error(adjustment, posterior))
     return Calibration(
         trajectory=trajectory,
         recorded=tuple(recorded),
@@ -220,14 +220,14 @@ def calibration_by(
         determined=determined,
         screening=screening,
         used=used,
-        guards=find_guards(equations, parameters, drift.corrected),
-        equations=equations,
+        guards=find_guards(adjustment, parameters, drift.corrected),
+        adjustment=adjustment,
         drift=drift,
         notes=notes,
     )
 
 
-def _least_squares(equations, matched, recorded):
+def _least_squares(adjustment, matched, recorded):
     """Equations about the mountings of plain least squares, their correction, and the estimate.
 
     Iterated, as a rotation is not linear; the targets are georeferenced anew each time.
@@ -236,7 +236,7 @@ def _least_squares(equations, matched, recorded):
     step = 0.0
     for _ in range(SETTINGS.mounting_iterations):
         correction = correction + step  # here, so that the last equations are about the last one
-        mountings, about = linearized(equations, matched, recorded, correction)
+        mountings, about = linearized(adjustment, matched, recorded, correction)
         solved = about.solve(None)
         step = combined_correction(correction, solved.trend) - correction
         if np.abs(step).max() < SETTINGS.resolution:
@@ -255,13 +255,13 @@ def _least_squares(equations, matched, recorded):
 
 
 def linearized(
-    equations: Equations, matched: Matched, recorded: Sequence[Mounting], correction: np.ndarray
-) -> tuple[tuple[Mounting, ...], Equations]:
+    adjustment: Adjustment, matched: Matched, recorded: Sequence[Mounting], correction: np.ndarray
+) -> tuple[tuple[Mounting, ...], Adjustment]:
     """Mountings with a correction, and the equations about them, targets georeferenced anew.
 
     Parameters
     ----------
-    equations : Equations
+    adjustment : Adjustment
         Of the same targets, about any mountings.
     matched : Matched
         As georeferenced with the recorded mountings.
@@ -272,9 +272,9 @@ def linearized(
     mountings = corrected_mountings(recorded, correction)
     observed = matched.observations
     place = observed.position, matched.gps_time, matched.scanner
-    position = georeferenced_anew(equations.trajectory, recorded, mountings, *place)
+    position = georeferenced_anew(adjustment.trajectory, recorded, mountings, *place)
     moved = replace(matched, observations=replace(observed, position=position))
-    return mountings, mounting_equations(equations, moved, mountings, correction, _weak(recorded))
+    return mountings, mounting_adjustment(adjustment, moved, mountings, correction, _weak(recorded))
 
 
 def _converged(calibration, matched, ties) -> tuple[WeighedTies, np.ndarray]:
@@ -283,12 +283,12 @@ def _converged(calibration, matched, ties) -> tuple[WeighedTies, np.ndarray]:
     targets = matched[calibration.used]
     step = 0.0
     correction = calibration.lsc.correction
-    equations = calibration.equations
+    adjustment = calibration.adjustment
     for _ in range(SETTINGS.mounting_iterations):
         correction = correction + step  # here, so that the last equations are about the last one
-        mountings, about = linearized(equations, targets, recorded, correction)
-        moved = georeferenced_ties(about, recorded, mountings, ties)
-        tied = graduated(about, calibration.parameters[0][0], moved)
+        mountings, about = linearized(adjustment, targets, recorded, correction)
+        factor = georeferenced_ties(about.errors, recorded, mountings, ties)
+        tied = graduated(about.with_factor(factor), calibration.parameters[0][0])
         step = combined_correction(correction, tied.solved.trend) - correction
         if np.abs(step).max() < SETTINGS.resolution:
             break
@@ -296,24 +296,24 @@ def _converged(calibration, matched, ties) -> tuple[WeighedTies, np.ndarray]:
 
 
 def georeferenced_ties(
-    equations: Equations, recorded: Sequence[Mounting], mountings: Sequence[Mounting], ties: Ties
-) -> TieEquations:
-    """The equations of ties that mountings georeferenced, about other ones.
+    errors: PosErrors, recorded: Sequence[Mounting], mountings: Sequence[Mounting], ties: Ties
+) -> Factor:
+    """The factor of ties that mountings georeferenced, about other ones.
 
     Parameters
     ----------
-    equations : Equations
+    errors : PosErrors
     recorded, mountings : sequence of Mounting
         Of each scanner: the recorded one, and that about which the equations are.
     ties : Ties
     """
-    trajectory = equations.trajectory
+    trajectory = errors.trajectory
     views = (ties.place, ties.gps_time, ties.scanner)
     place = georeferenced_anew(trajectory, recorded, mountings, *views)
     misclosure = np.einsum("ni,ni->n", ties.direction, place[:, 1] - place[:, 0])
     moved = replace(ties, place=place, misclosure=misclosure)
     numbered = dict(enumerate(mountings))
-    return TieEquations.of(trajectory, equations.pos, moved, equations.stated, numbered)
+    return tie_factor(errors, moved, numbered)
 
 
 def _weak(mountings):
@@ -336,15 +336,15 @@ def prior_sigma(mounting: Mounting) -> np.ndarray:
     return np.where(np.isnan(mounting.measured), unmeasured, mounting.measured)
 
 
-def _collocation(equations, posterior, recorded, start):
+def _collocation(adjustment, posterior, recorded, start):
     """The estimate by collocation, averaged over the parameters, and what is determined (6 k,)."""
-    shifting = with_shift(equations)
+    shifting = with_shift(adjustment)
     mean = 0.0
     square = 0.0
     shifted = 0.0
     sigma0 = 0.0
     for parameters, probability in posterior.points:
-        solved = equations.solve(parameters)
+        solved = adjustment.solve(parameters)
         mean += probability * solved.trend
         square += probability * (solved.trend_covariance + np.outer(solved.trend, solved.trend))
         sigma0 += probability * solved.sigma0
@@ -356,13 +356,13 @@ def _collocation(equations, posterior, recorded, start):
     return estimate, is_determined(shifted)
 
 
-def with_shift(equations: Equations) -> Equations:
+def with_shift(adjustment: Adjustment) -> Adjustment:
     """The same with a constant difference between the coordinates of control and trajectory."""
-    if len(equations.names) == 0:  # nothing sees it
-        return equations
-    constant = np.tile(np.eye(3), (len(equations.mounting), 1, 1))
-    constant[len(equations.names) :] = 0.0  # the rows that hold the mountings
-    return replace(equations, mounting=np.concatenate([equations.mounting, constant], axis=2))
+    n = len(adjustment.names)
+    if n == 0:  # nothing sees it
+        return adjustment
+    constant = {TARGET: np.tile(np.eye(3), (n, 1, 1))}
+    return adjustment.with_unknowns(constant, np.zeros(3), np.full(3, np.inf))
 
 
 def is_determined(variance: np.ndarray) -> np.ndarray:

@@ -5,56 +5,55 @@ the recorded path; the starts don't, so each segment's is sought between its con
 likelihood. A step that contradicts the control points is no fall-back, only a restart.
 """
 
-from dataclasses import replace
-
 import numpy as np
 from scipy.special import chdtri
 
 from mlscorr.collocation import INTEGRATED
-from mlscorr.estimate.equations import Equations, with_fallbacks
+from mlscorr.estimate.adjustment import Adjustment, with_reacquisitions
+from mlscorr.estimate.factors import REACQUISITION, TIE
 from mlscorr.estimate.posterior import Objective
 from mlscorr.estimate.settings import SETTINGS
-from mlscorr.estimate.signals import SignalParameters
 from mlscorr.pos import SETTINGS as POS_SETTINGS
+from mlscorr.pos import SignalParameters
 
 
-def with_drift_history(equations: Equations) -> Equations:
+def with_drift_history(adjustment: Adjustment) -> Adjustment:
     """The equations with fall-backs, and with the most likely start of growth in each segment.
 
     Parameters
     ----------
-    equations : Equations
+    adjustment : Adjustment
         Of control points alone.
     """
-    steps = equations.stated.history.steps
+    steps = adjustment.errors.history.steps
     while True:
-        complete, parameters = with_likely_starts(with_fallbacks(equations, steps))
+        complete, parameters = with_likely_starts(with_reacquisitions(adjustment, steps))
         contradicted = _contradicted(complete, parameters)
         if contradicted is None:
             return complete
         steps = steps[np.arange(len(steps)) != contradicted]
 
 
-def with_likely_starts(equations: Equations) -> tuple[Equations, SignalParameters]:
+def with_likely_starts(adjustment: Adjustment) -> tuple[Adjustment, SignalParameters]:
     """The equations with the most likely starts, and the parameters that go with them.
 
     Parameters
     ----------
-    equations : Equations
+    adjustment : Adjustment
         Of control points, and of some ties, whose epochs tell starts apart between the points.
     """
-    history = equations.stated.history
+    history = adjustment.errors.history
     edges = history.edges
-    stated = equations.stated.starts
+    stated = adjustment.errors.starts
     ends_by_step = np.isin(edges[1:], history.steps.middle)
     begins_pass = np.isin(edges[:-1], history.trajectory.passes[:, 0])
     segments = list(zip(edges[:-1], edges[1:], begins_pass, ends_by_step, strict=True))
-    if equations.ties is None:
+    if adjustment.ties is None:
         tied = ()
     else:
-        tied = equations.ties.gps_time.ravel()
-    times = np.append(equations.observed, tied)
-    objective = Objective.of(equations)
+        tied = adjustment.ties.gps_time.ravel()
+    times = np.append(adjustment.observed, tied)
+    objective = Objective.of(adjustment)
     mode, _ = objective.maximum(INTEGRATED, objective.initial)
     starts = stated
     for _ in range(SETTINGS.rounds):
@@ -62,7 +61,7 @@ def with_likely_starts(equations: Equations) -> tuple[Equations, SignalParameter
         for number, segment in enumerate(segments):
             if not (segment[-1] or np.any((times > segment[0]) & (times < segment[1]))):
                 continue  # nothing there tells starts apart
-            part = _about(equations, *segment[:2])
+            part = _about(adjustment, *segment[:2])
             candidates = np.append(starts[number], _candidates(times, *segment))
             scores = []
             for candidate in candidates:
@@ -74,26 +73,26 @@ def with_likely_starts(equations: Equations) -> tuple[Equations, SignalParameter
             starts = np.where(np.arange(len(starts)) == number, likeliest, starts)
         if np.array_equal(before, starts):
             break
-        objective = Objective.of(equations.with_starts(starts))
+        objective = Objective.of(adjustment.with_starts(starts))
         mode, _ = objective.maximum(INTEGRATED, mode)
-    return equations.with_starts(starts), objective.parameters(INTEGRATED, mode)
+    return adjustment.with_starts(starts), objective.parameters(INTEGRATED, mode)
 
 
-def _about(equations, first, last):
+def _about(adjustment, first, last):
     """The equations; of large surveys those of targets and ties about a segment: they feel it."""
-    ties = equations.ties
+    ties = adjustment.ties
     if ties is not None and len(ties) > SETTINGS.tie_sample:
         inside = ((ties.gps_time >= first) & (ties.gps_time <= last)).any(axis=1)
-        some = None
         if inside.any():
-            some = ties.select(inside)
-        equations = replace(equations, ties=some)
-    if len(equations.names) <= SETTINGS.block:
-        return equations
-    times = equations.observed
+            adjustment = adjustment.with_factor(ties.select(inside))
+        else:
+            adjustment = adjustment.without_kind(TIE)
+    if len(adjustment.names) <= SETTINGS.block:
+        return adjustment
+    times = adjustment.observed
     inside = np.abs(times - (first + last) / 2) <= (last - first) / 2 + POS_SETTINGS.outage
     inside |= np.isin(np.arange(len(times)), np.argsort(np.abs(times - last))[: SETTINGS.block])
-    return equations.select(inside).without_outer_fallbacks()
+    return adjustment.select(inside).without_outer_steps()
 
 
 def _candidates(times, first, last, begins_pass, ends_by_step):
@@ -109,17 +108,16 @@ def _candidates(times, first, last, begins_pass, ends_by_step):
     return np.concatenate([[first], before, (edges[1:] + edges[:-1]) / 2, endless])
 
 
-def _contradicted(equations, parameters):
+def _contradicted(adjustment, parameters):
     """Number of the step that all else contradicts most, or None."""
-    number = equations.fallbacks
-    if number == 0:
+    steps = adjustment.rows_of(REACQUISITION).reshape(-1, 3)
+    if len(steps) == 0:
         return None
-    solved = equations.solve(parameters)
-    first = 3 * (len(equations.gps_time) - 2 * number)
-    critical = chdtri(3, SETTINGS.significance / number)
+    solved = adjustment.solve(parameters)
+    critical = chdtri(3, SETTINGS.significance / len(steps))
     statistics = []
-    for step in range(number):
-        residual, covariance = solved.leave_out(np.arange(3) + first + 6 * step)
+    for rows in steps:
+        residual, covariance = solved.leave_out(rows)
         statistics.append(float(residual @ np.linalg.solve(covariance, residual)))
     worst = int(np.argmax(statistics))
     if statistics[worst] > critical:

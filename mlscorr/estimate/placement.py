@@ -14,14 +14,14 @@ from threadpoolctl import threadpool_limits
 
 from mlscorr.collocation import FAMILIES, Noise, SparseRows, covariance_given
 from mlscorr.estimate._prediction import predict_under
-from mlscorr.estimate.equations import Equations, position_equations
+from mlscorr.estimate.adjustment import Adjustment, position_adjustment
+from mlscorr.estimate.factors import TIE
 from mlscorr.estimate.inputs import checked_inputs
 from mlscorr.estimate.pos_error import Estimate
 from mlscorr.estimate.posterior import Objective, position_prior
 from mlscorr.estimate.settings import SETTINGS
-from mlscorr.estimate.signals import SignalParameters, pose_signals
 from mlscorr.estimate.tied import sample
-from mlscorr.pos import stated_sigma
+from mlscorr.pos import SignalParameters, pose_signals
 from mlscorr.survey import Matched, Pos, Trajectory
 from mlscorr.wording import percent
 
@@ -98,10 +98,10 @@ def place_control(estimate: Estimate) -> tuple[NextControl, ...]:
     estimate : Estimate
         Without control nobody knows how far away a target would be seen, and none is named.
     """
-    if len(estimate.equations.names) == 0:
+    if len(estimate.adjustment.names) == 0:
         return ()
     sigma = estimate.correction.corrected.position_sigma
-    return _places(estimate.equations, estimate.families, np.linalg.norm(sigma, axis=1))
+    return _places(estimate.adjustment, estimate.families, np.linalg.norm(sigma, axis=1))
 
 
 def predict_accuracy(trajectory: Trajectory, matched: Matched, pos: Pos) -> PlannedAccuracy:
@@ -120,31 +120,31 @@ def predict_accuracy(trajectory: Trajectory, matched: Matched, pos: Pos) -> Plan
         As ``estimate_correction`` does.
     """
     filled, _ = checked_inputs(trajectory, matched, pos, SETTINGS.order)
-    equations = position_equations(filled, matched, pos, SETTINGS.order, position_prior)
-    objective = Objective.of(equations)
+    adjustment = position_adjustment(filled, matched, pos, SETTINGS.order, position_prior)
+    objective = Objective.of(adjustment)
     families = [
         (objective.parameters(family, objective.initial), 1 / len(FAMILIES)) for family in FAMILIES
     ]
     rows = _even_rows(filled)
-    sigma = np.sqrt(_variance(equations, families, rows))
+    sigma = np.sqrt(_variance(adjustment, families, rows))
     along = np.interp(filled.gps_time, filled.gps_time[rows], sigma)
-    return PlannedAccuracy(filled.gps_time[rows], sigma, _places(equations, families, along))
+    return PlannedAccuracy(filled.gps_time[rows], sigma, _places(adjustment, families, along))
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")  # more threads, other last digits
-def _places(equations, families, sigma):
+def _places(adjustment, families, sigma):
     """NextControl, at most PLACES, by the 3D sigma (n,) at all epochs of the trajectory."""
     families = [family for family in families if family[1] > SETTINGS.smallest_share]
-    trajectory = equations.trajectory
-    regular = _even_rows(equations.trajectory)
+    trajectory = adjustment.trajectory
+    regular = _even_rows(adjustment.trajectory)
     candidates = np.unique(_candidate_rows(trajectory, regular, sigma))
     rows = np.union1d(regular, candidates)
     is_even = np.isin(rows, regular)
     at = np.searchsorted(rows, candidates)
-    sights = [_passing(trajectory, equations, row) for row in candidates]
-    outlook = Outlook.of(equations, families, rows, sights)
-    observed = equations.observed
-    names = equations.names
+    sights = [_passing(trajectory, adjustment, row) for row in candidates]
+    outlook = Outlook.of(adjustment, families, rows, sights)
+    observed = adjustment.observed
+    names = adjustment.names
     places = []
     taken: list[int] = []
     square = sigma[rows] ** 2
@@ -154,11 +154,11 @@ def _places(equations, families, sigma):
         taken.append(best)
         observed = np.append(observed, trajectory.gps_time[sights[best]])
         span = float(observed.min()), float(observed.max())
-        if span == equations.span:
+        if span == adjustment.span:
             chosen = outlook.with_target(best)
         else:  # the trend of a correction with that target reaches as far
-            equations = replace(equations, trend_span=span)
-            chosen = Outlook.of(equations, families, rows, sights)
+            adjustment = replace(adjustment, trend_span=span)
+            chosen = Outlook.of(adjustment, families, rows, sights)
             for target in taken:
                 chosen = chosen.with_target(target)
         after = square * chosen.variance / outlook.variance
@@ -220,18 +220,18 @@ def _candidate_rows(trajectory, regular, sigma):
     return scanned[np.interp(shares, total, np.searchsorted(scanned, regular)).round().astype(int)]
 
 
-def _variance(equations, families, rows):
+def _variance(adjustment, families, rows):
     """3D variance (k,) of the corrected position at epochs, averaged over the families. m^2."""
     total = sum(weight for _, weight in families)
     return sum(
-        weight / total * np.einsum("qii->q", predict_under(equations, chosen, rows)[1][:, :3, :3])
+        weight / total * np.einsum("qii->q", predict_under(adjustment, chosen, rows)[1][:, :3, :3])
         for chosen, weight in families
     )
 
 
-def _passing(trajectory, equations, row):
+def _passing(trajectory, adjustment, row):
     """Epochs at which a target beside one of them is passed, no farther than control was seen."""
-    arms = equations.partials[: len(equations.names), :, 3:]
+    arms = adjustment.targets.partials[:, 0, :, 3:]
     sight = np.sqrt((arms**2).sum(axis=(1, 2)) / 2).max()  # |G|, by Phi(G)
     away = np.linalg.norm(trajectory.position - trajectory.position[row], axis=1)
     scanned = trajectory.scanned_rows
@@ -270,7 +270,7 @@ class Outlook:
     @classmethod
     def of(
         cls,
-        equations: Equations,
+        adjustment: Adjustment,
         families: list[tuple[SignalParameters, float]],
         rows: np.ndarray,
         sights: list[list[int]],
@@ -279,7 +279,7 @@ class Outlook:
 
         Parameters
         ----------
-        equations : Equations
+        adjustment : Adjustment
         families : list of (SignalParameters, weight)
         rows : (k,) int array
             Of the trajectory's epochs.
@@ -287,13 +287,13 @@ class Outlook:
             Epochs at which each target would be seen: as far and as well as the median control
             point, on its side.
         """
-        thinned = with_fewer_rows(equations)
+        thinned = with_fewer_rows(adjustment)
         at_target = np.concatenate(sights)
         still = np.tile(np.eye(3, 6), (len(rows), 1, 1))
-        moved = np.concatenate([still, _target_partials(equations, at_target)])
+        moved = np.concatenate([still, _target_partials(adjustment, at_target)])
         at = np.concatenate([rows, at_target])
         weights = np.array([weight for _, weight in families])
-        shown = [_shown(equations, chosen, at, moved) for chosen, _ in families]
+        shown = [_shown(adjustment, chosen, at, moved) for chosen, _ in families]
         covariances = np.stack(
             [
                 covariance_given(thinned.rows(chosen), [part], thinned.believed(chosen))
@@ -302,7 +302,7 @@ class Outlook:
         )
         ends = 3 * (len(rows) + np.cumsum([len(sight) for sight in sights]))
         targets = [np.arange(end - 3 * len(s), end) for end, s in zip(ends, sights, strict=True)]
-        noise = [_target_noise(equations.noise, len(equations.names), len(s)) for s in sights]
+        noise = [_target_noise(adjustment.targets.noise, len(s)) for s in sights]
         return cls(weights / weights.sum(), covariances, len(rows), tuple(targets), tuple(noise))
 
     @property
@@ -344,60 +344,55 @@ class Outlook:
         return self.covariances[:, rows[:, None], rows] + self.noise[number]
 
 
-def with_fewer_rows(equations: Equations) -> Equations:
+def with_fewer_rows(adjustment: Adjustment) -> Adjustment:
     """The equations with some of the ties and targets, each as precise as those it stands for.
 
     Parameters
     ----------
-    equations : Equations
+    adjustment : Adjustment
     """
     room = SETTINGS.dense_rows
-    if equations.ties is not None:
-        some = sample(equations)
-        share = len(some.ties) / len(equations.ties)
-        equations = replace(some, ties=replace(some.ties, variance=share * some.ties.variance))
-        room -= len(equations.ties)
-    step = -(-equations.misclosure.size // max(room, 1))
+    if adjustment.ties is not None:
+        ties = sample(adjustment).ties
+        share = len(ties) / len(adjustment.ties)
+        adjustment = adjustment.with_factor(ties.scaled(share))
+        room -= len(ties)
+    others = sum(f.misclosure.size for f in adjustment.observing if f.kind != TIE)
+    step = -(-others // max(room, 1))
     if step == 1:
-        return equations
-    thinned = equations.select(np.arange(0, len(equations.names), step))
-    noise = thinned.noise
-    own = noise.own / step
-    if noise.shared is None:
-        shared = None
-    else:
-        shared = noise.shared / np.sqrt(step)
-    return replace(thinned, noise=Noise(own, noise.group, shared))
+        return adjustment
+    targets = adjustment.select(np.arange(0, len(adjustment.names), step)).targets
+    noise = targets.noise
+    thinned = Noise(noise.own / step, noise.group, noise.shared / np.sqrt(step))
+    return adjustment.with_factor(replace(targets, noise=thinned))
 
 
-def _shown(equations, parameters, rows, partials):
+def _shown(adjustment, parameters, rows, partials):
     """SparseRows of what is corrected of points with partials (n, 3, 6) at epochs."""
-    times = equations.trajectory.gps_time[rows]
+    times = adjustment.trajectory.gps_time[rows]
     n = len(rows)
     noise = Noise(np.zeros((n, 3, 3)))
-    design = equations.pose_design(times)[:, :3]
-    signals = pose_signals(equations.stated_epochs.at(rows), parameters, partials)
+    design = adjustment.pose_design(times)[:, :3]
+    signals = pose_signals(adjustment.errors.epochs.at(rows), parameters, partials)
     return SparseRows(times[:, None], np.zeros((n, 3)), noise, design, signals)
 
 
-def _target_partials(equations, rows):
+def _target_partials(adjustment, rows):
     """Partials (n, 3, 6) of targets that are seen as the median control point, at epochs."""
-    trajectory = equations.trajectory
-    n = len(equations.names)
-    turned = stated_sigma(trajectory, equations.pos, equations.observed).rotation.as_matrix()
-    arm = np.median(turned.swapaxes(1, 2) @ equations.partials[:n, :, 3:] @ turned, axis=0)
-    attitude = trajectory.attitude[rows].as_matrix()
+    targets = adjustment.targets
+    turned = targets.stated.rotation.as_matrix()
+    arms = turned.swapaxes(1, 2) @ targets.partials[:, 0, :, 3:] @ turned
+    arm = np.median(arms, axis=0)
+    attitude = adjustment.trajectory.attitude[rows].as_matrix()
     still = np.tile(np.eye(3), (len(rows), 1, 1))
     return np.concatenate([still, attitude @ arm @ attitude.swapaxes(1, 2)], axis=2)
 
 
-def _target_noise(noise, n, sights):
-    """Covariance of a target's observations at some sights, by medians of the n control points'.
+def _target_noise(noise, sights):
+    """Covariance of a target's observations at some sights, by medians of the control points'.
 
     Of their variances alone: medians of whole matrices, element by element, can be no covariance.
     """
-    own = np.diag(np.median(np.diagonal(noise.own[:n], axis1=1, axis2=2), axis=0))
-    usual = np.zeros((1, 3))
-    if noise.shared is not None:
-        usual = np.median(noise.shared[noise.group[:n]], axis=0)[None]
+    own = np.diag(np.median(np.diagonal(noise.own, axis1=1, axis2=2), axis=0))
+    usual = np.median(noise.shared[noise.group], axis=0)[None]
     return Noise(np.tile(own, (sights, 1, 1)), np.zeros(sights, int), usual).matrix

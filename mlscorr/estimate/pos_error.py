@@ -14,25 +14,24 @@ from mlscorr.collocation import Collocation
 from mlscorr.correction import Correction
 from mlscorr.estimate._prediction import GridPredictions, pose_rows, predict_pose_error
 from mlscorr.estimate._runs import find_windows, weighed_refusals, with_windows
-from mlscorr.estimate._tie_equations import TieEquations
 from mlscorr.estimate._wording import sentences_of
-from mlscorr.estimate.equations import (
+from mlscorr.estimate.adjustment import (
     NO_TREND,
-    Equations,
-    position_equations,
-    with_fallbacks,
-    with_mountings,
+    Adjustment,
+    position_adjustment,
+    with_reacquisitions,
 )
+from mlscorr.estimate.factors import TIE, tie_factor
 from mlscorr.estimate.guards import Guards, find_guards, guard_warnings, sparse_warnings
 from mlscorr.estimate.inputs import checked_inputs, filled_sigmas
 from mlscorr.estimate.mounting import prior_sigma
 from mlscorr.estimate.outages import with_drift_history
 from mlscorr.estimate.posterior import Objective, most_probable, position_prior
 from mlscorr.estimate.settings import SETTINGS
-from mlscorr.estimate.signals import SignalParameters
 from mlscorr.estimate.support import Support, find_support
 from mlscorr.estimate.target_tests import Screening, TargetTest, screen
 from mlscorr.estimate.tied import TieResiduals, robust_ties, screen_with_ties
+from mlscorr.pos import SignalParameters
 from mlscorr.survey import (
     Matched,
     Mounting,
@@ -75,7 +74,7 @@ class Estimate(Summary):
     ----------
     correction : Correction
         An average over all parameters.
-    equations : Equations
+    adjustment : Adjustment
         Of the used targets, and of the ties that hold.
     screening : Screening
     used : (n,) bool array
@@ -96,7 +95,7 @@ class Estimate(Summary):
     """
 
     correction: Correction
-    equations: Equations
+    adjustment: Adjustment
     screening: Screening
     used: np.ndarray
     left_out: np.ndarray
@@ -111,7 +110,7 @@ class Estimate(Summary):
     @property
     def order(self) -> int:
         """Order of the trend; without control points a shift, within what the POS states."""
-        return self.equations.order
+        return self.adjustment.order
 
     @property
     def parameters(self) -> SignalParameters:
@@ -136,7 +135,7 @@ class Estimate(Summary):
     @property
     def span(self) -> tuple[float, float]:
         """First and last control epoch, in s."""
-        return self.equations.span
+        return self.adjustment.span
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -148,7 +147,7 @@ class Estimate(Summary):
         """What is doubtful."""
         statements = [
             *self.notes,
-            *guard_warnings(self.guards, self.equations, self.parameters),
+            *guard_warnings(self.guards, self.adjustment, self.parameters),
             *self.screening.warnings,
         ]
         if self.ties is not None:
@@ -158,10 +157,10 @@ class Estimate(Summary):
     @cached_property
     def alternatives(self) -> tuple[Alternative, ...]:
         """Other orders of the trend beside the one in use; none without control."""
-        if len(self.equations.names) == 0:
+        if len(self.adjustment.names) == 0:
             return ()
         with threadpool_limits(limits=1, user_api="blas"):
-            return compare_orders(self.equations, self.families)
+            return compare_orders(self.adjustment, self.families)
 
 
 # The matrices are small: on a busy machine threads would wait longer than they work
@@ -189,8 +188,8 @@ def estimate_correction(
     """
     pos = pos or Pos()
     filled, notes = checked_inputs(trajectory, matched, pos, order)
-    equations, screening, windows = _screened(filled, matched, pos, order)
-    kept = equations.without({outlier.name for outlier in screening.outliers})
+    adjustment, screening, windows = _screened(filled, matched, pos, order)
+    kept = adjustment.without({outlier.name for outlier in screening.outliers})
     notes = (
         *notes,
         *(window.statement for window in windows),
@@ -210,18 +209,18 @@ def _screened(trajectory, matched, pos, order):
             raised = with_windows(trajectory, windows)
         else:
             raised = trajectory
-        equations = position_equations(raised, matched, pos, order, position_prior)
-        equations = replace(equations, order=affordable_order(order, equations))
-        equations = with_drift_history(equations)
-        plain = plain or equations
-        screening = screen(equations)
-        more = find_windows(equations, screening)
+        adjustment = position_adjustment(raised, matched, pos, order, position_prior)
+        adjustment = replace(adjustment, order=affordable_order(order, adjustment))
+        adjustment = with_drift_history(adjustment)
+        plain = plain or adjustment
+        screening = screen(adjustment)
+        more = find_windows(adjustment, screening)
         if not more:
             break
-    weighed = weighed_refusals(equations, plain, screening, len(windows))
+    weighed = weighed_refusals(adjustment, plain, screening, len(windows))
     if screening.outliers and not weighed.outliers:
         return plain, weighed, ()
-    return equations, weighed, windows
+    return adjustment, weighed, windows
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
@@ -243,10 +242,10 @@ def believed_correction(trajectory: Trajectory, pos: Pos | None = None) -> Estim
     """
     pos = pos or Pos()
     filled, notes = filled_sigmas(trajectory)
-    equations = position_equations(filled, Matched.none(), pos, 0, position_prior)
-    equations = with_fallbacks(equations, equations.stated.history.steps)
-    screening = Screening.believed(equations)
-    return _estimate(trajectory, (), GridPredictions(equations), screening, notes)
+    adjustment = position_adjustment(filled, Matched.none(), pos, 0, position_prior)
+    adjustment = with_reacquisitions(adjustment, adjustment.errors.history.steps)
+    screening = Screening.believed(adjustment)
+    return _estimate(trajectory, (), GridPredictions(adjustment), screening, notes)
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
@@ -263,10 +262,10 @@ def with_ties(estimate: Estimate, ties: Ties, mountings: Sequence[Mounting] = ()
         first is estimated with the drift, so that it doesn't pass for drift. Of the one scanner
         where it saw things again at one visit: likewise what that lacks.
     """
-    before, rows = _tie_equations(estimate.equations, ties, mountings)
-    predictions, screening, is_used = screen_with_ties(before, estimate.screening, rows)
+    tied = _tied_adjustment(estimate.adjustment, ties, mountings)
+    predictions, screening, is_used = screen_with_ties(tied, estimate.screening)
     names = np.full(len(estimate.used), "", dtype=object)
-    names[estimate.used] = before.names
+    names[estimate.used] = tied.names
     trajectory = estimate.correction.recorded
     changed = _estimate(trajectory, names, predictions, screening, estimate.notes)
     return replace(changed, ties=TieResiduals.of(ties, is_used, changed.correction))
@@ -287,10 +286,10 @@ def previewed_correction(
     with_sigmas : bool
         Of the corrected trajectory: they need the inverse of the normal equations.
     """
-    before, rows = _tie_equations(estimate.equations, ties, mountings)
-    before = replace(before, tolerance=SETTINGS.coarse_tolerance)
-    weighed = robust_ties(before, estimate.parameters, rows)
-    asked = pose_rows(weighed.equations, weighed.parameters)
+    tied = _tied_adjustment(estimate.adjustment, ties, mountings)
+    tied = replace(tied, tolerance=SETTINGS.coarse_tolerance)
+    weighed = robust_ties(tied, estimate.parameters)
+    asked = pose_rows(weighed.adjustment, weighed.parameters)
     solved = weighed.solved
     if with_sigmas:
         pose = solved.predict(*asked)
@@ -299,29 +298,28 @@ def previewed_correction(
     return Correction.by_pose_error(estimate.correction.recorded, *pose)
 
 
-def _tie_equations(equations, ties, mountings):
-    """Equations with all mountings but the first, or the only one, and TieEquations with the same
-    drift.
-    """
+def _tied_adjustment(adjustment, ties, mountings):
+    """The adjustment with ties, and with all mountings but the first, or the only one."""
     free = dict(enumerate(mountings))
     if len(free) > 1:
         del free[0]  # which the others are compared with
-    rows = TieEquations.of(equations.trajectory, equations.pos, ties, equations.stated, free)
+    factor = tie_factor(adjustment.errors, ties, free)
     if not free:
-        return equations, rows
+        return adjustment.with_factor(factor)
+    columns = factor.columns
     sigma = np.array([prior_sigma(mounting) for mounting in mountings])
     if 0 in free:  # what two visits of one scanner disagree by is drift
-        rows = replace(rows, mounting=rows.mounting * ties.is_of_visit[:, None])
+        columns = columns * ties.is_of_visit[:, None, None]
     else:
         sigma = np.hypot(sigma[1:], sigma[0])
     sigma = sigma.ravel()
-    nothing = np.zeros((len(equations.names), 3, len(sigma)))
-    return with_mountings(equations, nothing, np.zeros(len(sigma)), sigma), rows
+    tied = adjustment.with_factor(replace(factor, columns=None))
+    return tied.with_unknowns({TIE: columns}, np.zeros(len(sigma)), sigma)
 
 
 def _estimate(trajectory, names, predictions, screening, notes):
     """The Estimate by equations, as predictions have them, and the parameters chosen for them."""
-    kept = predictions.equations
+    kept = predictions.adjustment
     posterior = screening.posterior
     used = np.isin(np.asarray(names, dtype=object), kept.names)
     parameters = posterior.modes[0][0]
@@ -333,7 +331,7 @@ def _estimate(trajectory, names, predictions, screening, notes):
     correction = Correction.by_pose_error(trajectory, *pose_error)
     return Estimate(
         correction=correction,
-        equations=kept,
+        adjustment=kept,
         screening=screening,
         used=used,
         left_out=left_out,
@@ -346,24 +344,24 @@ def _estimate(trajectory, names, predictions, screening, notes):
 
 
 def compare_orders(
-    equations: Equations, families: Sequence[tuple[SignalParameters, float]]
+    adjustment: Adjustment, families: Sequence[tuple[SignalParameters, float]]
 ) -> tuple[Alternative, ...]:
     """Alternatives of all families, for no trend and all orders up to one above that in use.
 
     Parameters
     ----------
-    equations : Equations
+    adjustment : Adjustment
     families : sequence of (SignalParameters, float)
         Most probable parameters of each family at the order in use.
     """
-    order = equations.order
+    order = adjustment.order
     # Blocks have trends of their own, which can't be compared; ties tell none
-    is_alone = len(equations.names) > SETTINGS.block or equations.ties is not None
+    is_alone = len(adjustment.names) > SETTINGS.block or adjustment.ties is not None
     orders = [order] if is_alone else range(NO_TREND, order + 2)
     start = [chosen for chosen, _ in families]
     rows = []
     for tried in orders:
-        with_order = replace(equations, order=tried)
+        with_order = replace(adjustment, order=tried)
         objective = Objective.of(with_order)
         if tried == order:
             modes = families
@@ -382,32 +380,32 @@ def compare_orders(
     )
 
 
-def affordable_order(order: int, equations: Equations) -> int:
+def affordable_order(order: int, adjustment: Adjustment) -> int:
     """The order that leaves one control epoch more than the trend needs.
 
     Parameters
     ----------
     order : int
         As asked for.
-    equations : Equations
+    adjustment : Adjustment
     """
-    sizes = len(equations.target_rows), len(control_epochs(equations.observed))
+    sizes = len(adjustment.target_rows), len(control_epochs(adjustment.observed))
     return max(min(order, min(sizes) - 2), 0)
 
 
-def leave_targets_out(equations: Equations, solved: Collocation) -> np.ndarray:
+def leave_targets_out(adjustment: Adjustment, solved: Collocation) -> np.ndarray:
     """Misclosures (n, 3) that remain when each target in turn takes no part. Units: m.
 
     Parameters
     ----------
-    equations : Equations
+    adjustment : Adjustment
     solved : Collocation
 
     Returns
     -------
     (n, 3) array
     """
-    residuals = np.empty(3 * len(equations.names))
-    for rows in equations.target_rows.values():
+    residuals = np.empty(3 * len(adjustment.names))
+    for rows in adjustment.target_rows.values():
         residuals[rows] = solved.leave_out(rows)[0]
     return residuals.reshape(-1, 3)

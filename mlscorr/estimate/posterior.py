@@ -15,9 +15,9 @@ from scipy.optimize import minimize
 from scipy.special import ndtri
 
 from mlscorr.collocation import FAMILIES, INTEGRATED
-from mlscorr.estimate.equations import NO_TREND, Equations
+from mlscorr.estimate.adjustment import NO_TREND, Adjustment
 from mlscorr.estimate.settings import SETTINGS
-from mlscorr.estimate.signals import SignalParameters
+from mlscorr.pos import SignalParameters
 
 SCALES = ("drift_scale", "walk_scale", "jitter_scale", "bias_scale")
 # One sigma of the logarithms about their start
@@ -57,7 +57,7 @@ class Prior:
     attitude_follows: bool
 
 
-def position_prior(equations: Equations) -> Prior:
+def position_prior(adjustment: Adjustment) -> Prior:
     """Prior of a correction.
 
     The time of drift and bias is by the paper's rule, or what is believed where the trajectory has
@@ -65,15 +65,15 @@ def position_prior(equations: Equations) -> Prior:
 
     Parameters
     ----------
-    equations : Equations
+    adjustment : Adjustment
     """
-    time = SETTINGS.start_ratio * equations.interval
-    if equations.trajectory.position_sigma is None:
-        time = equations.pos.correlation_time
-    return _prior(equations, time, attitude_follows=True)
+    time = SETTINGS.start_ratio * adjustment.interval
+    if adjustment.trajectory.position_sigma is None:
+        time = adjustment.errors.pos.correlation_time
+    return _prior(adjustment, time, attitude_follows=True)
 
 
-def mounting_prior(equations: Equations) -> Prior:
+def mounting_prior(adjustment: Adjustment) -> Prior:
     """Prior of a calibration.
 
     A site's targets stand so close that their interval says nothing of the POS, so the time is the
@@ -81,32 +81,32 @@ def mounting_prior(equations: Equations) -> Prior:
 
     Parameters
     ----------
-    equations : Equations
+    adjustment : Adjustment
     """
-    return _prior(equations, equations.pos.correlation_time, attitude_follows=False)
+    return _prior(adjustment, adjustment.errors.pos.correlation_time, attitude_follows=False)
 
 
-def _prior(equations, time, attitude_follows):
+def _prior(adjustment, time, attitude_follows):
     start = {
         "drift_time": time,
-        "jitter_time": equations.interval,  # correlated over one interval
+        "jitter_time": adjustment.interval,  # correlated over one interval
         "bias_time": time,
         "attitude_time": SETTINGS.attitude_time,
         "walk_scale": SETTINGS.walk_scale,
         "trend_sigma": SETTINGS.trend_sigma,
     }
-    is_held = len(equations.names) > 0
+    is_held = len(adjustment.names) > 0
     if not is_held:  # nothing tells of what all passes share, of which the POS states this
-        start["trend_sigma"] = float(np.sqrt(np.mean(equations.stated_epochs.gnss**2)))
-    is_split = bool(np.any(equations.stated.gnss))
+        start["trend_sigma"] = float(np.sqrt(np.mean(adjustment.errors.epochs.gnss**2)))
+    is_split = bool(np.any(adjustment.errors.epochs.gnss))
     fixed: list[str] = []
     if not is_split:
         fixed += SPLIT
     if attitude_follows:
         fixed.append("attitude_time")
-    if equations.stated.gnss_clock is None:
+    if len(adjustment.errors.history.turns) == 0:
         fixed.append("level_scale")
-    if equations.order == NO_TREND or not is_held:
+    if adjustment.order == NO_TREND or not is_held:
         fixed.append("trend_sigma")
     free = [name for name in NAMES if name not in fixed]
     return Prior(
@@ -149,17 +149,17 @@ class Objective:
 
     Parameters
     ----------
-    blocks : tuple of Equations
+    blocks : tuple of an Adjustment
     prior : Prior
     """
 
-    blocks: tuple[Equations, ...]
+    blocks: tuple[Adjustment, ...]
     prior: Prior
 
     @classmethod
-    def of(cls, equations: Equations) -> Objective:
+    def of(cls, adjustment: Adjustment) -> Objective:
         """The objective of Equations under their own prior."""
-        return cls(_blocks(equations), equations.prior(equations))
+        return cls(_blocks(adjustment), adjustment.prior(adjustment))
 
     @property
     def initial(self) -> np.ndarray:
@@ -281,17 +281,17 @@ class Objective:
 
 
 def most_probable(
-    equations: Equations, start: Sequence[SignalParameters] = ()
+    adjustment: Adjustment, start: Sequence[SignalParameters] = ()
 ) -> list[tuple[SignalParameters, float]]:
     """Most probable SignalParameters of each family and its log posterior, the best first.
 
     Parameters
     ----------
-    equations : Equations
+    adjustment : Adjustment
     start : sequence of SignalParameters
         Of each family, near which the maxima are expected.
     """
-    objective = Objective.of(equations)
+    objective = Objective.of(adjustment)
     near = {chosen.family: objective.logarithms(chosen) for chosen in start}
     modes = []
     at = objective.initial
@@ -302,7 +302,7 @@ def most_probable(
 
 
 def choose_parameters(
-    equations: Equations,
+    adjustment: Adjustment,
     start: Sequence[SignalParameters] = (),
     points: int = SETTINGS.posterior_points,
 ) -> Posterior:
@@ -314,26 +314,26 @@ def choose_parameters(
 
     Parameters
     ----------
-    equations : Equations
+    adjustment : Adjustment
     start : sequence of SignalParameters
         As in most_probable.
     points : int
         Number of parameters over which a prediction will be averaged.
     """
-    objective = Objective.of(equations)
+    objective = Objective.of(adjustment)
     ties = 0
-    if equations.ties is not None:
-        ties = len(equations.ties)  # a row each, targets have three
-    if ties + 3 * len(equations.names) <= equations.design.shape[-1]:
+    if adjustment.ties is not None:
+        ties = len(adjustment.ties)  # a row each, targets have three
+    if ties + 3 * len(adjustment.names) <= adjustment.believed(None).shape[1] - 1:
         families = (*FAMILIES, INTEGRATED)
         stated = [objective.parameters(family, objective.initial) for family in families]
         believed = tuple((parameters, 1 / len(families)) for parameters in stated)
         return Posterior(believed, believed)
-    probable = most_probable(equations, start)
+    probable = most_probable(adjustment, start)
     share = np.exp([value - probable[0][1] for _, value in probable])
     chosen = zip([row[0] for row in probable], (share / share.sum()).tolist(), strict=True)
     by_share = tuple(chosen)
-    if max(len(equations.names), ties / 3) > SETTINGS.block:
+    if max(len(adjustment.names), ties / 3) > SETTINGS.block:
         return Posterior(by_share, by_share)  # so many know them well
     drawn = []
     for (parameters, probability), (_, value) in zip(by_share, probable, strict=True):
@@ -362,20 +362,20 @@ def _points(objective, family, mode, covariance, value, probability, pairs):
     return list(zip(chosen, weights[weights > 0].tolist(), strict=True))
 
 
-def _blocks(equations):
+def _blocks(adjustment):
     """The equations in blocks of targets, each with a trend of its own.
 
     A target is in one block with all its passes, which judge each other; they follow each other as
     they were first seen, so that a block is a stretch of the street.
     """
-    number = -(-len(equations.names) // SETTINGS.block)
-    if number <= 1 or equations.ties is not None:  # which may link any two blocks
-        return (equations,)
-    order = np.argsort(equations.observed, kind="stable")
-    _, first, target, counts = np.unique(equations.names[order], True, True, True)
+    number = -(-len(adjustment.names) // SETTINGS.block)
+    if number <= 1 or adjustment.ties is not None:  # which may link any two blocks
+        return (adjustment,)
+    order = np.argsort(adjustment.observed, kind="stable")
+    _, first, target, counts = np.unique(adjustment.names[order], True, True, True)
     before = np.empty(len(first), int)
     rank = np.argsort(first)
     before[rank] = np.cumsum(counts[rank]) - counts[rank]
     block = (before * number // len(order))[target]
-    parts = (equations.select(np.sort(order[block == k])) for k in np.unique(block))
-    return tuple(part.without_outer_fallbacks() for part in parts)
+    parts = (adjustment.select(np.sort(order[block == k])) for k in np.unique(block))
+    return tuple(part.without_outer_steps() for part in parts)

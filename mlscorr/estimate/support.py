@@ -8,10 +8,9 @@ import numpy as np
 
 from mlscorr.collocation import Collocation
 from mlscorr.correction import Correction
-from mlscorr.estimate.equations import Equations
+from mlscorr.estimate.adjustment import Adjustment
 from mlscorr.estimate.settings import SETTINGS
-from mlscorr.estimate.signals import SignalParameters, drift_signals, pose_signals
-from mlscorr.pos import drift_history
+from mlscorr.pos import SignalParameters, drift_history, drift_signals
 from mlscorr.survey import SAME_EPOCH, Trajectory
 
 REASONS = (
@@ -99,13 +98,13 @@ class Support:
 
 
 def find_support(
-    equations: Equations, solved: Collocation, parameters: SignalParameters, corrected: Trajectory
+    adjustment: Adjustment, solved: Collocation, parameters: SignalParameters, corrected: Trajectory
 ) -> Support:
     """What holds a correction along the drive.
 
     Parameters
     ----------
-    equations : Equations
+    adjustment : Adjustment
         Of the control points that took part.
     solved : Collocation
         Of them, under the parameters.
@@ -114,12 +113,12 @@ def find_support(
     corrected : Trajectory
         With its sigmas.
     """
-    is_drifting = _is_drifting(equations, parameters)
-    codes = _reasons(equations, solved, parameters, corrected, is_drifting)
-    history = equations.stated.history
-    starts = equations.stated.starts
+    is_drifting = _is_drifting(adjustment, parameters)
+    codes = _reasons(adjustment, solved, parameters, corrected, is_drifting)
+    history = adjustment.errors.history
+    starts = adjustment.errors.starts
     ends_by_step = np.isin(history.edges[1:], history.steps.middle)
-    drifting = equations.trajectory.gps_time[is_drifting]
+    drifting = adjustment.trajectory.gps_time[is_drifting]
     epochs = [np.searchsorted(drifting, times) for times in (starts, history.edges[1:])]
     # a start without a fall-back behind it may be set off by the noise of GNSS
     shown = ends_by_step | (history.is_stated & (epochs[1] > epochs[0]))
@@ -134,7 +133,7 @@ def find_support(
     )
 
 
-def _reasons(equations, solved, parameters, corrected, is_drifting):
+def _reasons(adjustment, solved, parameters, corrected, is_drifting):
     """Number of the reason (n,) why each epoch of the trajectory is extrapolated; HELD where not.
 
     No control holds an epoch before the first or past the last control point of its pass, nor
@@ -146,17 +145,17 @@ def _reasons(equations, solved, parameters, corrected, is_drifting):
     that of its control. Where ties hold the passes together, a control point holds both, and the
     variance alone decides.
     """
-    trajectory = equations.trajectory
-    stated = equations.stated_epochs
+    trajectory = adjustment.trajectory
+    stated = adjustment.errors.epochs
     time = trajectory.gps_time
-    control = np.sort(equations.observed)
+    control = np.sort(adjustment.observed)
     if len(control) == 0:
         return np.full(len(time), NO_CONTROL)
-    is_open = is_drifting & _is_drift_open(equations, solved, parameters, corrected)
+    is_open = is_drifting & _is_drift_open(adjustment, solved, parameters, corrected)
     codes = np.where(is_open, DRIFT, HELD)
-    if equations.ties is not None:
+    if adjustment.ties is not None:
         return codes
-    for first, last in pairwise(equations.stated.history.edges):
+    for first, last in pairwise(adjustment.errors.history.edges):
         rows = (time > first) & (time <= last) & (stated.since > 0) & (stated.ahead == 1)
         inside = control[(control > first) & (control <= last)]
         codes[rows & (time > inside.max(initial=-np.inf) + SAME_EPOCH)] = IN_OUTAGE
@@ -174,17 +173,16 @@ def _reasons(equations, solved, parameters, corrected, is_drifting):
     return codes
 
 
-def _is_drift_open(equations, solved, parameters, corrected):
+def _is_drift_open(adjustment, solved, parameters, corrected):
     """Where (n,) control tells less than half of a drift's variance.
 
     Nor of the whole position error's: drift and a slow bias may stand for each other, so that
     neither is known where their sum is.
     """
-    time = equations.trajectory.gps_time
-    stated = equations.stated_epochs
-    signals = pose_signals(stated, parameters, np.broadcast_to(np.eye(6), (len(time), 6, 6)))
+    time = adjustment.trajectory.gps_time
+    signals = adjustment.errors.pose_signals(parameters)
     mixings = [signal.mixing for signal in signals]
-    trend = equations.pose_design(time)
+    trend = adjustment.pose_design(time)
     parts = parameters.trend_sigma * trend, *mixings
     whole = sum((part[:, :3] ** 2).sum(axis=(1, 2)) for part in parts)
     is_open = (corrected.position_sigma**2).sum(axis=1) > SETTINGS.determined_ratio * whole
@@ -197,12 +195,11 @@ def _is_drift_open(equations, solved, parameters, corrected):
     return is_open & (after > SETTINGS.determined_ratio * before)
 
 
-def _is_drifting(equations, parameters):
+def _is_drifting(adjustment, parameters):
     """Where (n,) the drift that may have come since it began is larger than the noise of GNSS."""
-    stated = equations.stated_epochs
-    partials = np.broadcast_to(np.eye(3, 6), (len(stated.gps_time), 3, 6))
-    drift = pose_signals(stated, parameters, partials)[: drift_signals(parameters)]
-    size = sum((signal.mixing**2).sum(axis=(1, 2)) for signal in drift)
+    stated = adjustment.errors.epochs
+    drift = adjustment.errors.pose_signals(parameters)[: drift_signals(parameters)]
+    size = sum((signal.mixing[:, :3] ** 2).sum(axis=(1, 2)) for signal in drift)
     return size > (stated.gnss**2).sum(axis=1)
 
 

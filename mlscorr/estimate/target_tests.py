@@ -16,7 +16,7 @@ import numpy as np
 from scipy.special import chdtri, ndtri
 
 from mlscorr.collocation import INTEGRATED, Collocation
-from mlscorr.estimate.equations import Equations
+from mlscorr.estimate.adjustment import Adjustment
 from mlscorr.estimate.posterior import Objective, Posterior, choose_parameters, most_probable
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.survey import Statement
@@ -66,65 +66,65 @@ class TargetTest:
 
 
 def all_tests(
-    equations: Equations, posterior: Posterior, visit: Callable | None = None
+    adjustment: Adjustment, posterior: Posterior, visit: Callable | None = None
 ) -> list[TargetTest]:
     """TargetTest of each target by all others.
 
     Parameters
     ----------
-    equations : Equations
+    adjustment : Adjustment
     posterior : Posterior
         Of the parameters, by these equations.
     visit : function of SignalParameters and a Collocation, optional
         Called with each solution of these equations while it is held, for what else it tells.
     """
     tests = []
-    targets = len(equations.target_rows)
-    for block in Objective.of(equations).blocks:
-        if len(block.names) < len(equations.names):  # visitors want whole solutions
+    targets = len(adjustment.target_rows)
+    for block in Objective.of(adjustment).blocks:
+        if len(block.names) < len(adjustment.names):  # visitors want whole solutions
             visit = None
         tests += _tests(block, block.target_rows, posterior, targets, visit)
     return tests
 
 
-def single_test(equations: Equations, name: str, posterior: Posterior) -> TargetTest:
+def single_test(adjustment: Adjustment, name: str, posterior: Posterior) -> TargetTest:
     """TargetTest of one target by all others.
 
     Parameters
     ----------
-    equations : Equations
+    adjustment : Adjustment
         This target's among them.
     name : str
     posterior : Posterior
         Of the parameters, by the others.
     """
-    block = next(block for block in Objective.of(equations).blocks if name in block.names)
-    return _tests(block, [name], posterior, len(equations.target_rows))[0]
+    block = next(block for block in Objective.of(adjustment).blocks if name in block.names)
+    return _tests(block, [name], posterior, len(adjustment.target_rows))[0]
 
 
-def _tests(equations, names, posterior, targets, visit=None):
+def _tests(adjustment, names, posterior, targets, visit=None):
     """TargetTests of some targets, by a Collocation after the other: many would fill the memory."""
     left_out = {name: [] for name in names}
     # targets of several passes first: sparse rows part with the factor that these need for the
     # inverse, which those of one pass need, and the visitor
-    largest_first = sorted(names, key=lambda name: -len(equations.target_rows[name]))
+    largest_first = sorted(names, key=lambda name: -len(adjustment.target_rows[name]))
     for chosen, weight in reversed(posterior.mixture):  # a visitor may keep the most probable
-        solved = equations.solve(chosen)
+        solved = adjustment.solve(chosen)
         for name in largest_first:
-            left_out[name].append((weight, *solved.leave_out(equations.target_rows[name])))
+            left_out[name].append((weight, *solved.leave_out(adjustment.target_rows[name])))
         if visit is not None:
             visit(chosen, solved)
         del solved  # before the next one takes as much
-    return [_test(equations, name, parts[::-1], targets) for name, parts in left_out.items()]
+    return [_test(adjustment, name, parts[::-1], targets) for name, parts in left_out.items()]
 
 
-def _test(equations, name, left_out, targets):
+def _test(adjustment, name, left_out, targets):
     """TargetTest by the left-out misclosure, averaged over the parameters.
 
     What the parameters leave open is a part of its covariance, so that neither a mode that is too
     sure of itself decides nor one that the target itself has raised.
     """
-    rows = equations.target_rows[name]
+    rows = adjustment.target_rows[name]
     critical = float(chdtri(len(rows), SETTINGS.significance / targets))
     mean = 0.0
     square = 0.0
@@ -132,7 +132,7 @@ def _test(equations, name, left_out, targets):
         mean = mean + weight * residual
         square = square + weight * (covariance + np.outer(residual, residual))
     covariance = square - np.outer(mean, mean)
-    redundancy = np.diag(equations.noise.block(rows) @ np.linalg.inv(covariance))
+    redundancy = np.diag(adjustment.targets.noise.block(rows) @ np.linalg.inv(covariance))
     statistic = float(mean @ np.linalg.solve(covariance, mean))
     parts = (mean, np.sqrt(np.diag(covariance)), redundancy)
     return TargetTest(name, statistic, critical, *(part.reshape(-1, 3) for part in parts))
@@ -185,33 +185,33 @@ class Screening:
     warnings: tuple[Statement, ...]
 
     @classmethod
-    def believed(cls, equations: Equations) -> Screening:
+    def believed(cls, adjustment: Adjustment) -> Screening:
         """Nothing screened: the parameters are those that are believed before any target."""
-        objective = Objective.of(equations)
+        objective = Objective.of(adjustment)
         mode = ((objective.parameters(INTEGRATED, objective.initial), 1.0),)
         return cls(Posterior(mode, mode), (), (), ())
 
 
-def screen(equations: Equations) -> Screening:
+def screen(adjustment: Adjustment) -> Screening:
     """Find gross errors among targets, and what the others say of them.
 
     Parameters
     ----------
-    equations : Equations
+    adjustment : Adjustment
     """
-    out, start = _search(equations)
+    out, start = _search(adjustment)
     tried = []
     while True:
-        kept = equations.without(out)
+        kept = adjustment.without(out)
         posterior = choose_parameters(kept, start)
         start = [chosen for chosen, _ in posterior.modes]
         tests = all_tests(kept, posterior)
-        rejected = [single_test(equations.without(out - {name}), name, posterior) for name in out]
+        rejected = [single_test(adjustment.without(out - {name}), name, posterior) for name in out]
         back = {test.name for test in rejected if test.excess <= 1.0}
         worst = max(tests, key=lambda test: test.excess)
         tried.append(out)
         changed = out - back
-        if not back and worst.excess > 1.0 and may_go(equations, out | {worst.name}):
+        if not back and worst.excess > 1.0 and may_go(adjustment, out | {worst.name}):
             changed = out | {worst.name}
         if changed in tried:
             break
@@ -220,26 +220,26 @@ def screen(equations: Equations) -> Screening:
         posterior,
         tuple(sorted(rejected, key=lambda test: -test.excess)),
         tuple(tests),
-        (*_rejected_groups(equations, rejected), *_doubtful_pairs(kept, posterior)),
+        (*_rejected_groups(adjustment, rejected), *_doubtful_pairs(kept, posterior)),
     )
 
 
-def may_go(equations: Equations, names: Collection[str]) -> bool:
+def may_go(adjustment: Adjustment, names: Collection[str]) -> bool:
     """Whether so many targets may be wrong, and enough are left.
 
     Parameters
     ----------
-    equations : Equations
+    adjustment : Adjustment
     names : collection of str
     """
-    total = len(equations.target_rows)
+    total = len(adjustment.target_rows)
     return (
         len(names) <= SETTINGS.breakdown * total
         and total - len(names) >= SETTINGS.screened_targets - 1
     )
 
 
-def _search(equations):
+def _search(adjustment):
     """Names of the most probable set of wrong targets, and each family's SignalParameters.
 
     Large surveys are searched in blocks.
@@ -247,9 +247,9 @@ def _search(equations):
     best = frozenset()
     modes = ()
     for _ in range(SETTINGS.rounds):
-        modes = [chosen for chosen, _ in most_probable(equations.without(best), modes)]
+        modes = [chosen for chosen, _ in most_probable(adjustment.without(best), modes)]
         names = frozenset()
-        for block in Objective.of(equations).blocks:
+        for block in Objective.of(adjustment).blocks:
             scores = _scores(block, modes)
             names |= max(scores, key=scores.get)
         if names == best:
@@ -258,12 +258,12 @@ def _search(equations):
     return best, modes
 
 
-def _scores(equations, modes):
+def _scores(adjustment, modes):
     """Log posterior of sets of wrong targets, each under the parameters that suit it best."""
-    objective = Objective.of(equations)
+    objective = Objective.of(adjustment)
     scores = {}
     for parameters in _shrunk(modes):
-        for names, score in _eliminate(equations, parameters, objective):
+        for names, score in _eliminate(adjustment, parameters, objective):
             scores[names] = max(score, scores.get(names, -np.inf))
     return scores
 
@@ -276,13 +276,13 @@ def _shrunk(modes):
             yield replace(mode, **{name: factor * getattr(mode, name) for name in scales})
 
 
-def _eliminate(equations, parameters, objective):
+def _eliminate(adjustment, parameters, objective):
     """Sets of wrong targets, growing by the most unlikely one, with their log posteriors."""
     names = frozenset()
     score = objective(parameters.family, objective.logarithms(parameters))
     yield names, score
-    while may_go(equations, names | {""}):
-        kept = equations.without(names)
+    while may_go(adjustment, names | {""}):
+        kept = adjustment.without(names)
         gains = _gains(kept.solve(parameters), kept.target_rows)
         worst = max(gains, key=gains.get)
         if gains[worst] < -np.log(SETTINGS.strong_evidence):
@@ -298,28 +298,28 @@ def _gains(solved, rows_of):
     return {name: gain + odds for name, gain in gross_evidence(solved, rows_of).items()}
 
 
-def _rejected_groups(equations, rejected):
+def _rejected_groups(adjustment, rejected):
     """A Statement on each two neighbours in time that were rejected and agree in direction."""
     ways = {test.name: test.left_out.mean(axis=0) for test in rejected}
-    for first, other in _neighbours(equations):
+    for first, other in _neighbours(adjustment):
         if first in ways and other in ways and _agree(ways[first], ways[other]):
             misclosures = ways[first].tolist(), ways[other].tolist()
             values = {"names": (first, other), "misclosures": misclosures}
             yield Statement("neighbours rejected", "warning", values)
 
 
-def _doubtful_pairs(equations, posterior):
+def _doubtful_pairs(adjustment, posterior):
     """A Statement on the two neighbours in time that may be wrong together, or tell of drift.
 
     Both readings are weighed, each under the parameters that suit it best.
     """
-    if not may_go(equations, {"", " "}):
+    if not may_go(adjustment, {"", " "}):
         return
     modes = [chosen for chosen, _ in posterior.modes]
     none = -np.inf
     pairs = {}
     ways = {}
-    for block in Objective.of(equations).blocks:
+    for block in Objective.of(adjustment).blocks:
         objective = Objective.of(block)
         rows = block.target_rows
         for parameters in _shrunk(modes):
@@ -346,10 +346,10 @@ def _doubtful_pairs(equations, posterior):
     yield Statement("neighbours kept", "warning", {"names": pair, "misclosures": misclosures})
 
 
-def _neighbours(equations):
+def _neighbours(adjustment):
     """Names of targets that follow each other in time."""
     names = list(
-        dict.fromkeys(equations.names[np.argsort(equations.observed, kind="stable")].tolist())
+        dict.fromkeys(adjustment.names[np.argsort(adjustment.observed, kind="stable")].tolist())
     )
     return list(pairwise(names))
 

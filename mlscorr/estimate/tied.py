@@ -17,13 +17,13 @@ from scipy.special import ndtri
 from mlscorr.collocation import INTEGRATED, Collocation, reweight
 from mlscorr.correction import Correction, increments_by_scanner
 from mlscorr.estimate._prediction import GridPredictions
-from mlscorr.estimate._tie_equations import TieEquations
-from mlscorr.estimate.equations import Equations
+from mlscorr.estimate.adjustment import Adjustment
+from mlscorr.estimate.factors import TIE, Factor
 from mlscorr.estimate.outages import with_likely_starts
 from mlscorr.estimate.posterior import Objective, Posterior, choose_parameters
 from mlscorr.estimate.settings import SETTINGS
-from mlscorr.estimate.signals import SignalParameters
 from mlscorr.estimate.target_tests import Screening, all_tests, may_go
+from mlscorr.pos import SignalParameters
 from mlscorr.survey import Statement, Ties
 
 MEDIAN = float(ndtri(0.75))  # of the absolute value of a standard normal variable
@@ -93,49 +93,46 @@ class Tied:
 
     Parameters
     ----------
-    equations : Equations
+    adjustment : Adjustment
     posterior : Posterior
         Of the parameters, by both.
     used : (n,) bool array
         Which of the ties hold.
     """
 
-    equations: Equations
+    adjustment: Adjustment
     posterior: Posterior
     used: np.ndarray
 
 
-def add_ties(equations: Equations, parameters: SignalParameters, ties: TieEquations) -> Tied:
-    """The equations with the ties that hold, and the parameters that both choose.
+def add_ties(tied: Adjustment, parameters: SignalParameters) -> Tied:
+    """The ties that hold beside the control points, and the parameters that both choose.
 
     Parameters
     ----------
-    equations : Equations
-        Of the control points.
+    tied : Adjustment
+        With all ties.
     parameters : SignalParameters
-        That these chose.
-    ties : TieEquations
+        That the control points chose.
     """
-    weighed = robust_ties(equations, parameters, ties)
-    tied = weighed.equations
+    weighed = robust_ties(tied, parameters)
+    tied = weighed.adjustment
     parameters = weighed.parameters
-    tied = tied.with_starts(with_likely_starts(sample(tied))[0].stated.starts)
-    rows = tied.ties
+    tied = tied.with_starts(with_likely_starts(sample(tied))[0].errors.starts)
     objective = Objective.of(sample(tied))
     at, _ = objective.maximum(parameters.family, objective.logarithms(parameters))
     parameters = objective.parameters(parameters.family, at)  # the weights of the ties stay
     weighed = solved_ties(tied, parameters).graded((student,))
-    tied = weighed.equations
+    tied = weighed.adjustment
     ratio = np.abs(weighed.ratio)
     factor = float(np.clip(np.median(ratio) / MEDIAN, 1.0, SETTINGS.tie_cut))
     used = ratio <= SETTINGS.tie_cut * factor
-    kept = replace(rows, variance=factor**2 * rows.variance, weight=np.ones(len(rows)))
-    tied = replace(tied, ties=kept.select(used))
+    tied = tied.with_factor(tied.ties.scaled(factor**2).select(used))
     return Tied(tied, choose_parameters(sample(tied), (parameters,), SETTINGS.tie_points), used)
 
 
 def screen_with_ties(
-    equations: Equations, screening: Screening, ties: TieEquations
+    adjustment: Adjustment, screening: Screening
 ) -> tuple[GridPredictions, Screening, np.ndarray]:
     """Equations with ties and what they predict, what both say of control, which ties hold (n,).
 
@@ -143,24 +140,24 @@ def screen_with_ties(
 
     Parameters
     ----------
-    equations : Equations
-        Of the control points that the others don't contradict.
+    adjustment : Adjustment
+        Of the control points that the others don't contradict, with all ties.
     screening : Screening
-        Of these.
-    ties : TieEquations
+        Of these points.
     """
     parameters = screening.posterior.modes[0][0]
-    kept = equations
+    kept = adjustment
     rejected = []
-    untied = GridPredictions(equations), screening, np.zeros(len(ties), dtype=bool)
+    bare = GridPredictions(adjustment.without_kind(TIE))
+    untied = bare, screening, np.zeros(len(adjustment.ties), dtype=bool)
     while True:
-        tied = add_ties(kept, parameters, ties)
+        tied = add_ties(kept, parameters)
         if tied.used.mean() < SETTINGS.tie_majority:
             return untied
-        predictions = GridPredictions(tied.equations, mode=tied.posterior.modes[0][0])
-        tests = all_tests(tied.equations, tied.posterior, predictions.add)
+        predictions = GridPredictions(tied.adjustment, mode=tied.posterior.modes[0][0])
+        tests = all_tests(tied.adjustment, tied.posterior, predictions.add)
         doubtful = sorted((t for t in tests if t.excess > 1.0), key=lambda t: -t.excess)
-        if not doubtful or not may_go(equations, {t.name for t in (*rejected, doubtful[0])}):
+        if not doubtful or not may_go(adjustment, {t.name for t in (*rejected, doubtful[0])}):
             break
         rejected.append(doubtful[0])
         kept = kept.without({doubtful[0].name})
@@ -187,7 +184,7 @@ def _contradiction(test, is_used):
     return Statement("contradicts ties", "warning", values)
 
 
-def sample(tied: Equations) -> Equations:
+def sample(tied: Adjustment) -> Adjustment:
     """The equations with as many of the ties as are needed to choose parameters.
 
     Three for each two of the believed intervals that any view falls into: then each has a view
@@ -196,14 +193,15 @@ def sample(tied: Equations) -> Equations:
 
     Parameters
     ----------
-    tied : Equations
+    tied : Adjustment
         With ties.
     """
     since = tied.ties.gps_time - tied.ties.gps_time.min(initial=np.inf)
     intervals = len(np.unique(np.floor(since / tied.interval)))
-    number = min(3 * intervals // 2, SETTINGS.dense_rows - tied.misclosure.size)
+    others = sum(f.misclosure.size for f in tied.observing if f.kind != TIE)
+    number = min(3 * intervals // 2, SETTINGS.dense_rows - others)
     step = -(-len(tied.ties) // max(number, SETTINGS.tie_sample))
-    return replace(tied, ties=tied.ties.select(slice(None, None, step)))
+    return tied.with_factor(tied.ties.select(slice(None, None, step)))
 
 
 @dataclass(frozen=True)
@@ -212,33 +210,37 @@ class WeighedTies:
 
     Parameters
     ----------
-    equations : Equations
+    adjustment : Adjustment
         With ties.
     parameters : SignalParameters
     solved : Collocation
         By both.
-    first : (n,) array
-        Weights of the ties when the equations were solved first; others are put beside these.
     """
 
-    equations: Equations
+    adjustment: Adjustment
     parameters: SignalParameters
     solved: Collocation
-    first: np.ndarray
 
     @property
-    def ties(self) -> TieEquations:
+    def ties(self) -> Factor:
         """The ties with their weights."""
-        ties = self.equations.ties
+        ties = self.adjustment.ties
         assert ties is not None
         return ties
 
     @property
+    def weight(self) -> np.ndarray:
+        """Weights (n,) of the ties."""
+        if self.ties.weight is None:
+            return np.ones(len(self.ties))
+        return self.ties.weight
+
+    @property
     def ratio(self) -> np.ndarray:
         """Residuals (n,) of the ties over their sigmas."""
-        variance = self.ties.variance / self.ties.weight
-        residual = variance * self.solved.weights[-len(self.ties) :]  # N V^-1 (l - A x)
-        return residual / np.sqrt(self.ties.variance)
+        variance = self.ties.variance[:, 0]
+        weights = self.solved.weights[self.adjustment.rows_of(TIE)]
+        return np.sqrt(variance) / self.weight * weights  # N V^-1 (l - A x), over its sigma
 
     def graded(self, functions: Iterable[Callable]) -> WeighedTies:
         """With weights by each function of the residuals in turn.
@@ -251,34 +253,34 @@ class WeighedTies:
         weighed = self
         for function in functions:
             weight = np.maximum(function(weighed.ratio), SETTINGS.resolution)
-            tied = replace(weighed.equations, ties=replace(weighed.ties, weight=weight))
-            both = [np.ones(len(tied.gps_time)), weight / self.first]
-            weighed = replace(weighed, equations=tied, solved=reweight(weighed.solved, both))
+            tied = weighed.adjustment.with_factor(replace(weighed.ties, weight=weight))
+            relative = [
+                weight / self.weight if factor.kind == TIE else np.ones(len(factor))
+                for factor in tied.observing
+            ]
+            weighed = replace(weighed, adjustment=tied, solved=reweight(weighed.solved, relative))
         return weighed
 
 
-def robust_ties(
-    equations: Equations, parameters: SignalParameters, ties: TieEquations
-) -> WeighedTies:
-    """The equations with graduated weights of ties, under those parameters by which more hold.
+def robust_ties(tied: Adjustment, parameters: SignalParameters) -> WeighedTies:
+    """Graduated weights of ties, under those parameters by which more hold.
 
     Few control points may choose drift that is too slow or too small; then ties that agree with
     each other contradict it. So they are also weighed by what is believed without control.
 
     Parameters
     ----------
-    equations : Equations
-        Of the control points.
+    tied : Adjustment
+        With ties.
     parameters : SignalParameters
-        That these chose.
-    ties : TieEquations
+        That the control points chose.
     """
-    weighed = graduated(equations, parameters, ties)
+    weighed = graduated(tied, parameters)
     held = _held(weighed)
-    if held == len(ties):
+    if held == len(weighed.ties):
         return weighed
-    prior = Objective((), weighed.equations.prior(weighed.equations))
-    other = graduated(equations, prior.parameters(INTEGRATED, prior.initial), ties)
+    prior = Objective((), tied.prior(tied))
+    other = graduated(tied, prior.parameters(INTEGRATED, prior.initial))
     if _held(other) > held:
         return other
     return weighed
@@ -287,38 +289,35 @@ def robust_ties(
 def _held(weighed):
     """Number of ties that hold."""
     least = _geman_mcclure(SETTINGS.tie_cut)(SETTINGS.tie_cut)
-    return np.count_nonzero(weighed.ties.weight > least)
+    return np.count_nonzero(weighed.weight > least)
 
 
-def graduated(
-    equations: Equations, parameters: SignalParameters, ties: TieEquations
-) -> WeighedTies:
-    """The equations with ties, whose weights' scale has shrunk from all to the honest ones.
+def graduated(tied: Adjustment, parameters: SignalParameters) -> WeighedTies:
+    """Weights of ties whose scale has shrunk from all to the honest ones.
 
     Parameters
     ----------
-    equations : Equations
-        Without ties.
+    tied : Adjustment
+        With ties.
     parameters : SignalParameters
-    ties : TieEquations
     """
-    weighed = solved_ties(replace(equations, ties=ties), parameters)
+    weighed = solved_ties(tied, parameters)
     largest = float(np.abs(weighed.ratio).max(initial=0.0))
     steps = max(int(np.ceil(np.log2(max(largest, 1.0) / SETTINGS.tie_cut))), 1)
     scales = SETTINGS.tie_cut * 2.0 ** np.arange(steps)[::-1]
     return weighed.graded(_geman_mcclure(scale) for scale in scales)
 
 
-def solved_ties(tied: Equations, parameters: SignalParameters) -> WeighedTies:
-    """Equations with ties, solved as they are.
+def solved_ties(tied: Adjustment, parameters: SignalParameters) -> WeighedTies:
+    """The adjustment with ties, solved as it is.
 
     Parameters
     ----------
-    tied : Equations
+    tied : Adjustment
     parameters : SignalParameters
     """
     assert tied.ties is not None
-    return WeighedTies(tied, parameters, tied.solve(parameters), tied.ties.weight)
+    return WeighedTies(tied, parameters, tied.solve(parameters))
 
 
 def _geman_mcclure(scale: float) -> Callable:

@@ -24,20 +24,19 @@ from threadpoolctl import threadpool_limits
 from mlscorr.collocation import FAMILIES, INTEGRATED
 from mlscorr.estimate import SETTINGS as ESTIMATE
 from mlscorr.estimate import (
-    Equations,
+    TARGET,
+    Adjustment,
     Objective,
-    SignalParameters,
     filled_sigmas,
-    position_equations,
+    position_adjustment,
     position_prior,
     with_drift_history,
-    with_mountings,
 )
 from mlscorr.evaluate._settings import SETTINGS
 from mlscorr.evaluate.wording import DATUM
 from mlscorr.io.trajectories import MapFactors, map_factors
 from mlscorr.matching import SETTINGS as MATCHING
-from mlscorr.pos import stated_sigma
+from mlscorr.pos import SignalParameters, stated_sigma
 from mlscorr.survey import Matched, Pos, Statement, Trajectory
 
 SHIFT, HEIGHT, SCALE, TURN, TILT = TERMS = ("shift", "height", "scale", "turn", "tilt")
@@ -199,11 +198,11 @@ def linear_columns(place: np.ndarray) -> np.ndarray:
 @threadpool_limits.wrap(limits=1, user_api="blas")
 def _linear_terms(control, trajectory, pos):
     """(term, size, sigma, log evidence) of each linear term in the most probable set of them."""
-    equations = position_equations(trajectory, control, pos, ESTIMATE.order, position_prior)
-    equations = with_drift_history(equations)
+    adjustment = position_adjustment(trajectory, control, pos, ESTIMATE.order, position_prior)
+    adjustment = with_drift_history(adjustment)
     columns = linear_columns(control.surveyed.position)
     prior = np.array([SETTINGS.datum_scale, SETTINGS.datum_turn, *2 * [SETTINGS.datum_tilt]])
-    evidence = _Evidence(equations, columns, prior)
+    evidence = _Evidence(adjustment, columns, prior)
     best = max(SETS, key=evidence.of)
     terms = []
     for term in best:
@@ -224,20 +223,18 @@ class _Evidence:
 
     Parameters
     ----------
-    equations : Equations
+    adjustment : Adjustment
     columns : (n, 3, k) array
         M, of the n observations.
     prior : (k,) array
         D, one sigma of each coefficient.
     """
 
-    def __init__(self, equations: Equations, columns: np.ndarray, prior: np.ndarray):
+    def __init__(self, adjustment: Adjustment, columns: np.ndarray, prior: np.ndarray):
         self.prior = prior
-        everything = with_mountings(equations, *_padded(columns, prior))
-        rows = np.zeros((len(equations.gps_time), *columns.shape[1:]))
-        rows[: len(columns)] = columns
-        matrix = rows.reshape(-1, columns.shape[2])
-        objective = Objective.of(equations)
+        everything = adjustment.with_unknowns({TARGET: columns}, np.zeros(len(prior)), prior)
+        matrix = adjustment.stacked({TARGET: columns})
+        objective = Objective.of(adjustment)
         complete = Objective.of(everything)
         self.modes = []  # (family, log posterior without terms, N, r)
         for family in (*FAMILIES, INTEGRATED):
@@ -247,7 +244,7 @@ class _Evidence:
             for logarithms in (plain, beside):
                 value = objective(family, logarithms)
                 parameters = objective.parameters(family, logarithms)
-                self.modes.append((family, value, *_normal(equations, parameters, matrix)))
+                self.modes.append((family, value, *_normal(adjustment, parameters, matrix)))
 
     def of(self, terms: Iterable[str]) -> float:
         """Log evidence of a set of terms, but for a constant.
@@ -290,20 +287,13 @@ class _Evidence:
         return numbers, covariance, covariance @ right[numbers]
 
 
-def _padded(columns, prior):
-    """Columns, misclosures and sigmas as with_mountings takes them: three to each epoch."""
-    lacking = -len(prior) % 3
-    padding = np.zeros((*columns.shape[:2], lacking))
-    sigma = np.append(prior, np.ones(lacking))
-    return np.concatenate([columns, padding], axis=2), np.zeros(len(sigma)), sigma
-
-
-def _normal(equations: Equations, parameters: SignalParameters, matrix: np.ndarray):
+def _normal(adjustment: Adjustment, parameters: SignalParameters, matrix: np.ndarray):
     """N = M'P M and r = M'P l, where P leaves out the trend."""
-    solved = equations.solve(parameters)
+    solved = adjustment.solve(parameters)
     white = solved.solver.whiten(np.column_stack([solved.design, matrix, solved.misclosure]))
+    known = solved.design.shape[1]
     believed = np.zeros((len(solved.believed), white.shape[1]))
-    believed[:, : solved.design.shape[1]] = solved.believed
+    believed[:, :known] = solved.believed[:, :known]
     white = np.vstack([white, believed])
     trend, rest = np.split(white, [solved.design.shape[1]], axis=1)
     basis = np.linalg.qr(trend)[0]

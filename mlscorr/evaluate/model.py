@@ -71,7 +71,7 @@ def _observations(estimate):
     """What the parameters were chosen by."""
     if estimate.ties is None or not estimate.ties.used.any():
         return "the control points"
-    if len(estimate.equations.names):
+    if len(estimate.adjustment.names):
         return "control points and ties"
     return "ties"
 

@@ -200,7 +200,7 @@ def estimate_together(
         return replace(estimate, untied=LEFT_OUT)
     estimate = tie_passes(survey, estimate, features)
     wrong = ()  # of mountings, where the ties tell of it
-    if estimate.equations.mounting is not None:
+    if estimate.adjustment.unknowns:
         wrong = tuple(scanner_warnings(estimate, list(survey.by_scanner)))
     if not wrong and None not in survey.mountings:  # all of them may be wrong alike
         error = find_mounting_error(estimate, control, survey.mountings)

@@ -7,7 +7,9 @@ within moments, by a step that no vehicle drives. Across it drift starts anew, a
 the drift had grown to.
 """
 
+from mlscorr.pos.errors import PosErrors
 from mlscorr.pos.history import drift_history, runs
 from mlscorr.pos.settings import SETTINGS
+from mlscorr.pos.signals import SignalParameters, drift_signals, pose_signals
 from mlscorr.pos.stated import StatedSigma, stated_sigma
 from mlscorr.pos.steps import Steps, find_steps

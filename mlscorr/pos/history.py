@@ -8,7 +8,6 @@ sigma(t) states is taken free of the noise of epochs.
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from weakref import WeakValueDictionary
 
 import numpy as np
 from scipy.ndimage import median_filter
@@ -159,17 +158,14 @@ class DriftHistory:
 
 
 def drift_history(trajectory: Trajectory) -> DriftHistory:
-    """The history of a trajectory, worked out once as long as somebody holds it.
+    """The history of a trajectory, worked out once.
 
     Parameters
     ----------
     trajectory : Trajectory
         As recorded, as a whole.
     """
-    history = _KNOWN.get(id(trajectory))
-    if history is None or history.trajectory is not trajectory:
-        history = _KNOWN[id(trajectory)] = _history(trajectory)
-    return history
+    return trajectory.derived(_history)
 
 
 def _history(trajectory):
@@ -403,6 +399,3 @@ def _pairs(times, others):
     limit = np.minimum(away[:, 1], np.append(back[:, 1], 0.0)[number[:, 0]]) / 2  # 0: no others
     rows = np.flatnonzero(away[:, 0] < np.minimum(limit, SETTINGS.change_interval))
     return np.column_stack([rows, number[rows, 0]])
-
-
-_KNOWN: WeakValueDictionary[int, DriftHistory] = WeakValueDictionary()

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
+Result = TypeVar("Result")
 ANGLES = ("roll", "pitch", "heading")
 GAP_FACTOR = 10.0  # a step longer than ten median steps is a gap
 SAME_EPOCH = 1.0  # s; closer together, two targets say the same of the POS
@@ -192,6 +193,25 @@ class Trajectory(Summary):
         if self.weeks is None:
             return self.gps_time
         return self.gps_time - WEEK * self.weeks
+
+    def derived(self, function: Callable[[Trajectory], Result]) -> Result:
+        """What a function makes of this trajectory, worked out once: a trajectory never changes.
+
+        Parameters
+        ----------
+        function : function of a Trajectory
+        """
+        if function not in self._derived:
+            self._derived[function] = function(self)
+        return self._derived[function]
+
+    @cached_property
+    def _derived(self):
+        return {}
+
+    def __getstate__(self):
+        """Its fields alone: whoever unpickles it works out anew what follows from them."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @cached_property
     def gaps(self) -> np.ndarray:

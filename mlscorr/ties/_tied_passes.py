@@ -107,7 +107,7 @@ def _noted(sentence):
 
 def _unheld(estimate: Estimate, features: TieFeatures, ties: Ties) -> Iterator[Statement]:
     """Statements on passes between which neither ties nor control of both hold a direction."""
-    control = estimate.equations.observed
+    control = estimate.adjustment.observed
     first, last = time_spans(features.pass_number, features.gps_time)
 
     for part, axis in unheld_directions(ties):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mlscorr.estimate import estimate_correction, position_equations, position_prior
+from mlscorr.estimate import estimate_correction, position_adjustment, position_prior
 from mlscorr.frames import attitude_from_angles
 from mlscorr.survey import Matched, Pos, Trajectory
 from tests.beds.discs import observed_discs, surveyed_discs
@@ -59,8 +59,8 @@ class Case:
     def matched(self):
         return Matched.by_name(self.observations, self.control)
 
-    def equations(self, order=0):
-        return position_equations(self.recorded, self.matched, Pos(), order, position_prior)
+    def adjustment(self, order=0):
+        return position_adjustment(self.recorded, self.matched, Pos(), order, position_prior)
 
     def remaining(self, estimate):
         "True - corrected position (n, 3) at every epoch, m"

@@ -14,17 +14,17 @@ def small_case():
 
 
 @pytest.fixture(scope="session")
-def equations(small_case):
+def adjustment(small_case):
     "Its equations with a trend of order 1"
-    return small_case.equations(order=1)
+    return small_case.adjustment(order=1)
 
 
 @pytest.fixture(scope="session")
-def objective(equations):
-    return Objective.of(equations)
+def objective(adjustment):
+    return Objective.of(adjustment)
 
 
 @pytest.fixture(scope="session")
-def posterior(equations):
+def posterior(adjustment):
     "Of its parameters, by eight points or a few more"
-    return choose_parameters(equations, points=8)
+    return choose_parameters(adjustment, points=8)

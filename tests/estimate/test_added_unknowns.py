@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mlscorr.estimate import estimate_correction
-from mlscorr.estimate._tie_equations import TieEquations
+from mlscorr.estimate._tied_adjustment import TieEquations
 from mlscorr.estimate.added_unknowns import AddedUnknowns, with_added
 from tests.beds.tied_passes import tied_passes
 
@@ -16,23 +16,23 @@ def tied():
     "Equations of control and ties, and parameters"
     survey = tied_passes(1, number=60)
     alone = estimate_correction(survey.trajectory, survey.matched)
-    equations = alone.equations
-    rows = TieEquations.of(survey.trajectory, equations.pos, survey.ties, equations.stated)
-    return replace(equations, ties=rows), alone.parameters
+    adjustment = alone.adjustment
+    rows = TieEquations.of(survey.trajectory, adjustment.pos, survey.ties, adjustment.stated)
+    return replace(adjustment, ties=rows), alone.parameters
 
 
-def columns_of(equations, seed):
+def columns_of(adjustment, seed):
     "Two columns at random"
-    rows = equations.misclosure.size + len(equations.ties)
+    rows = adjustment.misclosure.size + len(adjustment.ties)
     return np.random.default_rng(seed).standard_normal((rows, 2))
 
 
 def test_what_was_added_to_the_misclosures_is_found(tied):
     "Columns times known sizes of centimetres, within three sigmas, and highly significant"
-    equations, parameters = tied
-    columns = columns_of(equations, 1)
+    adjustment, parameters = tied
+    columns = columns_of(adjustment, 1)
     sizes = np.array([0.03, -0.02])
-    changed = with_added(equations, columns @ sizes)
+    changed = with_added(adjustment, columns @ sizes)
     added = AddedUnknowns.of(changed, parameters, columns, np.ones(2))
     assert (np.abs(added.correction - sizes) < 3 * added.sigma).all()
     assert (added.sigma < 0.002).all()  # m
@@ -42,18 +42,18 @@ def test_what_was_added_to_the_misclosures_is_found(tied):
 
 def test_the_response_is_what_the_trend_takes_of_a_unit(tied):
     "The trend without the unknowns differs by response times size from that of clean misclosures"
-    equations, parameters = tied
-    columns = columns_of(equations, 2)
+    adjustment, parameters = tied
+    columns = columns_of(adjustment, 2)
     sizes = np.array([0.03, -0.02])
-    added = AddedUnknowns.of(equations, parameters, columns, np.ones(2))
-    changed = with_added(equations, columns @ sizes)
-    before, after = (each.solve(parameters).trend for each in (equations, changed))
+    added = AddedUnknowns.of(adjustment, parameters, columns, np.ones(2))
+    changed = with_added(adjustment, columns @ sizes)
+    before, after = (each.solve(parameters).trend for each in (adjustment, changed))
     assert np.abs(after - before - added.response @ sizes).max() < 1e-9  # m
 
 
 def test_nothing_added_is_chance(tied):
     "Columns at random explain no more than chance does"
-    equations, parameters = tied
-    added = AddedUnknowns.of(equations, parameters, columns_of(equations, 3), np.ones(2))
+    adjustment, parameters = tied
+    added = AddedUnknowns.of(adjustment, parameters, columns_of(adjustment, 3), np.ones(2))
     assert added.statistic < added.critical
     assert not added.is_wrong(np.zeros(2)).any()

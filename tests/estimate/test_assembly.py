@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mlscorr.estimate import estimate_correction, position_equations, position_prior
-from mlscorr.estimate.equations import _noise, mounting_equations, with_fallbacks
+from mlscorr.estimate import estimate_correction, position_adjustment, position_prior
+from mlscorr.estimate.adjustment import _noise, mounting_adjustment, with_reacquisitions
 from mlscorr.estimate.posterior import mounting_prior
 from mlscorr.frames import georeference, to_scanner
 from mlscorr.pos import Steps
@@ -37,16 +37,16 @@ def test_passes_of_one_target_share_its_survey_error():
 def test_partials_are_what_a_pose_moves():
     "Moved by 1 mm and turned by 1e-6 rad, the targets move as B says, to 1e-9 m"
     case = smooth_case(3, n=6)
-    equations = case.equations()
+    adjustment = case.adjustment()
     times = case.observations.gps_time
     pose = case.recorded.at(times)
     body = pose.attitude.inv().apply(case.observations.position - pose.position)
     for axis in range(3):
         unit = np.eye(3)[axis]
-        assert equations.partials[:, :, axis] == pytest.approx(np.tile(unit, (6, 1)))
+        assert adjustment.partials[:, :, axis] == pytest.approx(np.tile(unit, (6, 1)))
         turned = (Rotation.from_rotvec(1e-6 * unit) * pose.attitude).apply(body)
         moved = (turned - pose.attitude.apply(body)) / 1e-6
-        np.testing.assert_allclose(equations.partials[:, :, 3 + axis], moved, atol=1e-4)
+        np.testing.assert_allclose(adjustment.partials[:, :, 3 + axis], moved, atol=1e-4)
 
 
 def test_misclosures_are_surveyed_less_observed():
@@ -54,11 +54,11 @@ def test_misclosures_are_surveyed_less_observed():
     case = smooth_case(4, n=9)
     shuffled = np.random.default_rng(1).permutation(9)
     case.observations = case.observations[shuffled]
-    equations = case.equations()
+    adjustment = case.adjustment()
     expected = (case.control.position - case.observations.position[np.argsort(shuffled)])[shuffled]
-    np.testing.assert_allclose(equations.misclosure, expected, atol=1e-9)
-    assert equations.names.tolist() == [case.control.name[i] for i in shuffled]
-    np.testing.assert_array_equal(equations.gps_time, case.observations.gps_time)
+    np.testing.assert_allclose(adjustment.misclosure, expected, atol=1e-9)
+    assert adjustment.names.tolist() == [case.control.name[i] for i in shuffled]
+    np.testing.assert_array_equal(adjustment.gps_time, case.observations.gps_time)
 
 
 def test_two_passes_share_the_survey_alone():
@@ -66,7 +66,7 @@ def test_two_passes_share_the_survey_alone():
     case = Case(EPOCHS, CONSTANT, [50.0, 90.0], np.random.default_rng(2))
     observations = case.observations[np.array([0, 1, 0])]
     matched = Matched.by_name(observations, case.control)
-    noise = position_equations(case.recorded, matched, Pos(), 0, position_prior).noise.matrix
+    noise = position_adjustment(case.recorded, matched, Pos(), 0, position_prior).noise.matrix
     between = SURVEYED**2 * np.eye(3)
     np.testing.assert_allclose(noise[0:3, 6:9], between, atol=1e-15)
     np.testing.assert_allclose(noise[0:3, 0:3], between + NOISE**2 * np.eye(3), atol=1e-15)
@@ -82,9 +82,9 @@ def steps_at(*times, size=0.5):
 
 def test_a_fall_back_is_a_place_seen_before_and_after_it():
     "Of two views of a place that nobody surveyed only the difference counts: step and its sigma"
-    equations = smooth_case(5, n=8).equations(order=1)
+    adjustment = smooth_case(5, n=8).adjustment(order=1)
     steps = steps_at(60.0, 120.0)
-    complete = with_fallbacks(equations, steps)
+    complete = with_reacquisitions(adjustment, steps)
     assert complete.fallbacks == 2 and len(complete.names) == 8 and len(complete.gps_time) == 12
     ends = np.column_stack([steps.before, steps.after]).ravel()
     np.testing.assert_array_equal(complete.gps_time[-4:], ends)
@@ -104,24 +104,24 @@ def test_a_fall_back_is_a_place_seen_before_and_after_it():
 
 def test_no_step_no_row():
     "Without fall-backs the equations are the same object; a jump of kilometres is none"
-    equations = smooth_case(6, n=5).equations()
-    assert with_fallbacks(equations, steps_at()) is equations
-    assert with_fallbacks(equations, steps_at(50.0, size=2000.0)) is equations
+    adjustment = smooth_case(6, n=5).adjustment()
+    assert with_reacquisitions(adjustment, steps_at()) is adjustment
+    assert with_reacquisitions(adjustment, steps_at(50.0, size=2000.0)) is adjustment
     gate = SEARCH_RADIUS
-    assert with_fallbacks(equations, steps_at(50.0, size=0.99 * gate)).fallbacks == 1
+    assert with_reacquisitions(adjustment, steps_at(50.0, size=0.99 * gate)).fallbacks == 1
 
 
 def mounting_case():
     "A case, and its equations of a mounting that is corrected by nothing so far"
     case = smooth_case(7, n=6)
-    position = position_equations(case.recorded, case.matched, Pos(), 0, mounting_prior)
+    position = position_adjustment(case.recorded, case.matched, Pos(), 0, mounting_prior)
     return case, position
 
 
 def test_a_mounting_moves_targets_as_its_columns_say():
     "Lever arm by 1 mm and boresight by 1e-6 rad about body axes, to 1e-5 of the effect"
     case, position = mounting_case()
-    equations = mounting_equations(position, case.matched, [MOUNTING], np.zeros(6), WEAK)
+    adjustment = mounting_adjustment(position, case.matched, [MOUNTING], np.zeros(6), WEAK)
     times = case.observations.gps_time
     scanned = to_scanner(case.recorded, MOUNTING, case.observations.position, times)
     before = georeference(case.recorded, MOUNTING, scanned, times)
@@ -130,20 +130,20 @@ def test_a_mounting_moves_targets_as_its_columns_say():
         turn = Rotation.from_rotvec(small[3:]) * MOUNTING.boresight
         other = Mounting(MOUNTING.lever_arm + small[:3], turn)
         moved = (georeference(case.recorded, other, scanned, times) - before) / 1e-6
-        np.testing.assert_allclose(equations.mounting[:6, :, k], moved, atol=2e-3)
+        np.testing.assert_allclose(adjustment.mounting[:6, :, k], moved, atol=2e-3)
 
 
 def test_two_epochs_hold_the_mounting_weakly():
     "What was corrected already comes back as a misclosure with the sigmas of no measurement"
     case, position = mounting_case()
     corrected = np.array([0.1, -0.2, 0.3, 0.01, 0.02, -0.03])
-    equations = mounting_equations(position, case.matched, [MOUNTING], corrected, WEAK)
-    assert len(equations.gps_time) == 8 and equations.fallbacks == 0
-    np.testing.assert_array_equal(equations.misclosure[-2:].ravel(), -corrected)
-    np.testing.assert_allclose(np.diag(equations.noise.matrix)[-6:], WEAK**2)
-    np.testing.assert_array_equal(equations.mounting[-2:].reshape(6, 6), np.eye(6))
-    assert not equations.partials[-2:].any()
-    assert not equations.pose_design(case.recorded.gps_time[:4]).any()
+    adjustment = mounting_adjustment(position, case.matched, [MOUNTING], corrected, WEAK)
+    assert len(adjustment.gps_time) == 8 and adjustment.fallbacks == 0
+    np.testing.assert_array_equal(adjustment.misclosure[-2:].ravel(), -corrected)
+    np.testing.assert_allclose(np.diag(adjustment.noise.matrix)[-6:], WEAK**2)
+    np.testing.assert_array_equal(adjustment.mounting[-2:].reshape(6, 6), np.eye(6))
+    assert not adjustment.partials[-2:].any()
+    assert not adjustment.pose_design(case.recorded.gps_time[:4]).any()
 
 
 def test_a_site_without_targets_leaves_the_mounting_as_it_was():
@@ -152,7 +152,7 @@ def test_a_site_without_targets_leaves_the_mounting_as_it_was():
     vague = np.tile(1e6 * np.eye(3), (6, 1, 1))
     matched = replace(case.matched, observations=replace(case.observations, covariance=vague))
     corrected = np.array([0.1, -0.2, 0.3, 0.01, 0.02, -0.03])
-    solved = mounting_equations(position, matched, [MOUNTING], corrected, WEAK).solve(None)
+    solved = mounting_adjustment(position, matched, [MOUNTING], corrected, WEAK).solve(None)
     np.testing.assert_allclose(solved.trend, -corrected, atol=1e-3)
     np.testing.assert_allclose(np.sqrt(np.diag(solved.trend_covariance)), WEAK, rtol=1e-2)
 
@@ -162,10 +162,10 @@ def test_what_was_observed_stays_as_it_was():
     case = smooth_case(5, n=6)
     covariance = case.matched.observations.covariance.copy()
     time = case.observations.gps_time[2:3]
-    equations = case.equations()
+    adjustment = case.adjustment()
     steps = Steps(time - 0.1, time + 0.1, np.array([[0.5, 0.0, 0.0]]), np.array([0.01]))
     stepped = _noise(case.matched, steps).own
     assert stepped[2, 0, 0] - covariance[2, 0, 0] == pytest.approx(0.25)  # m^2
     np.testing.assert_array_equal(np.delete(stepped, 2, axis=0), np.delete(covariance, 2, axis=0))
     np.testing.assert_array_equal(case.matched.observations.covariance, covariance)
-    np.testing.assert_array_equal(equations.noise.own, covariance)
+    np.testing.assert_array_equal(adjustment.noise.own, covariance)

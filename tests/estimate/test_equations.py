@@ -16,7 +16,7 @@ from mlscorr.collocation import (
     polynomial_design,
 )
 from mlscorr.estimate import Objective, estimate_correction, with_ties
-from mlscorr.estimate.equations import with_fallbacks
+from mlscorr.estimate.adjustment import with_reacquisitions
 from mlscorr.estimate.signals import pose_signals
 from mlscorr.estimate.tied import sample
 from mlscorr.pos import Steps
@@ -26,7 +26,7 @@ from tests.beds.tied_passes import tied_passes
 
 N = 9
 CASE = smooth_case(21, n=N)
-EQUATIONS = CASE.equations(order=1)
+EQUATIONS = CASE.adjustment(order=1)
 
 
 def steps(*times):
@@ -53,7 +53,7 @@ def test_some_targets_have_their_rows_of_the_whole(kept):
 
 def test_fall_backs_stay_with_any_choice_of_targets():
     "Two targets of nine, and both fall-backs still follow them"
-    complete = with_fallbacks(EQUATIONS, steps(60.0, 120.0))
+    complete = with_reacquisitions(EQUATIONS, steps(60.0, 120.0))
     part = complete.select([4, 1])
     assert part.names.tolist() == [EQUATIONS.names[4], EQUATIONS.names[1]]
     assert part.fallbacks == 2 and len(part.gps_time) == 6
@@ -64,7 +64,7 @@ def test_fall_backs_stay_with_any_choice_of_targets():
 def test_outer_fall_backs_go():
     "Of fall-backs before, within and after the control span only the one within stays"
     first, last = (time - START for time in EQUATIONS.span)
-    complete = with_fallbacks(EQUATIONS, steps(first / 2, 100.0, (last + LENGTH) / 2))
+    complete = with_reacquisitions(EQUATIONS, steps(first / 2, 100.0, (last + LENGTH) / 2))
     inner = complete.without_outer_fallbacks()
     assert inner.fallbacks == 1 and len(inner.gps_time) == N + 2
     assert inner.gps_time[-2] == START + 100.0
@@ -75,22 +75,22 @@ def test_targets_are_left_out_by_name():
     "All passes of a name go; without names nothing changes"
     case = smooth_case(21, n=N)
     case.observations = case.observations[np.append(np.arange(N), 3)]
-    equations = case.equations()
-    name = equations.names[3]
-    assert (equations.names == name).sum() == 2
-    left = equations.without({name})
+    adjustment = case.adjustment()
+    name = adjustment.names[3]
+    assert (adjustment.names == name).sum() == 2
+    left = adjustment.without({name})
     assert name not in left.names and len(left.names) == N - 1
-    assert equations.without(set()) is equations
+    assert adjustment.without(set()) is adjustment
 
 
 def test_rows_of_a_target_are_those_of_all_its_passes():
     "Three for each pass, in the order of the misclosures, and every row once"
     case = smooth_case(22, n=5)
     case.observations = case.observations[np.array([0, 1, 2, 1, 4, 0, 3])]
-    equations = case.equations()
-    rows = equations.target_rows
-    assert list(rows) == list(dict.fromkeys(equations.names))
-    assert rows[equations.names[1]].tolist() == [3, 4, 5, 9, 10, 11]
+    adjustment = case.adjustment()
+    rows = adjustment.target_rows
+    assert list(rows) == list(dict.fromkeys(adjustment.names))
+    assert rows[adjustment.names[1]].tolist() == [3, 4, 5, 9, 10, 11]
     assert sorted(np.concatenate(list(rows.values()))) == list(range(21))
 
 
@@ -106,10 +106,10 @@ def test_rows_of_a_target_are_those_of_all_its_passes():
 def test_targets_within_a_second_share_an_epoch(times, epochs, interval):
     "Control epochs, their span, and the mean interval between them"
     case = Case(EPOCHS, CONSTANT, times, np.random.default_rng(1))
-    equations = case.equations()
-    assert len(control_epochs(equations.observed)) == epochs
-    assert equations.interval == pytest.approx(interval, abs=0.5)  # s
-    assert equations.span == pytest.approx((START + times[0], START + times[-1]))
+    adjustment = case.adjustment()
+    assert len(control_epochs(adjustment.observed)) == epochs
+    assert adjustment.interval == pytest.approx(interval, abs=0.5)  # s
+    assert adjustment.span == pytest.approx((START + times[0], START + times[-1]))
 
 
 def test_gaps_of_the_trajectory_are_no_interval():
@@ -118,7 +118,7 @@ def test_gaps_of_the_trajectory_are_no_interval():
     keep = (EPOCHS < 70.0) | (EPOCHS > 130.0)
     old = case.recorded
     case.recorded = type(old)(old.gps_time[keep], old.position[keep], old.attitude[keep])
-    assert case.equations().interval == pytest.approx(60.0, abs=0.3)
+    assert case.adjustment().interval == pytest.approx(60.0, abs=0.3)
 
 
 def test_least_squares_is_the_solution_without_parameters():
@@ -133,7 +133,7 @@ def test_least_squares_is_the_solution_without_parameters():
 
 def test_a_step_adds_three_to_the_redundancy():
     "sigma0 of two epochs of a step, whose place nothing tells, is that of one row of differences"
-    complete = with_fallbacks(EQUATIONS, steps(80.0))
+    complete = with_reacquisitions(EQUATIONS, steps(80.0))
     objective = Objective.of(complete)
     solved = complete.solve(objective.parameters("matern32", objective.initial))
     squares = (solved.misclosure - solved.design @ solved.trend) @ solved.weights
@@ -145,7 +145,7 @@ def test_a_step_adds_three_to_the_redundancy():
 @pytest.mark.parametrize("family", ["exponential", "matern52", "integrated"])
 def test_the_solution_is_the_dense_one(family):
     "With fall-backs, in any family: trend, likelihood and weights to 1e-7 of their size"
-    complete = with_fallbacks(EQUATIONS, steps(80.0))
+    complete = with_reacquisitions(EQUATIONS, steps(80.0))
     objective = Objective.of(complete)
     parameters = objective.parameters(family, objective.initial)
     solved = complete.solve(parameters)
@@ -164,7 +164,7 @@ def test_few_rows_with_ties_are_weighed_as_they_are_solved():
     "The log-likelihood by the covariance matrix is that of the knots, to 0.01 in any family"
     survey = tied_passes(1)
     estimate = with_ties(estimate_correction(survey.trajectory, survey.matched), survey.ties)
-    few = sample(estimate.equations)
+    few = sample(estimate.adjustment)
     objective = Objective.of(few)
     for family in (*FAMILIES, INTEGRATED):
         parameters = objective.parameters(family, objective.initial)

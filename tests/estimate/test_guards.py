@@ -119,26 +119,26 @@ def test_without_redundancy_there_is_no_global_test():
     "As many misclosures as parameters leave nothing to test, and nothing to warn of"
     assert not list(global_test_warnings(guards_with()))
     case = Case(EPOCHS, CONSTANT, [100.0], np.random.default_rng(1))
-    assert _global_test(case.equations(order=0), None) is None
+    assert _global_test(case.adjustment(order=0), None) is None
 
 
 def test_the_global_test_is_that_of_least_squares_without_signals():
     "Where all the variance is noise it is the weighted sum of squares of all redundant misclosures"
-    equations = smooth_case(13, n=7).equations()
-    test = _global_test(equations, None)
-    assert test.redundancy == pytest.approx(3 * 7 - 3 * (equations.order + 1))
-    assert test.statistic == pytest.approx(equations.solve(None).sigma0 ** 2 * test.redundancy)
+    adjustment = smooth_case(13, n=7).adjustment()
+    test = _global_test(adjustment, None)
+    assert test.redundancy == pytest.approx(3 * 7 - 3 * (adjustment.order + 1))
+    assert test.statistic == pytest.approx(adjustment.solve(None).sigma0 ** 2 * test.redundancy)
     assert test.upper == pytest.approx(chi2.isf(0.001, test.redundancy))
 
 
 def test_understated_sigmas_fail_the_global_test_and_true_ones_do_not():
     "Control points four times as far off as they say are told of, beside drift that is as it says"
-    equations = smooth_case(13, n=24).equations()
-    parameters = choose_parameters(equations).modes[0][0]
-    noise = np.random.default_rng(3).normal(size=equations.misclosure.shape)
-    sigma = np.sqrt(np.einsum("nii->ni", equations.noise.separate))
-    spoiled = replace(equations, misclosure=equations.misclosure + np.sqrt(15.0) * sigma * noise)
-    assert _global_test(equations, parameters).passed
+    adjustment = smooth_case(13, n=24).adjustment()
+    parameters = choose_parameters(adjustment).modes[0][0]
+    noise = np.random.default_rng(3).normal(size=adjustment.misclosure.shape)
+    sigma = np.sqrt(np.einsum("nii->ni", adjustment.noise.separate))
+    spoiled = replace(adjustment, misclosure=adjustment.misclosure + np.sqrt(15.0) * sigma * noise)
+    assert _global_test(adjustment, parameters).passed
     assert not _global_test(spoiled, parameters).passed
 
 
@@ -154,14 +154,14 @@ def found(times, trajectory=None):
     case = Case(EPOCHS, CONSTANT, times, np.random.default_rng(3))
     if trajectory is not None:
         case.recorded = trajectory(case)
-    equations = case.equations()
-    objective = Objective.of(equations)
+    adjustment = case.adjustment()
+    objective = Objective.of(adjustment)
     parameters = objective.parameters("matern32", objective.initial)
     unknown = np.full((len(case.recorded), 3), 1.0)
     corrected = SimpleNamespace(
         gps_time=case.recorded.gps_time, position_sigma=unknown, attitude_sigma=unknown
     )
-    return find_guards(equations, parameters, corrected), equations, parameters
+    return find_guards(adjustment, parameters, corrected), adjustment, parameters
 
 
 @pytest.mark.parametrize(
@@ -194,13 +194,13 @@ def test_what_was_not_improved_has_a_ratio_of_one():
 
 def test_a_signal_that_fades_in_a_gap_is_told():
     "Three correlation times and more without control: where, how long, and what applies"
-    guards, equations, parameters = found([5.0, 30.0, 170.0, 195.0])
+    guards, adjustment, parameters = found([5.0, 30.0, 170.0, 195.0])
     short = type(parameters)(**{**vars(parameters), "drift_time": 20.0, "bias_time": 20.0})
     long = type(parameters)(**{**vars(parameters), "drift_time": 90.0, "bias_time": 90.0})
-    (faded,) = (s for s in guard_warnings(guards, equations, short) if s.key == "faded")
+    (faded,) = (s for s in guard_warnings(guards, adjustment, short) if s.key == "faded")
     expected = {"seconds": 140.0, "start": START + 30.0, "correlation_times": 7.0}
     assert faded.values == pytest.approx(expected)
-    assert "faded" not in [s.key for s in guard_warnings(guards, equations, long)]
+    assert "faded" not in [s.key for s in guard_warnings(guards, adjustment, long)]
 
 
 @pytest.mark.parametrize(
@@ -225,8 +225,8 @@ def test_a_signal_that_fades_in_a_gap_is_told():
 )
 def test_sparse_control_is_told_in_numbers(times, asked, expected):
     "A lowered order, fewer points than show a fault, or all at one epoch; enough say nothing"
-    equations = Case(EPOCHS, CONSTANT, times, np.random.default_rng(4)).equations()
-    warnings = {warning.key: warning.values for warning in sparse_warnings(equations, asked)}
+    adjustment = Case(EPOCHS, CONSTANT, times, np.random.default_rng(4)).adjustment()
+    warnings = {warning.key: warning.values for warning in sparse_warnings(adjustment, asked)}
     assert list(warnings) == list(expected)
     for key, values in expected.items():
         assert warnings[key] == pytest.approx(values)

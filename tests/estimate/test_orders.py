@@ -32,10 +32,10 @@ def test_left_out_misclosures_are_those_of_an_estimate_without_the_target(number
     "left_out of a target is what the others' trend and signals leave there, to 1e-9 m"
     case = smooth_case(3)
     estimate = case.estimate()
-    equations = estimate.equations
+    adjustment = estimate.adjustment
     alone = np.arange(16) == number
-    one = equations.select(alone)
-    others = equations.select(~alone)
+    one = adjustment.select(alone)
+    others = adjustment.select(~alone)
     signals = pose_signals(one.stated, estimate.parameters, one.partials)
     mixings = [signal.mixing for signal in signals]
     design = others.pose_design(one.gps_time)[:, :3]
@@ -81,49 +81,49 @@ def test_a_shift_needs_no_slope():
 )
 def test_an_order_leaves_one_epoch_and_one_target_over(times, asked, order):
     "k targets at e epochs carry an order of min(k, e) - 2 at most, and never less than a shift"
-    equations = Case(EPOCHS, CONSTANT, times, np.random.default_rng(1)).equations()
-    assert affordable_order(asked, equations) == order
+    adjustment = Case(EPOCHS, CONSTANT, times, np.random.default_rng(1)).adjustment()
+    assert affordable_order(asked, adjustment) == order
 
 
 def test_passes_of_a_target_are_no_targets():
     "Three targets seen twice carry what three carry"
     case = Case(EPOCHS, CONSTANT, even(6), np.random.default_rng(1))
     case.observations = replace(case.observations, name=("T01", "T02", "T03") * 2)
-    assert affordable_order(3, case.equations()) == 1
+    assert affordable_order(3, case.adjustment()) == 1
 
 
 @pytest.fixture(scope="module")
-def alternatives(equations):
-    return compare_orders(equations, most_probable(equations))
+def alternatives(adjustment):
+    return compare_orders(adjustment, most_probable(adjustment))
 
 
-def test_probabilities_follow_likelihood_and_prior(equations, alternatives):
+def test_probabilities_follow_likelihood_and_prior(adjustment, alternatives):
     "Their ratios are those of the posterior, and sum to one"
     values = []
     for row in alternatives:
-        objective = Objective.of(replace(equations, order=row.order))
+        objective = Objective.of(replace(adjustment, order=row.order))
         values.append(objective(row.parameters.family, objective.logarithms(row.parameters)))
     share = np.exp(np.array(values) - max(values))
     np.testing.assert_allclose([row.probability for row in alternatives], share / share.sum())
 
 
-def test_the_likelihood_is_that_of_a_trend_with_a_prior(equations, alternatives):
+def test_the_likelihood_is_that_of_a_trend_with_a_prior(adjustment, alternatives):
     "It is the density of misclosures with coefficients of the trend's sigma, to 1e-6"
     row = next(row for row in alternatives if row.order == 0)
-    signals = pose_signals(equations.stated, row.parameters, equations.partials)
-    n = 3 * len(equations.names)
-    total = equations.noise.matrix.copy()
+    signals = pose_signals(adjustment.stated, row.parameters, adjustment.partials)
+    n = 3 * len(adjustment.names)
+    total = adjustment.noise.matrix.copy()
     for signal in signals:
         if signal.clock is None:
-            clock = equations.gps_time
+            clock = adjustment.gps_time
         else:
             clock = signal.clock
         time = np.repeat(clock, 3)
         mixing = signal.mixing.reshape(n, -1)
         total += (mixing @ mixing.T) * signal.covariance(time[:, None] - time)
-    design = polynomial_design(equations.gps_time, equations.span, 0).reshape(n, -1)
+    design = polynomial_design(adjustment.gps_time, adjustment.span, 0).reshape(n, -1)
     wide = total + row.parameters.trend_sigma**2 * design @ design.T
-    density = multivariate_normal(np.zeros(n), wide).logpdf(equations.misclosure.ravel())
+    density = multivariate_normal(np.zeros(n), wide).logpdf(adjustment.misclosure.ravel())
     assert row.log_likelihood == pytest.approx(density, abs=1e-6)
 
 
@@ -133,8 +133,8 @@ def test_a_slope_is_worth_an_order():
     slope = np.outer(EPOCHS / EPOCHS[-1], [1.0, -0.7, 0.5])
     sigma = np.full((len(EPOCHS), 3), 0.005)
     case = Case(EPOCHS, slope, even(7), np.random.default_rng(3), sigma)
-    equations = case.equations(order=1)
-    rows = compare_orders(equations, most_probable(equations))
+    adjustment = case.adjustment(order=1)
+    rows = compare_orders(adjustment, most_probable(adjustment))
     share = [sum(row.probability for row in rows if row.order == n) for n in range(4)]
     assert int(np.argmax(share)) == 1 and share[1] > 10 * share[0]
 
@@ -144,12 +144,12 @@ def test_left_out_targets_take_all_their_passes_along(small_case):
     case = smooth_case(11, n=7)
     twice = np.append(np.arange(7), 2)
     case.observations = case.observations[twice]
-    equations = case.equations(order=1)
-    objective = Objective.of(equations)
-    solved = equations.solve(objective.parameters("matern32", objective.initial))
-    left = leave_targets_out(equations, solved)
+    adjustment = case.adjustment(order=1)
+    objective = Objective.of(adjustment)
+    solved = adjustment.solve(objective.parameters("matern32", objective.initial))
+    left = leave_targets_out(adjustment, solved)
     np.testing.assert_allclose(left[7], left[2], atol=1e-9)
-    once = small_case.equations(order=1)
+    once = small_case.adjustment(order=1)
     objective = Objective.of(once)
     alone = once.solve(objective.parameters("matern32", objective.initial))
     alone = leave_targets_out(once, alone)
@@ -159,6 +159,6 @@ def test_left_out_targets_take_all_their_passes_along(small_case):
 def test_two_targets_test_each_other_under_a_shift_that_may_be_anything():
     "By least squares each leaves of the other what they differ by, to 1e-9 m"
     case = Case(EPOCHS, CONSTANT, even(2), np.random.default_rng(5))
-    shift = case.equations(order=0)
+    shift = case.adjustment(order=0)
     left = leave_targets_out(shift, shift.solve(None))
     np.testing.assert_allclose(left[0], shift.misclosure[0] - shift.misclosure[1], atol=1e-9)

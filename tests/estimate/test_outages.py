@@ -8,12 +8,12 @@ import pytest
 from mlscorr.baselines import fit_linear
 from mlscorr.estimate import (
     estimate_correction,
-    position_equations,
+    position_adjustment,
     position_prior,
     with_drift_history,
     with_ties,
 )
-from mlscorr.estimate.equations import with_fallbacks
+from mlscorr.estimate.adjustment import with_reacquisitions
 from mlscorr.pos import Steps
 from mlscorr.survey import Matched, Pos, Ties, Trajectory
 from tests.beds.lying_pos import START, TIME, survey, walk
@@ -94,7 +94,7 @@ def corrected_by_estimate(trajectory, matched):
 def test_the_start_of_an_outage_is_found_between_control_points(outages):
     "Drift begins to grow within 25 s of the truth, and the path tells its end"
     for _, _, estimate in outages:
-        stated = estimate.equations.stated
+        stated = estimate.adjustment.stated
         assert stated.history.restarts == pytest.approx([START + 139.95], abs=0.3)
         assert stated.starts[0] == pytest.approx(START + 80.0, abs=25.0)
 
@@ -137,7 +137,7 @@ def test_ties_tell_when_an_outage_began_where_no_control_point_does():
         trajectory, matched = survey(rng, error, EVEN[[0, 1, -2, -1]])
         alone = estimate_correction(trajectory, matched, BELIEVED)
         tied = with_ties(alone, ties_across(rng, error, trajectory, 400))
-        assert tied.equations.stated.starts[0] == pytest.approx(START + 80.0, abs=8.0)
+        assert tied.adjustment.stated.starts[0] == pytest.approx(START + 80.0, abs=8.0)
         left = [
             rms(error - (e.correction.corrected.position - trajectory.position))
             for e in (alone, tied)
@@ -197,13 +197,13 @@ def test_steps_that_control_contradicts_are_left_out():
     error = walk(rng, 300.0, 300.0)
     times = np.sort(np.append(EVEN, [119.0, 119.5]))
     trajectory, matched = survey(rng, error, times)
-    equations = position_equations(trajectory, matched, BELIEVED, 1, position_prior)
+    adjustment = position_adjustment(trajectory, matched, BELIEVED, 1, position_prior)
     at = np.array([START + 119.6])
     step = Steps(at, at + 0.1, np.array([[3.0, 0.0, 0.0]]), np.array([0.01]))
-    history = replace(equations.stated.history, steps=step, restarts=step.middle)
-    stated = replace(equations.stated, history=history, starts=np.array([START, START + 119.65]))
-    doubted = replace(equations, stated=stated)
-    assert with_fallbacks(doubted, step).fallbacks == 1
+    history = replace(adjustment.stated.history, steps=step, restarts=step.middle)
+    stated = replace(adjustment.stated, history=history, starts=np.array([START, START + 119.65]))
+    doubted = replace(adjustment, stated=stated)
+    assert with_reacquisitions(doubted, step).fallbacks == 1
     assert with_drift_history(doubted).fallbacks == 0
 
 
@@ -220,9 +220,9 @@ def test_a_drive_joined_of_two_needs_no_fall_back():
         replace(matched.observations, position=place),
         replace(matched.surveyed, position=matched.surveyed.position + away[rows]),
     )
-    equations = position_equations(joined, matched, BELIEVED, 1, position_prior)
-    assert len(equations.stated.history.steps) == 1
-    assert with_drift_history(equations).fallbacks == 0
+    adjustment = position_adjustment(joined, matched, BELIEVED, 1, position_prior)
+    assert len(adjustment.stated.history.steps) == 1
+    assert with_drift_history(adjustment).fallbacks == 0
 
 
 def test_a_target_in_the_middle_of_a_step_has_it_in_its_noise():
@@ -230,9 +230,9 @@ def test_a_target_in_the_middle_of_a_step_has_it_in_its_noise():
     rng = np.random.default_rng(2)
     error = walk(rng, 80.0, 140.0, 0.02)
     trajectory, matched = survey(rng, error, np.sort(np.append(EVEN, 139.95)))
-    equations = position_equations(trajectory, matched, BELIEVED, 1, position_prior)
-    steps = equations.stated.history.steps
+    adjustment = position_adjustment(trajectory, matched, BELIEVED, 1, position_prior)
+    steps = adjustment.stated.history.steps
     inside = (matched.gps_time >= steps.before[0]) & (matched.gps_time <= steps.after[0])
     assert inside.sum() == 1
-    noise = np.einsum("nii->n", equations.noise.own)
+    noise = np.einsum("nii->n", adjustment.noise.own)
     assert noise[inside][0] > 100 * noise[~inside].max()

@@ -15,9 +15,9 @@ from tests.estimate.test_outages import BELIEVED, START, survey
 from tests.estimate.test_placement import GAPPED, slow_error
 
 
-def variance(equations, parameters, rows):
+def variance(adjustment, parameters, rows):
     "3D variance of the position at epochs, by the solution itself"
-    covariance = predict_under(equations, parameters, rows)[1]
+    covariance = predict_under(adjustment, parameters, rows)[1]
     return np.einsum("qii->q", covariance[:, :3, :3])
 
 
@@ -26,28 +26,28 @@ def gapped():
     "Equations of a drive that has no control from 76 to 164 s, and their first family"
     trajectory, matched = survey(np.random.default_rng(5), slow_error(5), GAPPED)
     estimate = estimate_correction(trajectory, matched, BELIEVED)
-    return estimate.equations, estimate.families[0]
+    return estimate.adjustment, estimate.families[0]
 
 
-def observed_at(equations, row):
+def observed_at(adjustment, row):
     "The equations with a target that is seen at an epoch as the first control point is"
-    n = len(equations.names)
-    stated = equations.stated
-    at = np.insert(np.arange(len(equations.gps_time)), n, 0)
-    own = equations.noise.own[[0]]
-    epoch = equations.stated_epochs.at(np.array([row]))
+    n = len(adjustment.names)
+    stated = adjustment.stated
+    at = np.insert(np.arange(len(adjustment.gps_time)), n, 0)
+    own = adjustment.noise.own[[0]]
+    epoch = adjustment.stated_epochs.at(np.array([row]))
     added = {
         name: np.insert(getattr(stated, name), n, getattr(epoch, name), axis=0)
         for name in ("gps_time", "position", "angles", "least", "added", "drift")
     }
     turned = Rotation.concatenate([stated.rotation[:n], epoch.rotation, stated.rotation[n:]])
-    noise = equations.noise
+    noise = adjustment.noise
     return replace(
-        equations,
-        names=np.append(equations.names, "new"),
-        gps_time=np.insert(equations.gps_time, n, epoch.gps_time),
-        misclosure=np.insert(equations.misclosure, n, 0.0, axis=0),
-        partials=equations.partials[at],
+        adjustment,
+        names=np.append(adjustment.names, "new"),
+        gps_time=np.insert(adjustment.gps_time, n, epoch.gps_time),
+        misclosure=np.insert(adjustment.misclosure, n, 0.0, axis=0),
+        partials=adjustment.partials[at],
         stated=replace(stated, rotation=turned, **added),
         noise=Noise(
             np.insert(noise.own, n, own, axis=0),
@@ -59,16 +59,16 @@ def observed_at(equations, row):
 
 def test_a_target_leaves_what_a_solution_with_it_leaves(gapped):
     "Before and after, at all epochs, to 1e-6 of the variance, where all targets are alike"
-    equations, family = gapped
-    n = len(equations.names)
-    own = np.tile(equations.noise.own[0], (len(equations.gps_time), 1, 1))
-    own[n:] = equations.noise.own[n:]
+    adjustment, family = gapped
+    n = len(adjustment.names)
+    own = np.tile(adjustment.noise.own[0], (len(adjustment.gps_time), 1, 1))
+    own[n:] = adjustment.noise.own[n:]
     shared = np.tile(
-        equations.noise.shared[equations.noise.group[0]], (len(equations.noise.shared), 1)
+        adjustment.noise.shared[adjustment.noise.group[0]], (len(adjustment.noise.shared), 1)
     )
-    partials = equations.partials.copy()
+    partials = adjustment.partials.copy()
     partials[:n] = partials[0]
-    alike = replace(equations, partials=partials, noise=Noise(own, equations.noise.group, shared))
+    alike = replace(adjustment, partials=partials, noise=Noise(own, adjustment.noise.group, shared))
     rows = np.arange(0, len(alike.trajectory), 50)
     row = int(np.searchsorted(alike.trajectory.gps_time, START + 120.0))
     outlook = Outlook.of(alike, [family], rows, [[row]])
@@ -79,10 +79,10 @@ def test_a_target_leaves_what_a_solution_with_it_leaves(gapped):
 
 def test_the_best_target_is_the_one_that_lowers_the_variance_most(gapped):
     "Of five along the drive, each observed in turn"
-    equations, family = gapped
-    rows = np.arange(0, len(equations.trajectory), 50)
-    sights = [[len(equations.trajectory) * k // 6] for k in range(1, 6)]
-    outlook = Outlook.of(equations, [family], rows, sights)
+    adjustment, family = gapped
+    rows = np.arange(0, len(adjustment.trajectory), 50)
+    sights = [[len(adjustment.trajectory) * k // 6] for k in range(1, 6)]
+    outlook = Outlook.of(adjustment, [family], rows, sights)
     left = [outlook.with_target(k).variance.mean() for k in range(5)]
     assert outlook.best(np.ones(len(rows), bool)) == int(np.argmin(left))
 
@@ -91,8 +91,8 @@ def sigma_ratio(estimate, fewer, step):
     "Median, over every so manieth epoch, of the sigma by fewer Equations over that by all"
     rows = np.arange(0, len(fewer.trajectory), step)
     some, complete = (
-        np.sqrt(variance(equations, estimate.families[0][0], rows))
-        for equations in (fewer, estimate.equations)
+        np.sqrt(variance(adjustment, estimate.families[0][0], rows))
+        for adjustment in (fewer, estimate.adjustment)
     )
     return np.median(some / complete)
 
@@ -102,8 +102,8 @@ def test_fewer_rows_hold_the_drive_as_all_of_them_do():
     "A hundred ties, each as precise as the twelve that it stands for: its sigma to 10 %"
     case = tied_passes(1, number=1200)
     estimate = with_ties(estimate_correction(case.trajectory, case.matched), case.ties)
-    fewer = with_fewer_rows(estimate.equations)
-    assert len(fewer.ties) <= 100 and len(estimate.equations.ties) > 1000
+    fewer = with_fewer_rows(estimate.adjustment)
+    assert len(fewer.ties) <= 100 and len(estimate.adjustment.ties) > 1000
     assert sigma_ratio(estimate, fewer, step=20) == pytest.approx(1.0, abs=0.1)
 
 
@@ -113,6 +113,6 @@ def test_hundreds_of_control_points_are_thinned_alike():
     times = np.linspace(2.0, 238.0, 400)
     trajectory, matched = survey(np.random.default_rng(2), slow_error(2), times)
     estimate = estimate_correction(trajectory, matched, BELIEVED)
-    fewer = with_fewer_rows(estimate.equations)
+    fewer = with_fewer_rows(estimate.adjustment)
     assert len(fewer.names) < 170
     assert sigma_ratio(estimate, fewer, step=40) == pytest.approx(1.0, abs=0.1)

@@ -83,23 +83,23 @@ def test_beats_a_shift_even_with_the_wrong_correlation_time(factor, outages):
         chosen = estimate.parameters
         time = factor * chosen.drift_time
         wrong = replace(chosen, family="matern32", drift_time=time, attitude_time=time)
-        equations = case.equations()
-        mean, _ = _predicted(equations, equations.solve(wrong), wrong)
+        adjustment = case.adjustment()
+        mean, _ = _predicted(adjustment, adjustment.solve(wrong), wrong)
         error = case.true.position - case.recorded.position
         shift = (case.control.position - case.observations.position).mean(axis=0)
         ratios.append(rms(error - mean) / rms(error - shift))
     assert np.median(ratios) < 0.5
 
 
-def _predicted(equations, solved, parameters):
+def _predicted(adjustment, solved, parameters):
     "Position (n, 3) of trend and signals at the trajectory's epochs, and its covariance"
-    trajectory = equations.trajectory
-    stated = stated_sigma(trajectory, equations.pos)
+    trajectory = adjustment.trajectory
+    stated = stated_sigma(trajectory, adjustment.pos)
     partials = np.zeros((len(trajectory), 3, 6))
     partials[:, :, :3] = np.eye(3)
     signals = pose_signals(stated, parameters, partials)
     mixings = [signal.mixing for signal in signals]
-    design = equations.pose_design(trajectory.gps_time)[:, :3]
+    design = adjustment.pose_design(trajectory.gps_time)[:, :3]
     clocks = [signal.clock for signal in signals]
     return solved.predict(trajectory.gps_time, design, mixings, clocks)
 
@@ -147,8 +147,8 @@ def test_one_control_point_moves_the_drive_by_what_it_misses():
     share = shift / misclosure
     assert share[1000] == pytest.approx(np.ones(3), abs=0.01)
     assert share.min() > 0.85 and share.max() < 1.01
-    solved = estimate.equations.solve(estimate.screening.posterior.modes[0][0])
-    left_out = leave_targets_out(estimate.equations, solved)
+    solved = estimate.adjustment.solve(estimate.screening.posterior.modes[0][0])
+    left_out = leave_targets_out(estimate.adjustment, solved)
     np.testing.assert_allclose(left_out, misclosure, atol=1e-6)  # m
     assert np.isnan(estimate.left_out).all()  # as no other point predicts it
     there, away = corrected.position_sigma[[1000, 0]]

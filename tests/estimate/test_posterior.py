@@ -12,10 +12,10 @@ from mlscorr.estimate import (
     SETTINGS,
     Objective,
     estimate_correction,
-    position_equations,
+    position_adjustment,
     position_prior,
 )
-from mlscorr.estimate._tie_equations import TieEquations
+from mlscorr.estimate._tied_adjustment import TieEquations
 from mlscorr.estimate.posterior import (
     IMPROBABLE,
     NAMES,
@@ -36,13 +36,13 @@ def drawn(objective, seed=1):
 
 
 @pytest.mark.parametrize("family", (*FAMILIES, INTEGRATED))
-def test_the_objective_is_log_likelihood_plus_log_prior(objective, equations, family):
+def test_the_objective_is_log_likelihood_plus_log_prior(objective, adjustment, family):
     "The normal density of the logarithms, but for its constant, and the solution's likelihood"
     at = drawn(objective)
     parameters = objective.parameters(family, at)
     logarithm = norm(objective.initial, objective.spread).logpdf(at).sum()
     logarithm += np.log(objective.spread * np.sqrt(2 * np.pi)).sum()
-    expected = equations.solve(parameters).log_likelihood + logarithm
+    expected = adjustment.solve(parameters).log_likelihood + logarithm
     assert objective(family, at) == pytest.approx(expected, abs=1e-9)
 
 
@@ -116,10 +116,10 @@ def test_nothing_is_known_less_than_before(curvature):
     np.testing.assert_allclose(covariance, np.diag([100.0, 0.25]), rtol=1e-6, atol=1e-9)
 
 
-def test_each_family_has_a_mode(equations):
+def test_each_family_has_a_mode(adjustment):
     "Four families, the best first, each of the height that its parameters have"
-    modes = most_probable(equations)
-    objective = Objective.of(equations)
+    modes = most_probable(adjustment)
+    objective = Objective.of(adjustment)
     assert sorted(chosen.family for chosen, _ in modes) == sorted((*FAMILIES, INTEGRATED))
     values = [value for _, value in modes]
     assert values == sorted(values, reverse=True)
@@ -128,11 +128,11 @@ def test_each_family_has_a_mode(equations):
         assert again == pytest.approx(value, abs=1e-8)
 
 
-def test_a_search_that_starts_at_the_modes_stays_there(equations):
+def test_a_search_that_starts_at_the_modes_stays_there(adjustment):
     "Started from its own result the posterior's height changes by less than 0.05"
-    modes = most_probable(equations)
+    modes = most_probable(adjustment)
     again = {
-        chosen.family: value for chosen, value in most_probable(equations, [m for m, _ in modes])
+        chosen.family: value for chosen, value in most_probable(adjustment, [m for m, _ in modes])
     }
     for chosen, value in modes:
         assert again[chosen.family] == pytest.approx(value, abs=0.05)
@@ -153,11 +153,11 @@ def test_weights_and_probabilities_sum_to_one(posterior):
 
 
 @pytest.mark.long
-def test_points_are_always_the_same(equations, posterior):
+def test_points_are_always_the_same(adjustment, posterior):
     "No random number enters: again, and with targets in another order, the same points to 1e-3"
-    again = choose_parameters(equations, points=8)
+    again = choose_parameters(adjustment, points=8)
     assert again == posterior
-    shuffled = equations.select(np.random.default_rng(1).permutation(len(equations.names)))
+    shuffled = adjustment.select(np.random.default_rng(1).permutation(len(adjustment.names)))
     for (a, u), (b, v) in zip(
         choose_parameters(shuffled, points=8).points, posterior.points, strict=True
     ):
@@ -178,7 +178,7 @@ def test_more_drift_than_stated_raises_its_scale():
     rng = np.random.default_rng(2)
     wave = 0.1 * np.sin(2 * np.pi * EPOCHS[:, None] / [90.0, 130.0, 70.0] + rng.uniform(0, 6, 3))
     case = Case(EPOCHS, wave, even(14), rng, np.full((len(EPOCHS), 3), 0.01))
-    best = most_probable(case.equations())[0][0]
+    best = most_probable(case.adjustment())[0][0]
     assert 3.0 < max(best.drift_scale, best.bias_scale) < 30.0
 
 
@@ -209,8 +209,8 @@ def test_a_target_is_in_one_block_with_all_its_passes():
         observations=replace(matched.observations, name=tuple(names)),
         surveyed=replace(matched.surveyed, name=tuple(names)),
     )
-    equations = position_equations(case.recorded, matched, Pos(), 0, position_prior)
-    blocks = Objective.of(equations).blocks
+    adjustment = position_adjustment(case.recorded, matched, Pos(), 0, position_prior)
+    blocks = Objective.of(adjustment).blocks
     assert [len(block.names) for block in blocks] == [100, 100, 100]
     assert all(len(rows) == 6 for block in blocks for rows in block.target_rows.values())
 
@@ -219,10 +219,10 @@ def test_looks_of_a_target_keep_their_order_in_a_block():
     "Of 75 targets seen twice, in no order of time: what is said of each look is said of that look"
     times = np.random.default_rng(4).uniform(2.0, 198.0, 150)
     case = Case(EPOCHS, CONSTANT, times, np.random.default_rng(4))
-    equations = replace(case.equations(), names=np.array(case.control.name[:75] * 2))
-    for block in Objective.of(equations).blocks:
+    adjustment = replace(case.adjustment(), names=np.array(case.control.name[:75] * 2))
+    for block in Objective.of(adjustment).blocks:
         for name in block.target_rows:
-            looks = (part.observed[part.names == name] for part in (block, equations))
+            looks = (part.observed[part.names == name] for part in (block, adjustment))
             np.testing.assert_array_equal(*looks)
 
 
@@ -231,7 +231,7 @@ def test_large_surveys_are_cut_into_blocks_of_time():
     times = np.sort(np.random.default_rng(4).uniform(2.0, 198.0, 250))
     case = Case(EPOCHS, CONSTANT, times, np.random.default_rng(4))
     case.observations = case.observations[np.random.default_rng(5).permutation(250)]
-    blocks = Objective.of(case.equations()).blocks
+    blocks = Objective.of(case.adjustment()).blocks
     assert len(blocks) == 3 and sorted(len(block.names) for block in blocks) == [83, 83, 84]
     assert {name for block in blocks for name in block.names} == set(case.control.name)
     ends = [block.span for block in blocks]
@@ -241,8 +241,8 @@ def test_large_surveys_are_cut_into_blocks_of_time():
 def test_a_calibration_frees_the_attitude_time():
     "Where the attitude doesn't follow the drift, its time is what its own logarithm says"
     case = smooth_case(7, n=6)
-    equations = position_equations(case.recorded, case.matched, Pos(), 0, mounting_prior)
-    objective = Objective.of(equations)
+    adjustment = position_adjustment(case.recorded, case.matched, Pos(), 0, mounting_prior)
+    objective = Objective.of(adjustment)
     at = drawn(objective)
     chosen = objective.parameters("matern32", at)
     position = [NAMES[i] for i in objective.prior.free].index("attitude_time")
@@ -254,7 +254,7 @@ def test_a_calibration_frees_the_attitude_time():
 def test_a_search_turns_back_from_scales_that_rounding_spoils():
     "Drift of kilometres beside ties seen twice to a micrometre: improbable, not the end"
     survey = tied_passes(1, number=40)
-    control = estimate_correction(survey.trajectory, survey.matched).equations
+    control = estimate_correction(survey.trajectory, survey.matched).adjustment
     ties = TieEquations.of(control.trajectory, control.pos, survey.ties, control.stated)
     ties = replace(ties, variance=1e-7 * ties.variance).select(np.repeat(np.arange(40), 2))
     objective = Objective.of(replace(control, ties=ties))

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.estimate import position_equations, position_prior
-from mlscorr.estimate.equations import NO_TREND
+from mlscorr.estimate import position_adjustment, position_prior
+from mlscorr.estimate.adjustment import NO_TREND
 from mlscorr.estimate.posterior import NAMES, SPLIT, mounting_prior
 from mlscorr.survey import Pos
 from tests.beds.pos_errors import CONSTANT, EPOCHS, Case, even, outage_case
@@ -25,7 +25,7 @@ def equations_of(kind, pos=None, n=5, prior=position_prior):
         else:
             sigma = None
         case = Case(EPOCHS, CONSTANT, even(n), np.random.default_rng(1), sigma)
-    return position_equations(case.recorded, case.matched, pos or Pos(), 0, prior)
+    return position_adjustment(case.recorded, case.matched, pos or Pos(), 0, prior)
 
 
 def start(prior, name):
@@ -72,12 +72,12 @@ def test_the_attitude_follows_the_drift_in_a_correction_alone():
 @pytest.mark.parametrize("kind", [None, STEADY, GROWING])
 def test_jitter_and_bias_are_free_where_sigma_has_two_parts(kind):
     "A sigma without a part that GNSS holds has drift alone, and its four parameters stay"
-    equations = equations_of(kind)
-    free = {NAMES[i] for i in position_prior(equations).free}
-    is_split = bool(np.any(equations.stated.gnss))
+    adjustment = equations_of(kind)
+    free = {NAMES[i] for i in position_prior(adjustment).free}
+    is_split = bool(np.any(adjustment.stated.gnss))
     assert (set(SPLIT) <= free) == is_split and (not set(SPLIT) & free) == (not is_split)
-    nothing = replace(equations.stated, least=np.zeros((5, 3)), added=np.zeros((5, 3)))
-    hidden = replace(equations, stated=nothing)
+    nothing = replace(adjustment.stated, least=np.zeros((5, 3)), added=np.zeros((5, 3)))
+    hidden = replace(adjustment, stated=nothing)
     assert not set(SPLIT) & {NAMES[i] for i in position_prior(hidden).free}
 
 
@@ -99,7 +99,7 @@ def test_what_sigma_is_raised_by_at_once_has_a_scale_of_its_own():
     "A solution of 0.3 m for 60 s may be better than that, by ten; what grows gently needs none"
     sigma = np.where((EPOCHS > 60.0) & (EPOCHS < 120.0), 0.3, 0.02)[:, None] * np.ones(3)
     case = Case(EPOCHS, CONSTANT, even(5), np.random.default_rng(1), sigma)
-    raised = position_equations(case.recorded, case.matched, Pos(), 0, position_prior)
+    raised = position_adjustment(case.recorded, case.matched, Pos(), 0, position_prior)
     assert np.exp(spread(position_prior(raised), "level_scale")) == pytest.approx(10.0)
     assert spread(position_prior(equations_of(GROWING)), "level_scale") is None
 
@@ -115,6 +115,6 @@ def test_what_is_stated_is_believed_first():
 
 def test_a_trend_is_believed_to_be_of_a_decimetre_or_of_none():
     "Its coefficients' sigma starts at 0.1 m; without any coefficient it is no parameter"
-    equations = equations_of(GROWING)
-    assert start(position_prior(equations), "trend_sigma") == pytest.approx(0.1)  # m
-    assert spread(position_prior(replace(equations, order=NO_TREND)), "trend_sigma") is None
+    adjustment = equations_of(GROWING)
+    assert start(position_prior(adjustment), "trend_sigma") == pytest.approx(0.1)  # m
+    assert spread(position_prior(replace(adjustment, order=NO_TREND)), "trend_sigma") is None

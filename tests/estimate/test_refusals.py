@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.estimate import SETTINGS, Objective, position_equations, position_prior
+from mlscorr.estimate import SETTINGS, Objective, position_adjustment, position_prior
 from mlscorr.estimate._runs import drift_odds
 from mlscorr.survey import Matched, Pos
 from tests.beds.pos_errors import EPOCHS, Case, even, rms, waves
@@ -25,10 +25,10 @@ def bumped_case(count, times=None):
     return Case(EPOCHS, error, even(20) if times is None else times, rng, sigma), error
 
 
-def odds_of(equations, names, windows=0):
-    objective = Objective.of(equations)
+def odds_of(adjustment, names, windows=0):
+    objective = Objective.of(adjustment)
     parameters = objective.parameters("matern32", objective.initial)
-    return drift_odds(equations, names, parameters, windows)
+    return drift_odds(adjustment, names, parameters, windows)
 
 
 @pytest.mark.long
@@ -47,10 +47,10 @@ def test_many_lone_deviations_are_drift():
 def test_two_lone_deviations_of_twenty_are_blunders_rather():
     "More of them, or drift that was seen elsewhere in the drive, turn the odds"
     names = ["T02", "T06", "T10", "T14", "T18"]
-    odds = [odds_of(bumped_case(count)[0].equations(), names[:count]) for count in (1, 2, 3, 5)]
+    odds = [odds_of(bumped_case(count)[0].adjustment(), names[:count]) for count in (1, 2, 3, 5)]
     assert odds[1] < 0.0 < odds[2] < STRONG < odds[3]
     assert odds[0] < odds[1]
-    assert odds_of(bumped_case(2)[0].equations(), names[:2], windows=1) > STRONG
+    assert odds_of(bumped_case(2)[0].adjustment(), names[:2], windows=1) > STRONG
 
 
 def test_a_target_beside_one_that_is_right_is_wrong():
@@ -62,7 +62,7 @@ def test_a_target_beside_one_that_is_right_is_wrong():
         case.spoil(number, [0.4, -0.4, 0.4])
         names.append(case.control.name[number])
     assert len(names) == 5
-    assert odds_of(case.equations(), names) < -STRONG
+    assert odds_of(case.adjustment(), names) < -STRONG
 
 
 def test_a_target_that_deviates_alike_in_two_passes_is_wrong():
@@ -76,6 +76,6 @@ def test_a_target_that_deviates_alike_in_two_passes_is_wrong():
         place[[1, 11]] += np.outer([1.0, second], [0.4, -0.4, 0.4])
         looked = replace(case.observations, position=place, name=names)
         matched = Matched(looked, replace(case.control, name=names))
-        equations = position_equations(case.recorded, matched, Pos(), 0, position_prior)
-        odds.append(odds_of(equations, ["T02"]))
+        adjustment = position_adjustment(case.recorded, matched, Pos(), 0, position_prior)
+        odds.append(odds_of(adjustment, ["T02"]))
     assert odds[0] < odds[1] - STRONG

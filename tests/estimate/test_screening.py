@@ -126,8 +126,8 @@ def test_targets_of_very_many_passes_have_no_neighbour_in_their_block():
     names = tuple(f"T{i}" for i in range(7))
     case.control = replace(case.control[np.arange(0, 630, 90)], name=names)
     case.observations = replace(case.observations, name=tuple(np.repeat(names, 90).tolist()))
-    equations = case.equations()
-    objective = Objective.of(equations)
+    adjustment = case.adjustment()
+    objective = Objective.of(adjustment)
     assert [len(block.target_rows) for block in objective.blocks] == [1] * 7
     known = ((objective.parameters("exponential", objective.initial), 1.0),)
-    assert list(_doubtful_pairs(equations, Posterior(known, known))) == []
+    assert list(_doubtful_pairs(adjustment, Posterior(known, known))) == []

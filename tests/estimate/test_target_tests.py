@@ -46,11 +46,11 @@ def known(objective):
     return Posterior(pairs, pairs)
 
 
-def test_a_test_is_that_of_the_left_out_misclosure(equations, known):
+def test_a_test_is_that_of_the_left_out_misclosure(adjustment, known):
     "Under known parameters residual, sigma and chi-squared are those of leave_out"
-    solved = equations.solve(known.points[0][0])
-    for test in all_tests(equations, known):
-        rows = equations.target_rows[test.name]
+    solved = adjustment.solve(known.points[0][0])
+    for test in all_tests(adjustment, known):
+        rows = adjustment.target_rows[test.name]
         residual, covariance = solved.leave_out(rows)
         np.testing.assert_allclose(test.left_out.ravel(), residual, atol=1e-12)
         np.testing.assert_allclose(test.sigma.ravel(), np.sqrt(np.diag(covariance)), rtol=1e-9)
@@ -58,27 +58,27 @@ def test_a_test_is_that_of_the_left_out_misclosure(equations, known):
         assert test.statistic == pytest.approx(expected, rel=1e-8)
 
 
-def test_the_critical_value_shares_the_significance(equations, known):
+def test_the_critical_value_shares_the_significance(adjustment, known):
     "0.1 % over all seven targets together, with three degrees of freedom for each pass"
-    for test in all_tests(equations, known):
+    for test in all_tests(adjustment, known):
         assert chi2.sf(test.critical, 3) == pytest.approx(0.001 / 7)
     twice = smooth_case(11, n=7)
     twice.observations = twice.observations[np.array([0, 1, 2, 3, 4, 5, 6, 2])]
-    by_name = {test.name: test for test in all_tests(twice.equations(order=1), known)}
+    by_name = {test.name: test for test in all_tests(twice.adjustment(order=1), known)}
     name = twice.control.name[2]
     assert chi2.sf(by_name[name].critical, 6) == pytest.approx(0.001 / 7)
     assert by_name[name].left_out.shape == (2, 3)
 
 
-def test_redundancy_is_the_share_that_a_residual_shows(equations, known):
+def test_redundancy_is_the_share_that_a_residual_shows(adjustment, known):
     "An error of 1 m in height at a target leaves r metres in its residual l - A x - B s"
     parameters = known.points[0][0]
-    solved = equations.solve(parameters)
-    for number, test in enumerate(all_tests(equations, known)):
-        wrong = equations.misclosure.copy()
+    solved = adjustment.solve(parameters)
+    for number, test in enumerate(all_tests(adjustment, known)):
+        wrong = adjustment.misclosure.copy()
         wrong[number, 2] += 1.0
-        moved = replace(equations, misclosure=wrong).solve(parameters)
-        noise = equations.noise.block(np.arange(3 * number, 3 * number + 3))
+        moved = replace(adjustment, misclosure=wrong).solve(parameters)
+        noise = adjustment.noise.block(np.arange(3 * number, 3 * number + 3))
         change = (moved.weights - solved.weights).reshape(-1, 3)[number]
         assert (noise @ change)[2] == pytest.approx(test.redundancy[0, 2], abs=1e-6)
 
@@ -94,32 +94,32 @@ def test_a_gross_error_shows_at_its_target_most():
             np.full((len(EPOCHS), 3), 0.01),
         )
         case.spoil(number, [0.3, 0.0, 0.0])
-        equations = case.equations()
-        objective = Objective.of(equations)
+        adjustment = case.adjustment()
+        objective = Objective.of(adjustment)
         pairs = ((objective.parameters("matern32", objective.initial), 1.0),)
-        tests = all_tests(equations, Posterior(pairs, pairs))
+        tests = all_tests(adjustment, Posterior(pairs, pairs))
         worst = max(tests, key=lambda test: test.excess)
         assert worst.name == case.control.name[number] and worst.excess > 1.0
         assert abs(worst.left_out[0, 0]) == pytest.approx(0.3, abs=0.05)  # m
 
 
-def test_a_single_test_is_one_of_all(equations, posterior):
+def test_a_single_test_is_one_of_all(adjustment, posterior):
     "Alone or among the others, a target's test is the same"
-    tests = {test.name: test for test in all_tests(equations, posterior)}
-    for name in equations.names[[0, 4]]:
-        alone = single_test(equations, name, posterior)
+    tests = {test.name: test for test in all_tests(adjustment, posterior)}
+    for name in adjustment.names[[0, 4]]:
+        alone = single_test(adjustment, name, posterior)
         assert alone.statistic == pytest.approx(tests[name].statistic)
         np.testing.assert_allclose(alone.left_out, tests[name].left_out)
 
 
-def test_doubt_about_parameters_is_a_part_of_the_sigma(equations, known):
+def test_doubt_about_parameters_is_a_part_of_the_sigma(adjustment, known):
     "Averaged over two sets of parameters the variance holds the difference of their residuals"
     parameters = known.points[0][0]
     other = replace(parameters, drift_time=parameters.drift_time / 20, drift_scale=3.0)
     pairs = ((parameters, 0.5), (other, 0.5))
-    solved = [equations.solve(p) for p, _ in pairs]
-    for test in all_tests(equations, Posterior(pairs, pairs)):
-        rows = equations.target_rows[test.name]
+    solved = [adjustment.solve(p) for p, _ in pairs]
+    for test in all_tests(adjustment, Posterior(pairs, pairs)):
+        rows = adjustment.target_rows[test.name]
         (a, p), (b, q) = (s.leave_out(rows) for s in solved)
         np.testing.assert_allclose(test.left_out.ravel(), (a + b) / 2, atol=1e-12)
         variance = (np.diag(p) + np.diag(q)) / 2 + (a - b) ** 2 / 4
@@ -129,9 +129,9 @@ def test_doubt_about_parameters_is_a_part_of_the_sigma(equations, known):
 def test_what_is_believed_of_the_trend_tests_two_targets():
     "Under a slope either of two is tested by the other, and a shift of 0.5 m in both is no fault"
     case = Case(EPOCHS, CONSTANT, even(2), np.random.default_rng(1))
-    equations = case.equations(order=1)
-    objective = Objective.of(equations)
+    adjustment = case.adjustment(order=1)
+    objective = Objective.of(adjustment)
     pairs = ((objective.parameters("matern32", objective.initial), 1.0),)
-    for test in all_tests(equations, Posterior(pairs, pairs)):
+    for test in all_tests(adjustment, Posterior(pairs, pairs)):
         assert test.statistic > 0.0 and test.excess < 1.0
         assert np.isfinite(test.w).all() and np.isfinite(test.critical)

@@ -34,5 +34,5 @@ def test_fewer_control_points_would_have_sufficed_than_there_are(estimates):
     assert 1 <= number <= len(survey.matched)
     names = np.array(survey.matched.name)
     chosen = names[np.linspace(0, len(names) - 1, number).round().astype(int)]
-    fewer = tied.equations.without([name for name in names if name not in chosen])
+    fewer = tied.adjustment.without([name for name in names if name not in chosen])
     assert len(fewer.names) == number

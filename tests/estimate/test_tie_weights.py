@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mlscorr.estimate import estimate_correction
-from mlscorr.estimate._tie_equations import TieEquations
+from mlscorr.estimate._tied_adjustment import TieEquations
 from mlscorr.estimate.tied import graduated, robust_ties, solved_ties, student
 from tests.beds.tied_passes import tied_passes
 
@@ -16,31 +16,31 @@ def tied():
     "The estimate by control alone, its equations, and those of ties"
     survey = tied_passes(1)
     alone = estimate_correction(survey.trajectory, survey.matched)
-    equations = alone.equations
-    rows = TieEquations.of(survey.trajectory, equations.pos, survey.ties, equations.stated)
-    return alone, equations, rows
+    adjustment = alone.adjustment
+    rows = TieEquations.of(survey.trajectory, adjustment.pos, survey.ties, adjustment.stated)
+    return alone, adjustment, rows
 
 
 def test_weights_put_beside_others_are_those_of_a_new_solution(tied):
     "To 1e-6 of a sigma with the same knots, to a fiftieth (RMS) with those of other weights"
-    alone, equations, rows = tied
-    weighed = graduated(equations, alone.parameters, rows)
+    alone, adjustment, rows = tied
+    weighed = graduated(adjustment, alone.parameters, rows)
     for each in (weighed, weighed.graded((student,))):
-        solved = each.equations.solve(each.parameters, each.solved)
+        solved = each.adjustment.solve(each.parameters, each.solved)
         np.testing.assert_allclose(replace(each, solved=solved).ratio, each.ratio, atol=1e-6)
-        again = solved_ties(each.equations, each.parameters)
+        again = solved_ties(each.adjustment, each.parameters)
         assert np.sqrt(np.mean((again.ratio - each.ratio) ** 2)) < 0.02
 
 
 def test_control_that_believes_in_hardly_any_drift_does_not_outweigh_the_ties(tied):
     "A centimetre that changes in ten minutes, where ties tell of decimetres: they are believed"
-    alone, equations, rows = tied
+    alone, adjustment, rows = tied
     none = dict.fromkeys(("jitter_scale", "bias_scale", "attitude_scale"), 0.01)
     stiff = replace(alone.parameters, family="matern52", drift_scale=0.02, drift_time=600.0, **none)
-    lost = graduated(equations, stiff, rows).ties.weight < 0.25  # beyond the cut of 4 sigmas
+    lost = graduated(adjustment, stiff, rows).ties.weight < 0.25  # beyond the cut of 4 sigmas
     assert lost.mean() > 0.05
-    weighed = robust_ties(equations, stiff, rows)
+    weighed = robust_ties(adjustment, stiff, rows)
     assert (weighed.ties.weight < 0.25).mean() < 0.01
     assert weighed.parameters.drift_scale > 0.5
-    weighed = robust_ties(equations, alone.parameters, rows)
+    weighed = robust_ties(adjustment, alone.parameters, rows)
     assert weighed.parameters == alone.parameters and (weighed.ties.weight < 0.25).mean() < 0.01

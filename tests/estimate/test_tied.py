@@ -12,7 +12,7 @@ from mlscorr.estimate import (
     previewed_correction,
     with_ties,
 )
-from mlscorr.estimate._tie_equations import TieEquations
+from mlscorr.estimate._tied_adjustment import TieEquations
 from mlscorr.estimate.tied import sample
 from mlscorr.ties import weigh_by_time
 from tests.beds.tied_passes import tied_passes
@@ -154,13 +154,13 @@ def test_order_of_ties_does_not_matter(clean):
 def test_ties_that_choose_parameters_follow_the_time_in_which_they_were_seen():
     "A hundred of a street; of a city's drives a view along each axis of each interval; few rows"
     survey = tied_passes(1, number=6000)
-    equations = estimate_correction(survey.trajectory, survey.matched).equations
-    ties = TieEquations.of(survey.trajectory, equations.pos, survey.ties, equations.stated)
+    adjustment = estimate_correction(survey.trajectory, survey.matched).adjustment
+    ties = TieEquations.of(survey.trajectory, adjustment.pos, survey.ties, adjustment.stated)
     chosen = []
     views = []
     for longer in (1, 10, 100):
         slower = replace(ties, gps_time=longer * ties.gps_time)
-        few = sample(replace(equations, ties=slower))
+        few = sample(replace(adjustment, ties=slower))
         intervals = longer * 2 * 58.0 / few.interval  # ties are 1 s from the ends of both passes
         chosen.append(len(few.ties))
         views.append(2 * len(few.ties) / 3 / intervals)
@@ -172,11 +172,11 @@ def test_ties_that_choose_parameters_follow_the_time_in_which_they_were_seen():
 def test_a_sample_of_ties_does_not_depend_on_the_origin_of_time():
     "The same ties are taken in week 2 300 of GPS as in the first"
     survey = tied_passes(1, number=6000)
-    equations = estimate_correction(survey.trajectory, survey.matched).equations
-    ties = TieEquations.of(survey.trajectory, equations.pos, survey.ties, equations.stated)
+    adjustment = estimate_correction(survey.trajectory, survey.matched).adjustment
+    ties = TieEquations.of(survey.trajectory, adjustment.pos, survey.ties, adjustment.stated)
     slower = 10 * (ties.gps_time - ties.gps_time.min())
     taken = [
-        sample(replace(equations, ties=replace(ties, gps_time=slower + start))).ties.misclosure
+        sample(replace(adjustment, ties=replace(ties, gps_time=slower + start))).ties.misclosure
         for start in (0.0, 2300 * 604_800.0)
     ]
     np.testing.assert_array_equal(*taken)
@@ -208,4 +208,4 @@ def test_without_control_a_shift_of_all_passes_stays_in_sigma():
     tied = with_ties(believed, replace(survey.ties, misclosure=noise))
     held = tied.correction.corrected.position_sigma[~raised[:, 0]]
     assert np.median(held, axis=0).min() > 0.02  # m
-    assert tied.outliers == () and len(tied.equations.names) == 0
+    assert tied.outliers == () and len(tied.adjustment.names) == 0

@@ -53,13 +53,13 @@ def test_ties_tell_nothing_of_a_difference_between_coordinates(alone, tied):
 
 def test_partials_are_what_a_changed_mounting_does_to_the_misclosure(site, alone):
     "Differences of georeferenced misclosures by each component agree with a tie's row of A"
-    equations = alone.equations
+    adjustment = alone.adjustment
     step = 1e-4
-    about = georeferenced_ties(equations, [RECORDED], [RECORDED], site.ties)
+    about = georeferenced_ties(adjustment, [RECORDED], [RECORDED], site.ties)
     for axis in range(6):
         ends = [
             georeferenced_ties(
-                equations,
+                adjustment,
                 [RECORDED],
                 [corrected_mounting(RECORDED, sign * step * np.eye(6)[axis])],
                 site.ties,
@@ -72,10 +72,10 @@ def test_partials_are_what_a_changed_mounting_does_to_the_misclosure(site, alone
 
 def test_columns_beyond_the_mounting_are_zero_for_ties(site, alone):
     "With a difference between coordinates as trend, ties have rows of nine columns, three of zero"
-    equations = linearized(alone.equations, site.matched, [RECORDED], np.zeros(6))[1]
-    ties = georeferenced_ties(equations, [RECORDED], [RECORDED], site.ties)
-    shift = np.tile(np.eye(3), (len(equations.gps_time), 1, 1))
-    wider = replace(equations, mounting=np.concatenate([equations.mounting, shift], axis=2))
+    adjustment = linearized(alone.adjustment, site.matched, [RECORDED], np.zeros(6))[1]
+    ties = georeferenced_ties(adjustment, [RECORDED], [RECORDED], site.ties)
+    shift = np.tile(np.eye(3), (len(adjustment.gps_time), 1, 1))
+    wider = replace(adjustment, mounting=np.concatenate([adjustment.mounting, shift], axis=2))
     rows = ties.rows(alone.parameters[0][0], wider.pose_design)
     assert rows.design.shape == (100, 1, 9)
     assert np.array_equal(rows.design[:, 0, :6], ties.mounting)

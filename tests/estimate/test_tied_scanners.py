@@ -83,7 +83,7 @@ def test_two_scanners_carry_control_along_one_pass(survey, alone, tied):
 def test_what_the_second_scanner_lacks_beside_the_first_is_estimated(tied):
     "Lever arm and boresight to 4 of their sigmas, which are below 20 mm and 0.1 deg but for up"
     estimate, lacks = tied
-    solved = estimate.equations.solve(estimate.parameters)
+    solved = estimate.adjustment.solve(estimate.parameters)
     sigma = np.sqrt(np.diag(solved.trend_covariance)[:6])
     assert (np.abs(solved.trend[:6] - lacks) < 4 * sigma).all()
     assert (sigma < np.repeat([0.02, np.radians(0.1)], 3)).all()
@@ -120,7 +120,7 @@ def test_a_scanner_that_sees_things_again_carries_control_along_one_pass(survey,
 def test_what_such_a_scanner_lacks_is_estimated_and_named(again):
     "Turns about right and up, which look like drift across the way, to 4 sigmas below 0.1 deg"
     estimate, lacks = again
-    solved = estimate.equations.solve(estimate.parameters)
+    solved = estimate.adjustment.solve(estimate.parameters)
     sigma = np.sqrt(np.diag(solved.trend_covariance)[:6])
     assert (np.abs(solved.trend[:6] - lacks) < 4 * sigma).all()
     assert (sigma[[3, 5]] < np.radians(0.1)).all()

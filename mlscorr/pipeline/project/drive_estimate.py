@@ -8,6 +8,7 @@ from mlscorr.correction import Correction
 from mlscorr.estimate import Alternative, Estimate, NextControl, Support, TieResiduals, guards_of
 from mlscorr.pipeline.corrected_survey import CorrectedSurvey
 from mlscorr.pipeline.project.joint import JointDrives
+from mlscorr.pos import PosErrors
 
 
 @dataclass(frozen=True, repr=False)
@@ -20,7 +21,7 @@ class DriveEstimate(Estimate):
         return ()
 
     def _guard_warnings(self):
-        if len(self.equations.names):
+        if len(self.adjustment.names):
             return super()._guard_warnings()
         return ()
 
@@ -64,11 +65,11 @@ def drive_estimate(joint: JointDrives, estimate: Estimate, number: int, note: st
         outliers=tuple(out for out in estimate.screening.outliers if out.name in names),
         tests=tuple(test for test in estimate.screening.tests if test.name in names),
     )
-    equations = _equations(estimate.equations, rows[estimate.used], trajectory, shift)
-    guards = guards_of(trajectory.scanned_passes, equations.observed, estimate.guards)
+    adjustment = _adjustment(estimate.adjustment, rows[estimate.used], trajectory, shift)
+    guards = guards_of(trajectory.scanned_passes, adjustment.observed, estimate.guards)
     return DriveEstimate(
         correction=correction,
-        equations=equations,
+        adjustment=adjustment,
         screening=screening,
         used=estimate.used[rows],
         left_out=estimate.left_out[rows],
@@ -94,11 +95,14 @@ def _cut(correction, trajectory, shift):
     return Correction(trajectory, corrected, covariance=correction.covariance[rows]), chainage
 
 
-def _equations(equations, rows, trajectory, shift):
-    """The Equations of a drive's own control points, in its own times."""
-    own = equations.select(rows) if len(rows) else equations
-    own = replace(own, gps_time=own.gps_time - shift, trajectory=trajectory, ties=None)
-    return own.without_fallbacks()
+def _adjustment(adjustment, rows, trajectory, shift):
+    """The Adjustment of a drive's own control points, in its own times."""
+    targets = adjustment.targets
+    if len(rows):
+        targets = targets.select(rows)
+    targets = replace(targets, gps_time=targets.gps_time - shift)
+    errors = PosErrors.stated(trajectory, adjustment.errors.pos)
+    return replace(adjustment, errors=errors, factors=(targets,))
 
 
 def _ties(joint, residuals, number):

@@ -20,7 +20,7 @@ from mlscorr.estimate import (
     TieResiduals,
     filled_sigmas,
     guards_of,
-    position_equations,
+    position_adjustment,
     position_prior,
     weak_stretches,
 )
@@ -104,11 +104,11 @@ def _estimate(drive, parts, home, main):
     tests = {test.name: test for part, own in at_home for test in part.tests if test.name in own}
     order = main.estimate.order
     filled = filled_sigmas(survey.trajectory)[0]
-    equations = position_equations(filled, drive.control[used], survey.pos, order, position_prior)
+    adjustment = position_adjustment(filled, drive.control[used], survey.pos, order, position_prior)
     return replace(
         main.estimate,
         correction=correction,
-        equations=equations,
+        adjustment=adjustment,
         screening=replace(
             main.estimate.screening,
             outliers=tuple(outliers.values()),
@@ -118,7 +118,7 @@ def _estimate(drive, parts, home, main):
         used=used,
         left_out=left_out,
         guards=guards_of(
-            survey.trajectory.scanned_passes, equations.observed, main.estimate.guards
+            survey.trajectory.scanned_passes, adjustment.observed, main.estimate.guards
         ),
         notes=_distinct([part.estimate.notes for part in parts]),
         ties=_ties(parts, correction),

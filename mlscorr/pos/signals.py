@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mlscorr.collocation import INTEGRATED, Covariance, Signal
-from mlscorr.pos import StatedSigma
+from mlscorr.pos.stated import StatedSigma
 
 
 @dataclass(frozen=True)
