@@ -25,7 +25,7 @@ from mlscorr.collocation import (
     Noise,
     Signal,
     SparseRows,
-    collocate_rows,
+    collocate_by_knots,
     leave_each_out,
 )
 from mlscorr.collocation._block_cholesky import factorise, invert_in_place, solve_in_place
@@ -81,7 +81,7 @@ class Street:
         return np.concatenate([rows, np.cross(lever, rows)], axis=2) * SIGMA
 
     def solve(self):
-        return collocate_rows([self.control, self.ties])
+        return collocate_by_knots([self.control, self.ties])
 
     def predict(self, solved):
         q = len(self.asked)

@@ -1,5 +1,7 @@
 """The least squares that all solvers share."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import lstsq
@@ -194,7 +196,7 @@ def believing_rows(seed, p=2, n=7):
 def test_what_is_believed_of_the_trend_is_a_part_of_the_covariance(seed):
     "Likelihood, coefficients and left-out misclosures are those of V + A S A^T without any trend"
     rows, sigma = believing_rows(seed)
-    solved = collocate_rows_dense([rows], np.diag(1 / sigma))
+    solved = collocate_rows_dense([rows], np.eye(len(sigma), len(sigma) + 1) / sigma[:, None])
     (drift,), n = rows.signals, rows.misclosure.size
     time = np.repeat(drift.clock, 3)
     mixing = drift.mixing.reshape(n, 3)
@@ -217,13 +219,25 @@ def test_a_trend_of_any_size_is_that_of_least_squares():
     "Believed within 100 km they are those of Eq. 13 to 1e-6 m; within 1 nm there is no trend"
     rows, _ = believing_rows(7)
     free = collocate_rows_dense([rows], None).trend
-    np.testing.assert_allclose(collocate_rows_dense([rows], np.eye(2) / 1e5).trend, free, atol=1e-6)
-    assert np.abs(collocate_rows_dense([rows], np.eye(2) * 1e9).trend).max() < 1e-9  # m
+    unit = np.eye(2, 3)
+    np.testing.assert_allclose(collocate_rows_dense([rows], unit / 1e5).trend, free, atol=1e-6)
+    assert np.abs(collocate_rows_dense([rows], unit * 1e9).trend).max() < 1e-9  # m
+
+
+def test_a_value_that_is_believed_is_an_observation_of_its_own():
+    "Within 1 nm of 0.1 and -0.2 m the trend is these, and what is left is explained without it"
+    rows, _ = believing_rows(7)
+    value = np.array([0.1, -0.2])
+    solved = collocate_rows_dense([rows], 1e9 * np.column_stack([np.eye(2), value]))
+    np.testing.assert_allclose(solved.trend, value, atol=1e-9)  # m
+    less = rows.misclosure - rows.design @ value
+    less = replace(rows, misclosure=less, design=rows.design[..., :0])
+    np.testing.assert_allclose(solved.weights, collocate_rows_dense([less]).weights, atol=1e-3)
 
 
 def test_a_part_of_the_trend_may_be_believed():
     "Of more coefficients than misclosures some must be"
     rows, _ = believing_rows(8, p=22)
-    assert np.isfinite(collocate_rows_dense([rows], np.eye(22)[:2]).trend).all()
+    assert np.isfinite(collocate_rows_dense([rows], np.eye(2, 23)).trend).all()
     with pytest.raises(ValueError, match="22 trend parameters are not determined by 21"):
         collocate_rows_dense([rows], None)

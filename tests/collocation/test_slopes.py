@@ -39,7 +39,8 @@ def test_the_likelihood_changes_as_its_differences_do(family):
 def test_the_likelihood_changes_with_the_sigma_of_the_trend():
     "With coefficients believed a thousandth larger it changes as two solutions differ"
     street = Street("matern32", 40.0)
-    believed = np.eye(street.rows[0].design.shape[2]) / 0.2
+    parameters = street.rows[0].design.shape[2]
+    believed = np.eye(parameters, parameters + 1) / 0.2
     solved = collocate_rows_dense(street.rows, believed)
     given = street.rows, [street.rows] * 2, [believed / 1.001, believed]
     change, none = likelihood_changes(solved, *given)

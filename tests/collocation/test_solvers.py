@@ -16,11 +16,12 @@ from mlscorr.collocation import (
     Noise,
     Signal,
     SparseRows,
-    collocate,
+    collocate_by_knots,
     collocate_rows,
     collocate_rows_dense,
     leave_each_out,
 )
+from mlscorr.collocation.markov import MarkovSolver
 from tests.collocation.linked_rows import Street
 from tests.collocation.random_survey import RandomSurvey
 
@@ -41,19 +42,20 @@ class Solver:
 
 
 def by_recursion(rows, believed=None):
-    "Rows of one epoch each, filtered forward and backward in time"
-    (part,) = rows
-    given = part.misclosure, part.noise, part.design, part.signals
-    return collocate(part.gps_time[:, 0], *given, believed)
+    "Rows of one epoch each, and a few of two, filtered forward and backward in time"
+    solved = collocate_rows(rows, believed=believed)
+    assert isinstance(solved.solver, MarkovSolver)
+    return solved
 
 
 def by_knots(rows, believed=None):
     "Rows of any epochs, in information form between knots"
-    return collocate_rows(rows, believed=believed)
+    return collocate_by_knots(rows, believed=believed)
 
 
 SOLVERS = {
     "recursion": Solver(by_recursion, 1e-9, 1e-8, 1e-7, 1e-8, 1e-7),
+    "recursion of places": Solver(by_recursion, 1e-8, 1e-7, 1e-6, 1e-6, 1e-6),
     "knots": Solver(by_knots, 1e-5, 0.01, 0.01, 0.01, 1e-3),
 }
 
@@ -125,7 +127,23 @@ def one_process(family):
 def believed_trend(seed):
     "A random survey, of whose trend the sigma of two coefficients is believed"
     case = random_survey(seed)
-    return Case(case.rows, case.asked, np.diag([1 / 0.2, 1 / 0.05, 0.0])[:2])
+    return Case(case.rows, case.asked, np.diag([1 / 0.2, 1 / 0.05, 0.0, 0.0])[:2])
+
+
+def steps(family):
+    "Control, and three steps of the path, each seen from before and after it"
+    street = Street(family, 60.0, seed=2, targets=20)
+    part = street.rows[0]
+    rng = np.random.default_rng(5)
+    before = START + np.array([40.0, 110.0, 220.0])
+    gps_time = np.column_stack([before, before + 0.1])
+    position = np.eye(3, 6)
+    sides = np.tile([position, -position], (3, 1, 1))
+    noise = Noise(np.tile(1e-4 * np.eye(3), (3, 1, 1)))
+    design = np.zeros((3, *part.design.shape[1:]))
+    signals = street.signals(gps_time.ravel(), sides)
+    step = SparseRows(gps_time, 0.3 * rng.normal(size=(3, 3)), noise, design, signals)
+    return Case([part, step], street.asked_rows)
 
 
 def control(family):
@@ -167,15 +185,17 @@ LINKED = {
     },
     **{f"close ties {family}": lambda f=family: close_ties(f) for family in ALL_FAMILIES},
 }
-TABLE = [(solver, name) for solver in SOLVERS for name in OF_ONE_EPOCH]
+STEPPED = {f"steps {family}": lambda f=family: steps(f) for family in ALL_FAMILIES}
+TABLE = [(solver, name) for solver in ("recursion", "knots") for name in OF_ONE_EPOCH]
 TABLE += [("recursion", name) for name in CONTRADICTED]
 TABLE += [("knots", name) for name in LINKED]
+TABLE += [("recursion of places", name) for name in STEPPED]
 
 
 @pytest.mark.parametrize(("solver", "name"), TABLE)
 def test_a_solver_gives_what_the_dense_formula_gives(solver, name):
     "Trend, likelihood, weights, prediction and its covariance, and misclosures left out"
-    case = (OF_ONE_EPOCH | CONTRADICTED | LINKED)[name]()
+    case = (OF_ONE_EPOCH | CONTRADICTED | LINKED | STEPPED)[name]()
     solver = SOLVERS[solver]
     solved = solver.solve(case.rows, case.believed)
     expected = collocate_rows_dense(case.rows, case.believed)
@@ -221,7 +241,7 @@ def test_a_solver_gives_what_the_dense_formula_gives(solver, name):
 def test_each_observation_left_out_in_turn_is_left_out_by_itself(family):
     "Of control and of ties, residual and variance are those that the dense formula leaves"
     case = ties(family, 60.0)
-    each = leave_each_out(collocate_rows(case.rows))
+    each = leave_each_out(collocate_by_knots(case.rows))
     expected = collocate_rows_dense(case.rows)
     first = 0
     for part, left_out in zip(case.rows, each, strict=True):

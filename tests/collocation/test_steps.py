@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.collocation import Noise, collocate_rows
+from mlscorr.collocation import Noise, collocate_by_knots
 from mlscorr.collocation._knots import knot_step
 from mlscorr.collocation.linked import LARGEST_SHARE, sufficient_steps
 from mlscorr.estimate import SETTINGS
@@ -21,7 +21,7 @@ from tests.collocation.linked_rows import Street
 def test_fewer_knots_leave_the_result_and_its_sigmas(family, time, tolerance, wider, apart):
     "A half of what rows leave open moves positions by less than a tenth of a sigma, sigmas by 3 %"
     street = Street(family, time, ties=400)
-    exact, fewer = (collocate_rows(street.rows, tolerance=each) for each in (0.0, tolerance))
+    exact, fewer = (collocate_by_knots(street.rows, tolerance=each) for each in (0.0, tolerance))
     most = 1.0 if family == "exponential" else 0.8  # a metre of it needs a knot at each epoch
     assert fewer.solver.pattern.states <= most * exact.solver.pattern.states
     (mean, sigma), (there, spread) = street.predict(exact), street.predict(fewer)
