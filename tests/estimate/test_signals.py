@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mlscorr.collocation import FAMILIES, INTEGRATED
-from mlscorr.estimate import SignalParameters
-from mlscorr.estimate.signals import pose_signals
+from mlscorr.pos import SignalParameters
+from mlscorr.pos import pose_signals
 from mlscorr.pos import stated_sigma
 from mlscorr.survey import Pos, Trajectory
 

@@ -17,7 +17,7 @@ from mlscorr.collocation import (
 )
 from mlscorr.estimate import Objective, estimate_correction, with_ties
 from mlscorr.estimate.adjustment import with_reacquisitions
-from mlscorr.estimate.signals import pose_signals
+from mlscorr.pos import pose_signals
 from mlscorr.estimate.tied import sample
 from mlscorr.pos import Steps
 from mlscorr.survey import Pos, control_epochs
