@@ -16,7 +16,7 @@ from mlscorr.baselines.pairs import Undetermined
 from mlscorr.collocation import CHUNK, LiteralSignal, Noise, collocate_literal, polynomial_design
 from mlscorr.correction import Correction
 from mlscorr.frames import pose_partials
-from mlscorr.pos import drift_history, stated_sigma
+from mlscorr.pos import PosErrors, drift_history
 from mlscorr.survey import SAME_EPOCH, Matched, Pos, Trajectory, control_epochs
 
 Curve = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
@@ -198,7 +198,7 @@ def fit_literal(
     """
     gps_time = matched.gps_time
     _require_epochs(gps_time, order)
-    stated = stated_sigma(trajectory, pos, gps_time)
+    stated = PosErrors.stated(trajectory, pos).at(gps_time)
     turns = np.einsum("nij,nij->ni", stated.attitude, stated.attitude)  # about the map's axes
     c0 = np.append(np.mean(stated.position**2, axis=0), turns.mean(axis=0))
     partials = pose_partials(trajectory, matched.observations.position, gps_time)  # B

@@ -35,8 +35,8 @@ from mlscorr.estimate import (
 from mlscorr.evaluate._settings import SETTINGS
 from mlscorr.evaluate.wording import DATUM
 from mlscorr.io.trajectories import MapFactors, map_factors
-from mlscorr.matching import SETTINGS as MATCHING
-from mlscorr.pos import SignalParameters, stated_sigma
+from mlscorr.pos import SETTINGS as POS
+from mlscorr.pos import PosErrors, SignalParameters
 from mlscorr.survey import Matched, Pos, Statement, Trajectory
 
 SHIFT, HEIGHT, SCALE, TURN, TILT = TERMS = ("shift", "height", "scale", "turn", "tilt")
@@ -162,7 +162,7 @@ def datum_differences(
     rest = control.misclosure - sum(
         (columns[:, :, COLUMNS[term]] @ size for term, size, _, _ in linear), np.zeros(3)
     )
-    sigma = stated_sigma(filled, pos, control.gps_time).position
+    sigma = PosErrors.stated(filled, pos).at(control.gps_time).position
     shifts = (
         *_shift(rest[:, :2], sigma[:, :2], SHIFT),
         *_shift(rest[:, 2:], sigma[:, 2:], HEIGHT),
@@ -333,7 +333,7 @@ def _shift(misclosure, sigma, term):
 def _common_sigma(sigma):
     """Sigma of a mean of POS errors that may all be one, with a good mounting. Units: m."""
     mean = np.sum(1.0 / sigma) / np.sum(sigma**-2)
-    return float(np.hypot(mean, MATCHING.unstated_sigmas[0]))
+    return float(np.hypot(mean, POS.unstated_sigmas[0]))
 
 
 def _extent(place):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from mlscorr.estimate import COMPONENTS, Estimate, TieResiduals, tie_value
-from mlscorr.pos import stated_sigma
+from mlscorr.pos import PosErrors
 from mlscorr.survey import TIE_KINDS, Survey, Trajectory
 
 
@@ -62,7 +62,7 @@ def largest_sigma(trajectory: Trajectory, survey: Survey | None = None) -> dict[
     time = float(trajectory.gps_time[scanned[sigma.argmax()]])
     result = {"median": float(np.median(sigma)), "largest": float(sigma.max()), "time": time}
     if survey is not None and not survey.has_assumed_position:
-        stated = stated_sigma(survey.trajectory, survey.pos).position[scanned]
+        stated = PosErrors.stated(survey.trajectory, survey.pos).epochs.position[scanned]
         result["stated"] = float(np.median(np.linalg.norm(stated, axis=1)))
     return result
 

@@ -12,13 +12,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from mlscorr.gap.evidence import SETTINGS, weigh_labels
+from mlscorr.gap.evidence import weigh_labels
 from mlscorr.gap.residuals import Rows, background
 from mlscorr.gap.signatures import Signature
+from mlscorr.pos import SETTINGS as POS
 from mlscorr.survey import Pos, Survey
 
 SIGMAS = ("position_sigma", "attitude_sigma")
-STEP = float(np.sqrt(max(SETTINGS.pos_scales) / min(SETTINGS.pos_scales)))
+STEP = float(np.sqrt(max(POS.process_scales) / min(POS.process_scales)))
 # from one scale to the next: half of what the inference averages over, so that these overlap
 LEAST_GAIN = 1.0
 # log evidence by which a scale must be better: less is not worth a mention (Kass, Raftery 1995)

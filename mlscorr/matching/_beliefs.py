@@ -2,7 +2,7 @@
 
 Per map axis the misclosure of an observation at time t is
 
-    l(t) = c + g(t) s(t) + noise,   g(t)^2 = (k sigma(t))^2 + b^2 + u^2.
+    l(t) = c + g(t) s(t) + noise,   g(t)^2 = (k sigma(t))^2 + b^2 + u^2   (pos.Predictive).
 
 c is what datum and mounting do, constant but for its turning with the vehicle. s is a smooth
 process of unit variance (Matern 3/2: position and rate) that starts anew where the drift of the POS
@@ -12,7 +12,6 @@ attitude across the range, and a part of g and u that isn't smooth. k, b and u a
 several beliefs compete, and the observations decide.
 """
 
-from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,8 +19,8 @@ from numba import njit
 
 from mlscorr.matching._pairs import CandidatePairs
 from mlscorr.matching.settings import COMPILED, SETTINGS, settings_tuple
-from mlscorr.pos import StatedSigma
-from mlscorr.survey import ControlPoints, Pos, TargetObservations, Trajectory
+from mlscorr.pos import PosErrors
+from mlscorr.survey import ControlPoints, TargetObservations, Trajectory
 
 
 class Chain(NamedTuple):
@@ -106,9 +105,8 @@ def build_chain(
     observations: TargetObservations,
     control: ControlPoints,
     pose: Trajectory,
-    stated: StatedSigma,
+    errors: PosErrors,
     pairs: CandidatePairs,
-    pos: Pos,
 ) -> Chain:
     """Chain of observations in order of time.
 
@@ -118,42 +116,31 @@ def build_chain(
     control : ControlPoints
     pose : Trajectory
         At the observations.
-    stated : StatedSigma
-        What the POS states there.
+    errors : PosErrors
+        Of the drive.
     pairs : CandidatePairs
-    pos : Pos
-        Its correlation time.
     """
     distance = np.linalg.norm(observations.position - pose.position, axis=1)
     known = np.einsum("nii->ni", observations.covariance)
-    known = known + ((stated.angles.max(axis=1) * distance) ** 2)[:, None]
-    scale, bias, unstated, share = _beliefs()
-    gain = np.sqrt((scale * stated.position) ** 2 + bias**2 + unstated**2)
+    angle = errors.at(observations.gps_time).angles.max(axis=1)
+    known = known + ((angle * distance) ** 2)[:, None]
+    error = errors.predictive(observations.gps_time)
     ahead = pose.attitude.apply([0.0, 1.0, 0.0])[:, :2]
     odds = (1.0 - SETTINGS.visible_share) / SETTINGS.visible_share
     return Chain(
         gps_time=observations.gps_time,
         pass_number=observations.pass_number,
         forward=ahead / np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-12),
-        gain=gain,
-        noise=known + (SETTINGS.rough_share * gain) ** 2 + (unstated / 2) ** 2,
+        gain=error.sigma,
+        noise=known + error.rough_variance,
         otherwise=np.log(_lookalikes(observations, pose) * odds),
-        rate=np.sqrt(3.0) / (share[:, 0, 0] * pos.correlation_time),
-        segment=stated.history.segment(stated.gps_time),
+        rate=np.sqrt(3.0) / error.correlation_time,
+        segment=errors.history.segment(observations.gps_time),
         pairs=pairs,
         pair_variance=control.sigma[pairs.control] ** 2,
         moved_share=np.full(len(pairs.control), SETTINGS.moved_share),
         settings=settings_tuple(),
     )
-
-
-def _beliefs():
-    """Scale, bias (m), unstated sigma (m) and share of time (m, 1, 1) of each belief."""
-    drifts = [(scale, 0.0) for scale in SETTINGS.sigma_scales]
-    drifts += [(1.0, bias) for bias in SETTINGS.slow_biases]
-    groups = product(drifts, SETTINGS.unstated_sigmas, SETTINGS.time_shares)
-    table = np.array([(*drift, unstated, share) for drift, unstated, share in groups])
-    return table.T[:, :, None, None]
 
 
 def _lookalikes(observations, pose):

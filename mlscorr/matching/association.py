@@ -10,7 +10,7 @@ from mlscorr.matching._pairs import find_pairs
 from mlscorr.matching._wording import sentence_of
 from mlscorr.matching.decision import decide, moved_share_by_others
 from mlscorr.matching.reasons import Refusal, explain
-from mlscorr.pos import stated_sigma
+from mlscorr.pos import PosErrors
 from mlscorr.survey import (
     SEARCH_RADIUS,
     ControlPoints,
@@ -103,10 +103,9 @@ def match(
     order = np.argsort(observations.gps_time, kind="stable")
     ordered = observations[order]
     pose = trajectory.at(ordered.gps_time)
-    pos = pos or Pos()
-    stated = stated_sigma(trajectory, pos, ordered.gps_time)
+    errors = PosErrors.stated(trajectory, pos)
     pairs = find_pairs(ordered, control, search_radius)
-    decision = _decide(build_chain(ordered, control, pose, stated, pairs, pos), len(control))
+    decision = _decide(build_chain(ordered, control, pose, errors, pairs), len(control))
     refusals, reasons = explain(ordered, control, pairs, decision, search_radius)
     rank = np.argsort(order)
     column = decision.column[rank]

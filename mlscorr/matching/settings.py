@@ -18,13 +18,8 @@ class Settings:
     size_tolerance: float = 0.01  # m; between a size taken down and one observed
 
     # Beliefs
-    sigma_scales: tuple[float, ...] = (0.1, 0.3, 1.0, 3.0, 10.0)  # k; of stated sigmas to the truth
-    slow_biases: tuple[float, ...] = (1.0, 3.0)  # m; that no sigma states: multipath in a canyon
-    unstated_sigmas: tuple[float, ...] = (0.02, 0.2)  # m; good mounting; calibration due, GNSS
-    time_shares: tuple[float, ...] = (1.0, 0.3)  # of the POS's; drift ends with an outage
     constant_sigma: float = 1.5  # m; of datum and mounting: frames of one name differ by metres
     turning_sigma: float = 0.3  # m; its part that is fixed to the vehicle
-    rough_share: float = 0.1  # g(t); one sigma: steps when satellites come and go
     visible_share: float = 0.8  # targets; in a pass: some are hidden
     street_length: float = 30.0  # m; a street is at least as long as it is wide
     lookalike_density: float = 1 / 600  # 1/m^2; for each target, along and across a street

@@ -9,7 +9,16 @@ the drift had grown to.
 
 from mlscorr.pos.errors import PosErrors
 from mlscorr.pos.history import drift_history, runs
+from mlscorr.pos.prior import (
+    EXCURSIONS,
+    HUMP,
+    RISE,
+    Predictive,
+    Process,
+    excursion_profile,
+    stated_processes,
+)
 from mlscorr.pos.settings import SETTINGS
 from mlscorr.pos.signals import SignalParameters, drift_signals, pose_signals
-from mlscorr.pos.stated import StatedSigma, stated_sigma
+from mlscorr.pos.stated import StatedSigma
 from mlscorr.pos.steps import Steps, find_steps

@@ -25,6 +25,24 @@ class Settings:
     # much for what the inertial unit adds
     gnss_sigma: tuple[float, float, float] = (0.02, 0.02, 0.03)
 
+    # The error as one process, where sigma is about right (gap_study.py, seeds 5000, 6000, 7000)
+    process_scales: tuple[float, ...] = (0.4, 0.7, 1.2, 2.0)  # ratio to sigma; more is a cause
+    process_scale_spread: float = 0.45  # of log scale; sigmas are rarely wrong by more than half
+    process_shapes: tuple[tuple[str, float, float], ...] = (  # family, factor on the time, prior
+        *(("matern32", 0.1, 0.15), ("matern32", 0.3, 0.25), ("exponential", 1.0, 0.20)),
+        *(("matern32", 1.0, 0.25), ("matern32", 3.0, 0.15)),
+    )
+    # ratio to a sigma that is raised, and its prior: a POS knows when it lacks GNSS, and errs by up
+    # to five times what it states then (real units, pos_study.py)
+    raised_scales: tuple[tuple[float, float], ...] = ((1.0, 0.5), (2.0, 0.3), (3.5, 0.2))
+
+    # Hypotheses before any observation (``benchmarks/ablation.py matching`` shows what each does)
+    sigma_scales: tuple[float, ...] = (0.1, 0.3, 1.0, 3.0, 10.0)  # of stated sigmas to the truth
+    slow_biases: tuple[float, ...] = (1.0, 3.0)  # m; that no sigma states: multipath in a canyon
+    unstated_sigmas: tuple[float, ...] = (0.02, 0.2)  # m; good mounting; calibration due, GNSS
+    time_shares: tuple[float, ...] = (1.0, 0.3)  # of the POS's; drift ends with an outage
+    rough_share: float = 0.1  # of the smooth sigma; steps when satellites come and go
+
     @property
     def change_interval(self) -> float:
         """How far from an event sigma(t) may tell of it: interval and spread. Units: s."""

@@ -10,11 +10,12 @@ from dataclasses import replace
 import numpy as np
 
 from mlscorr.matching import SETTINGS as MATCHING
+from mlscorr.pos import PosErrors
 from mlscorr.survey import PointCloud, Scanner, Survey, TargetObservations
 from mlscorr.targets.candidates import Neighbourhoods, search_radius
 from mlscorr.targets.fit import FittedTarget, distinct, fit_targets, why_useless
 from mlscorr.targets.regions import BrightRegion, bright_regions
-from mlscorr.targets.scanner_path import ScannerPath, motion_covariance, split_visits
+from mlscorr.targets.scanner_path import ScannerPath, split_visits
 from mlscorr.targets.settings import SETTINGS
 from mlscorr.targets.shapes import BY_EDGES
 
@@ -84,7 +85,7 @@ def _as_without_control(visit, place, survey, shape, rng, known):
 def _with_motion(targets, survey):
     """The targets with the motion of the POS error in their covariances."""
     time, duration = [[getattr(t, name) for _, t in targets] for name in ("gps_time", "duration")]
-    motion = motion_covariance(survey.trajectory, survey.pos, time, duration)
+    motion = PosErrors.stated(survey.trajectory, survey.pos).motion_covariance(time, duration)
     return [
         (number, replace(target, covariance=target.covariance + moved))
         for (number, target), moved in zip(targets, motion, strict=True)

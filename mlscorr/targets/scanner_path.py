@@ -9,8 +9,7 @@ from math import dist
 import numpy as np
 
 from mlscorr.matching import SETTINGS as MATCHING
-from mlscorr.pos import stated_sigma
-from mlscorr.survey import PointCloud, Pos, Survey, Trajectory
+from mlscorr.survey import PointCloud, Survey
 from mlscorr.targets.settings import SETTINGS
 
 
@@ -125,24 +124,3 @@ def _each_step(path, step):
         if dist(place, places[marks[-1]]) > step:
             marks.append(row)
     return marks
-
-
-def motion_covariance(
-    trajectory: Trajectory, pos: Pos, gps_time: np.ndarray, duration: np.ndarray
-) -> np.ndarray:
-    """Covariance (n, 3, 3) of centres as the POS error moves while targets are scanned. m^2.
-
-    Parameters
-    ----------
-    trajectory : Trajectory
-    pos : Pos
-    gps_time, duration : (n,) array
-        Of each centre, and the standard deviation of its points' times. Units: s.
-
-    Source: the rate of a smooth (Matern 3/2) process is sigma sqrt(3) / correlation time; the
-    centre's time and the mean time of its points differ by at most their spread. The attitude's
-    share is left out: an error of 0.1 mrad moves a target at 10 m by 1 mm in all.
-    """
-    sigma = stated_sigma(trajectory, pos, gps_time).position
-    moved = sigma * np.sqrt(3) / pos.correlation_time * np.asarray(duration)[:, None]
-    return moved[:, :, None] ** 2 * np.eye(3)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlscorr.pos import stated_sigma
+from mlscorr.pos import PosErrors
 from mlscorr.survey import Survey, TieFeatures, Ties, time_spans
 from mlscorr.ties.agreement import (
     NORMAL_SCATTER,
@@ -117,8 +117,8 @@ def feature_sigma(survey: Survey, features: TieFeatures) -> np.ndarray:
     survey : Survey
     features : TieFeatures
     """
-    stated = stated_sigma(survey.trajectory, survey.pos, features.gps_time)
     pose = survey.trajectory.at(features.gps_time)
     distance = np.linalg.norm(features.centre - pose.position, axis=1)
-    sigma = np.hypot(stated.position.max(axis=1), distance * stated.angles.max(axis=1))
+    errors = PosErrors.stated(survey.trajectory, survey.pos)
+    sigma = errors.point_sigma(features.gps_time, distance)
     return np.maximum(sigma, SETTINGS.least_gate / (np.sqrt(2) * SETTINGS.gate_sigmas))

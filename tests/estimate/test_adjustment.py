@@ -17,9 +17,8 @@ from mlscorr.collocation import (
 )
 from mlscorr.estimate import Objective, estimate_correction, with_ties
 from mlscorr.estimate.adjustment import with_reacquisitions
-from mlscorr.pos import pose_signals
 from mlscorr.estimate.tied import sample
-from mlscorr.pos import Steps
+from mlscorr.pos import Steps, pose_signals
 from mlscorr.survey import Pos, control_epochs
 from tests.beds.pos_errors import CONSTANT, EPOCHS, LENGTH, START, Case, smooth_case
 from tests.beds.tied_passes import tied_passes

@@ -10,8 +10,8 @@ from mlscorr.collocation import polynomial_design
 from mlscorr.estimate import Objective
 from mlscorr.estimate.pos_error import affordable_order, compare_orders, leave_targets_out
 from mlscorr.estimate.posterior import most_probable
-from mlscorr.pos import pose_signals
 from mlscorr.evaluate import model_section
+from mlscorr.pos import pose_signals
 from tests.beds.pos_errors import CONSTANT, EPOCHS, Case, even, smooth_case
 
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from mlscorr.estimate.pos_error import leave_targets_out
-from mlscorr.pos import pose_signals
-from mlscorr.pos import stated_sigma
+from mlscorr.pos import pose_signals, stated_sigma
 from mlscorr.survey import Pos, Trajectory
 from tests.beds.pos_errors import (
     CONSTANT,

@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from mlscorr.estimate._tied_adjustment import TieEquations
 from scipy.stats import norm
 
 from mlscorr.collocation import FAMILIES, INTEGRATED
@@ -15,7 +16,6 @@ from mlscorr.estimate import (
     position_adjustment,
     position_prior,
 )
-from mlscorr.estimate._tied_adjustment import TieEquations
 from mlscorr.estimate.posterior import (
     IMPROBABLE,
     NAMES,

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from mlscorr.estimate._tied_adjustment import TieEquations
 
 from mlscorr.correction import Correction
-from mlscorr.estimate._tied_adjustment import TieEquations
 from mlscorr.pos import stated_sigma
 from mlscorr.survey import Pos
 from tests.beds.tied_passes import tied_passes

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mlscorr.estimate._tied_adjustment import TieEquations
 
 from mlscorr.estimate import estimate_correction
-from mlscorr.estimate._tied_adjustment import TieEquations
 from mlscorr.estimate.tied import graduated, robust_ties, solved_ties, student
 from tests.beds.tied_passes import tied_passes
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mlscorr.estimate._tied_adjustment import TieEquations
 
 from mlscorr.estimate import (
     TieResiduals,
@@ -12,7 +13,6 @@ from mlscorr.estimate import (
     previewed_correction,
     with_ties,
 )
-from mlscorr.estimate._tied_adjustment import TieEquations
 from mlscorr.estimate.tied import sample
 from mlscorr.ties import weigh_by_time
 from tests.beds.tied_passes import tied_passes

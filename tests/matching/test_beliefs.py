@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from mlscorr.collocation import Covariance
-from mlscorr.matching import SETTINGS
 from mlscorr.matching._beliefs import build_chain, transition
 from mlscorr.matching._pairs import find_pairs
-from mlscorr.pos import stated_sigma
+from mlscorr.pos import SETTINGS as POS
+from mlscorr.pos import PosErrors
 from mlscorr.survey import Pos
 from tests.matching.test_association import PLACES, control_points, observations, trajectory
 
@@ -20,20 +20,20 @@ def chain():
     control = control_points(PLACES)
     pos = Pos()
     pairs = find_pairs(seen, control, 1.0)
-    stated = stated_sigma(drive, pos, seen.gps_time)
-    return build_chain(seen, control, drive.at(seen.gps_time), stated, pairs, pos)
+    errors = PosErrors.stated(drive, pos)
+    return build_chain(seen, control, drive.at(seen.gps_time), errors, pairs)
 
 
 def test_beliefs_are_all_combinations(chain):
     "Each scale of the stated sigma or slow bias with each unstated error and correlation time"
-    scales = SETTINGS.sigma_scales
-    unstated = SETTINGS.unstated_sigmas
+    scales = POS.sigma_scales
+    unstated = POS.unstated_sigmas
     drifts = [0.2 * scale for scale in scales]
-    drifts += [np.hypot(0.2, bias) for bias in SETTINGS.slow_biases]
-    assert len(chain.gain) == len(drifts) * len(unstated) * len(SETTINGS.time_shares)
+    drifts += [np.hypot(0.2, bias) for bias in POS.slow_biases]
+    assert len(chain.gain) == len(drifts) * len(unstated) * len(POS.time_shares)
     expected = {round(np.hypot(drift, u), 9) for drift in drifts for u in unstated}
     assert set(chain.gain[:, 0, 0].round(9)) == expected  # m, easting
-    biases = (0.0, *SETTINGS.slow_biases)
+    biases = (0.0, *POS.slow_biases)
     northing = {round(np.hypot(bias, u), 9) for bias in biases for u in unstated}
     assert set(chain.gain[:, 0, 1].round(9)) == northing  # m: nothing is stated
 
@@ -47,9 +47,9 @@ def test_drift_starts_anew_at_a_step_of_the_path():
     drive = replace(drive, position=path)
     pos = Pos()
     pairs = find_pairs(seen, control_points(PLACES), 10.0)
-    stated = stated_sigma(drive, pos, seen.gps_time)
+    errors = PosErrors.stated(drive, pos)
     pose = drive.at(seen.gps_time)
-    chain = build_chain(seen, control_points(PLACES), pose, stated, pairs, pos)
+    chain = build_chain(seen, control_points(PLACES), pose, errors, pairs)
     matrix = transition(chain, 4, 5)
     assert matrix[:, 0, 0] == pytest.approx(1.0)
     assert np.abs(matrix[:, 1:, 1:]).max() == 0.0

@@ -16,7 +16,7 @@ from mlscorr.matching._hypotheses import predict, start
 from mlscorr.matching._marginals import join, marginals, use
 from mlscorr.matching._pairs import CandidatePairs, find_pairs
 from mlscorr.matching.settings import settings_tuple
-from mlscorr.pos import stated_sigma
+from mlscorr.pos import PosErrors
 from mlscorr.survey import SEARCH_RADIUS, Pos
 from tests.matching.test_association import (
     ORIGIN,
@@ -234,9 +234,9 @@ def test_marginals_stay_as_they_were_written_down(name):
     seen = made.observations[np.argsort(made.observations.gps_time, kind="stable")]
     pos = Pos()
     pose = made.trajectory.at(seen.gps_time)
-    stated = stated_sigma(made.trajectory, pos, seen.gps_time)
+    errors = PosErrors.stated(made.trajectory, pos)
     pairs = find_pairs(seen, made.control, SEARCH_RADIUS)
-    found = marginals(build_chain(seen, made.control, pose, stated, pairs, pos))
+    found = marginals(build_chain(seen, made.control, pose, errors, pairs))
     assert found.sound == pytest.approx(WRITTEN[name]["sound"], rel=0.0, abs=1e-9)
     assert found.moved == pytest.approx(WRITTEN[name]["moved"], rel=0.0, abs=1e-9)
 

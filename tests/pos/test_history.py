@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mlscorr.pos import drift_history, stated_sigma
+from mlscorr.pos import drift_history
+from mlscorr.pos.stated import stated_sigma
 from mlscorr.survey import Pos, Trajectory
 
 # s, m

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mlscorr.frames import angle_sigma, attitude_from_angles, map_root
-from mlscorr.pos import stated_sigma
+from mlscorr.pos.stated import stated_sigma
 from mlscorr.survey import Pos, Trajectory
 
 START = 413200.0  # s

@@ -1,11 +1,9 @@
 import numpy as np
-import pytest
 from scipy.spatial.transform import Rotation
 
 from mlscorr.frames import attitude_from_angles
-from mlscorr.survey import Mounting, PointCloud, Pos, Scanner, Survey, Trajectory
-from mlscorr.targets import ScannerPath
-from mlscorr.targets.scanner_path import motion_covariance, split_visits
+from mlscorr.survey import Mounting, PointCloud, Scanner, Survey, Trajectory
+from mlscorr.targets.scanner_path import split_visits
 from tests.targets.test_extract import control_point
 
 ORIGIN = np.array([523_000.0, 3_378_000.0, 42.0])  # m, UTM
@@ -73,25 +71,3 @@ def test_a_turn_before_the_first_point_parts_nothing():
     for seen in (np.arange(81, 160), np.array([159])):
         assert visits(time, place, seen) == [seen.tolist()]
     assert visits(time, place, np.empty(0, int)) == []
-
-
-def test_motion_of_the_pos_error_grows_with_its_sigma_and_the_time(straight_trajectory):
-    "3 mm where a POS of 0.1 m is watched for half a second; nothing in no time"
-    found = motion_covariance(straight_trajectory, Pos(), [START + 10.0], [0.5])[0]
-    assert np.sqrt(np.diag(found)) == pytest.approx(0.1 * np.sqrt(3) / 30 * 0.5)  # m
-    assert not motion_covariance(straight_trajectory, Pos(), [START + 10.0], [0.0]).any()
-
-
-@pytest.fixture
-def straight_trajectory():
-    time, place = drive((20, 5))
-    still = attitude_from_angles(0.0, 0.0, np.zeros(len(time)))
-    return Trajectory(time, place, still, np.full((len(time), 3), 0.1))
-
-
-def test_the_scanner_sits_on_its_lever_arm(straight_trajectory):
-    "Half a metre to the right of a drive north is half a metre east of it, between epochs too"
-    time = START + np.array([3.0, 3.02])
-    survey = survey_along(*drive((20, 5)), lever_arm=[0.5, 0.0, 0.0])
-    arm = ScannerPath.of(survey, time).at(time) - straight_trajectory.at(time).position
-    assert arm == pytest.approx(np.tile([0.5, 0.0, 0.0], (2, 1)), abs=1e-6)  # m

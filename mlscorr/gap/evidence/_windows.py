@@ -26,10 +26,9 @@ from mlscorr.gap.evidence.observations import (
 )
 from mlscorr.gap.evidence.settings import SETTINGS
 from mlscorr.gap.signatures import Signature
+from mlscorr.pos import EXCURSIONS, HUMP, RISE
 
-# In real time an error grows until GNSS is back; smoothed, to the middle. A single one of the
-# latter is position_bump, an effect: as a cause of noise it counts beside other windows alone.
-RISE, HUMP = SHAPES = ("rise", "hump")
+# A single HUMP is position_bump, an effect: as a cause of noise it counts beside other windows only
 
 
 class Window(NamedTuple):
@@ -111,7 +110,7 @@ def weigh_windows(
     factor, place = np.unravel_index(np.argmax(likelihood[:, :, 0]), likelihood.shape[:2])
     windows = (bank[chosen[place]]._replace(factor=SETTINGS.window_factors[factor]),)
     metric = np.logaddexp.reduce(likelihood - evidence.total, axis=1)
-    metric -= np.log(len(bank) * len(SHAPES))
+    metric -= np.log(len(bank) * len(EXCURSIONS))
     if metric[:, 0].max() > SETTINGS.refinement:
         windows, metric[:, 0] = _Search(observations, residual[:, :1], left[:, :1], bank).best()
         metric[:, 0] -= evidence.total[0]
@@ -170,8 +169,8 @@ class _Search:
     def best(self):
         """Windows refined one after the other, and the log evidence of all."""
         factors = SETTINGS.window_factors
-        prior = -np.log(SETTINGS.event_cell * len(self.bank) * len(factors) * len(SHAPES))
-        base, windows = self._first(SHAPES)
+        prior = -np.log(SETTINGS.event_cell * len(self.bank) * len(factors) * len(EXCURSIONS))
+        base, windows = self._first(EXCURSIONS)
         first = windows
         evidence = self.score(base, windows) + prior
         while True:
@@ -180,7 +179,7 @@ class _Search:
             beside = [w for w in beside if not w.overlaps(windows)][: SETTINGS.shortlist]
             tries = [
                 (*windows, window._replace(factor=factor, shape=shape))
-                for window, factor, shape in product(beside, factors, SHAPES)
+                for window, factor, shape in product(beside, factors, EXCURSIONS)
             ]
             if not tries:
                 break

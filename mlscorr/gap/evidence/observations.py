@@ -20,6 +20,8 @@ import numpy as np
 from mlscorr.collocation import Covariance, Signal, Whitener, factor
 from mlscorr.gap.evidence.settings import SETTINGS
 from mlscorr.gap.residuals import Background, Rows
+from mlscorr.pos import SETTINGS as POS
+from mlscorr.pos import excursion_profile, stated_processes
 from mlscorr.survey import Columns
 
 FACTORS = 128  # kept of V0: those that the evidence comes back to, less than 100 MB
@@ -95,28 +97,17 @@ def window_growth(
     """
     growth = np.zeros(len(gps_time))
     for start, length, largest, shape in windows:
-        part = (gps_time - start) / length
-        inside = (part >= 0) & (part < 1)
-        profile = part if shape == "rise" else 4 * part * (1 - part)
-        growth[inside] = largest * profile[inside]
+        profile = excursion_profile(gps_time, start, start + length, shape)
+        growth = np.where(profile > 0, largest * profile, growth)
     return growth[:, None]
 
 
 def error_models() -> tuple[ErrorModel, ...]:
     """Those within the belief whose attitude errs as the position does; weights sum to one."""
     return tuple(
-        ErrorModel(scale, family, time, (scale, family, time), weight=share)
-        for (scale, family, time), share in _processes()
+        ErrorModel(scale, family, time, (scale, family, time), weight=weight)
+        for scale, family, time, weight in stated_processes()
     )
-
-
-def _processes():
-    """Pairs of (scale, family, time) and prior weight."""
-    scales = np.asarray(SETTINGS.pos_scales)
-    share = np.exp(-0.5 * (np.log(scales) / SETTINGS.scale_spread) ** 2)
-    for family, time, weight in SETTINGS.shapes:
-        for scale, part in zip(scales, share / share.sum(), strict=True):
-            yield (float(scale), family, time), float(part * weight)
 
 
 def shaped_models(scale: float = 1.0, fixes: float = 0.0) -> list[ErrorModel]:
@@ -131,7 +122,7 @@ def shaped_models(scale: float = 1.0, fixes: float = 0.0) -> list[ErrorModel]:
     """
     return [
         ErrorModel(scale, family, time, (scale, family, time), fixes=fixes, weight=weight)
-        for family, time, weight in SETTINGS.shapes
+        for family, time, weight in POS.process_shapes
     ]
 
 
@@ -147,8 +138,8 @@ def _varied_models(stretches: int) -> Iterator[Callable]:
         Number of those in which sigma is raised.
     """
     yield lambda best: [
-        replace(best, attitude=process, weight=best.weight * share)
-        for process, share in _processes()
+        replace(best, attitude=process[:3], weight=best.weight * process.weight)
+        for process in stated_processes()
     ]
     yield lambda best: [
         replace(best, noise=noise, weight=best.weight * share)
@@ -165,7 +156,7 @@ def _varied_models(stretches: int) -> Iterator[Callable]:
                 ),
                 weight=best.weight * share,
             )
-            for factor, share in SETTINGS.raised
+            for factor, share in POS.raised_scales
         ]
     yield _nearby_models
 

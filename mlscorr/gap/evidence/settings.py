@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 from scipy.special import ndtri
 
+from mlscorr.pos import SETTINGS as POS
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -24,20 +26,8 @@ class Settings:
     # surveys in which nothing acts: a band of 95 % to a sixth of its width
 
     # The error model of the POS and of what is observed.
-    pos_scales: tuple[float, ...] = (0.4, 0.7, 1.2, 2.0)
-    # ratio to the POS's sigma; more is a cause of its own
-    scale_spread: float = 0.45
-    # of log scale; sigmas of POS are rarely wrong by more than half
     noise_scales: tuple[tuple[float, float], ...] = ((1.0, 0.7), (1.6, 0.3))
     # ratio to the rows' own sigma, and its prior: extraction errors have tails
-    shapes: tuple[tuple[str, float, float], ...] = (
-        *(("matern32", 0.1, 0.15), ("matern32", 0.3, 0.25), ("exponential", 1.0, 0.20)),
-        *(("matern32", 1.0, 0.25), ("matern32", 3.0, 0.15)),
-    )
-    # family, factor on the correlation time, prior
-    raised: tuple[tuple[float, float], ...] = ((1.0, 0.5), (2.0, 0.3), (3.5, 0.2))
-    # ratio to a sigma that is raised, and its prior: a POS knows when it lacks GNSS, and errs by up
-    # to five times what it states then (real units, pos_study.py)
     window_time: float = 100.0
     # s; without GNSS a velocity stays wrong for longer than most outages last
     fix_correlation_time: float = 0.9
@@ -93,7 +83,7 @@ class Settings:
     noise_steps: int = 4
     # from each of these sizes to the next, where only channels are looked at: these are sharper
     drift_sizes: tuple[float, ...] = (3.3, 5.0, 8.0)
-    # ratio to the POS's sigma, beyond what pos_scales believe
+    # ratio to the POS's sigma, beyond what process_scales of a POS believe
     fix_sizes: tuple[float, ...] = (0.5, 1.0, 2.0, 4.0)
     # ratio to position_noise's usual size
     roughness: tuple[tuple[float, float], ...] = ((0.0, 0.5), (0.1, 0.3), (0.3, 0.2))
@@ -136,7 +126,7 @@ class Settings:
     @property
     def scale_limit(self) -> float:
         """Largest ratio to the POS's sigma that is still believed, ten percent above the grid's."""
-        return 1.1 * max(self.pos_scales)
+        return 1.1 * max(POS.process_scales)
 
 
 SETTINGS = Settings()

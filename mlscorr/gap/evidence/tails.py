@@ -8,6 +8,7 @@ from numba import njit
 from mlscorr.gap.evidence.observations import ErrorModel, Observations
 from mlscorr.gap.evidence.settings import SETTINGS
 from mlscorr.gap.residuals import Rows
+from mlscorr.pos import SETTINGS as POS
 
 
 def without_tails(
@@ -31,7 +32,7 @@ def without_tails(
         Odd rows.
     """
     residual = observations.columns(rows.residual[:, None])
-    process = (SETTINGS.scale_limit, *SETTINGS.shapes[1][:2])
+    process = (SETTINGS.scale_limit, *POS.process_shapes[1][:2])
     flexible = ErrorModel(*process, process)
     whitener = observations.with_shared(nuisance).whitener(flexible)
     weights, precision = whitener.solve(residual)

@@ -20,7 +20,7 @@ from mlscorr.gap.residuals.rows import (
     scanner_origin,
 )
 from mlscorr.gap.residuals.settings import SETTINGS
-from mlscorr.pos import stated_sigma
+from mlscorr.pos import PosErrors
 from mlscorr.simulate import SceneScenario
 from mlscorr.simulate.scene import read_mesh
 from mlscorr.survey import SEARCH_RADIUS, Columns, Survey
@@ -85,7 +85,7 @@ def gate(survey: Survey, gps_time: np.ndarray) -> np.ndarray:
     (n,) array
         Units: m.
     """
-    sigma = stated_sigma(survey.trajectory, survey.pos, gps_time)
+    sigma = PosErrors.stated(survey.trajectory, survey.pos).at(gps_time)
     size = SETTINGS.surface_gate_sigmas * np.linalg.norm(sigma.drift + sigma.held, axis=1)
     return np.clip(size, SETTINGS.least_surface_gate, SEARCH_RADIUS)
 

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from mlscorr.effects import Reference
 from mlscorr.frames import angles_from_attitude, pose_partials, scanner_position, to_scanner
 from mlscorr.gap.residuals.settings import SETTINGS
-from mlscorr.pos import stated_sigma
+from mlscorr.pos import PosErrors
 from mlscorr.survey import Columns, ControlPoints, Survey, Trajectory
 
 METRIC = ("target", "surface", "shared")  # in m along a direction; the others have no unit
@@ -246,7 +246,7 @@ def background(rows: Rows, survey: Survey) -> Background:
     row = np.append(first, second)
     gps_time = np.append(rows.gps_time[first], rows.gps_time_2[second])
     partials = np.vstack([rows.partials[first], rows.partials_2[second]])
-    sigma = stated_sigma(survey.trajectory, survey.pos, gps_time)
+    sigma = PosErrors.stated(survey.trajectory, survey.pos).at(gps_time)
     return Background(
         row,
         gps_time,

@@ -5,6 +5,7 @@ from itertools import groupby
 
 from mlscorr.effects import lowered, title
 from mlscorr.gap.evidence import SETTINGS
+from mlscorr.pos import SETTINGS as POS
 from mlscorr.report.gap._channels import channel_statements
 from mlscorr.report.gap._verdict import facts, is_named, verdict
 from mlscorr.report.headline import (
@@ -17,7 +18,7 @@ from mlscorr.report.headline import (
 from mlscorr.wording import joined, length_in_words
 
 RATINGS = {"good": "green", "open": "amber", "bad": "red"}  # by the tone of a verdict
-TIMES = [time for _, time, _ in SETTINGS.shapes]
+TIMES = [time for _, time, _ in POS.process_shapes]
 USES = {  # of defaults that are not estimated
     "pos.attitude_sigma": "how much larger or smaller it is, is open",
     "pos.correlation_time": f"{min(TIMES):g} to {max(TIMES):g} times as long is possible, too",

@@ -5,6 +5,7 @@ from scipy.stats import norm
 
 from mlscorr.gap.evidence import SETTINGS
 from mlscorr.gap.evidence.settings import Settings
+from mlscorr.pos import SETTINGS as POS
 
 
 def test_quantile_and_band_are_those_of_the_confidence():
@@ -21,7 +22,7 @@ def test_priors_are_shares():
         dict(SETTINGS.noise_scales).values(),
         dict(SETTINGS.roughness).values(),
         dict(SETTINGS.roughness_common).values(),
-        dict(SETTINGS.raised).values(),
-        [shape[2] for shape in SETTINGS.shapes],
+        dict(POS.raised_scales).values(),
+        [shape[2] for shape in POS.process_shapes],
     )
     assert [sum(share) for share in shares] == pytest.approx([1.0] * len(shares))
