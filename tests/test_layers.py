@@ -19,7 +19,7 @@ FLOORS = (  # from the ground up; rooms on one floor do not know each other
     ("frames",),
     ("correction", "collocation", "pos"),
     ("effects", "io", "matching"),
-    ("simulate", "baselines", "targets", "estimate"),
+    ("simulate", "baselines", "targets", "estimate", "surfaces"),
     ("ties",),
     ("gap", "evaluate"),
     ("blind", "report"),

@@ -3,10 +3,16 @@
 The sums are about the middle of each cell, so that no digit is lost at coordinates of UTM size.
 """
 
+from __future__ import annotations
+
+from dataclasses import dataclass
+
 import numpy as np
 from numba import njit
 
-from mlscorr.survey import PointCloud
+from mlscorr.surfaces.places import block_chance, place_key
+from mlscorr.surfaces.settings import SETTINGS
+from mlscorr.survey import Columns, PointCloud
 
 EMPTY = -1
 CELL_BITS = 21  # of a key for each axis: a million cells to each side of the origin
@@ -14,8 +20,98 @@ GROUP_BITS = 24  # of a key for the group, below the number of the moment
 # Columns of the moments of a cell: number of points; sums of their times since the cell's moment
 # began, of x, y, z; of xx, xy, xz, yy, yz, zz; number of points that follow another one of the
 # cell, and the sums of the same products of the differences from that; sums of the times' products
-# with x, y, z.
-COLUMNS = 21
+# with x, y, z; sum of a value of each point.
+COLUMNS = 22
+ROW_AXES, COLUMN_AXES = np.triu_indices(3)  # of the products: xx, xy, xz, yy, yz, zz
+ALWAYS = np.array([[-np.inf, np.inf]])  # s: a single segment, of all times
+NO_VALUES = np.empty(0)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Cells(Columns):
+    """Cells of space and time, with the moments of their points.
+
+    Parameters
+    ----------
+    middle : (n, 3) array
+        Units: m.
+    begin : (n,) array
+        Of their moments. Units: s.
+    group : (n,) int array
+        Of the file and the segment of the trajectory.
+    moments : (n, 22) array
+        Sums over the points about the middle and the beginning; see the columns above.
+    """
+
+    middle: np.ndarray
+    begin: np.ndarray
+    group: np.ndarray
+    moments: np.ndarray
+
+    @property
+    def points(self) -> np.ndarray:
+        """Number of points (n,)."""
+        return self.moments[:, 0]
+
+    @property
+    def gps_time(self) -> np.ndarray:
+        """Mean of the points (n,). Units: s."""
+        return self.begin + self.moments[:, 1] / self.points
+
+    @property
+    def offset(self) -> np.ndarray:
+        """Mean of the points (n, 3), from the middle of the cell. Units: m."""
+        return self.moments[:, 2:5] / self.points[:, None]
+
+    @property
+    def centre(self) -> np.ndarray:
+        """Mean of the points (n, 3). Units: m."""
+        return self.middle + self.offset
+
+    @property
+    def value(self) -> np.ndarray:
+        """Mean of the points' values (n,)."""
+        return self.moments[:, 21] / self.points
+
+    @property
+    def key(self) -> np.ndarray:
+        """Number (n,) of the place and moment, the same in all clouds (see place_key)."""
+        return place_key(self.middle, self.begin)
+
+    @property
+    def chance(self) -> np.ndarray:
+        """Random number (n,) of the block of the ground, from 0 to 1."""
+        return block_chance(self.middle)
+
+
+def covariances(moments: np.ndarray) -> np.ndarray:
+    """Covariances (n, 3, 3) of the points of cells. Units: m^2.
+
+    Parameters
+    ----------
+    moments : (n, 22) array
+    """
+    count = np.maximum(moments[:, :1], 1.0)
+    mean = moments[:, 2:5] / count
+    return _symmetric(moments[:, 5:11] / count - mean[:, ROW_AXES] * mean[:, COLUMN_AXES])
+
+
+def neighbour_covariances(moments: np.ndarray) -> np.ndarray:
+    """Noise (n, 3, 3) of the points of cells by those that follow each other. Units: m^2.
+
+    Half the mean product of their differences: what neighbours share is the surface.
+
+    Parameters
+    ----------
+    moments : (n, 22) array
+    """
+    return _symmetric(moments[:, 12:18] / np.maximum(2 * moments[:, 11:12], 1.0))
+
+
+def _symmetric(products):
+    matrix = np.empty((len(products), 3, 3))
+    matrix[:, ROW_AXES, COLUMN_AXES] = matrix[:, COLUMN_AXES, ROW_AXES] = products
+    return matrix
 
 
 @njit(cache=True, inline="always")
@@ -54,6 +150,7 @@ def hash_rows(keys: np.ndarray, count: int, size: int) -> np.ndarray:
 def add_points(
     xyz: np.ndarray,
     gps_time: np.ndarray,
+    values: np.ndarray,
     begin: int,
     grid: np.ndarray,
     passes: np.ndarray,
@@ -63,12 +160,15 @@ def add_points(
     keys: np.ndarray,
     moments: np.ndarray,
     count: int,
+    rows: np.ndarray,
 ) -> tuple[int, int]:
     """Add points to the moments of their cells, until all are added or no row is left.
 
     Parameters
     ----------
     xyz, gps_time : (n, 3), (n,) arrays
+    values : (n,) or (0,) array
+        Whose sums are wanted, if any.
     begin : int
         The first point to add.
     grid : (6,) array
@@ -79,10 +179,12 @@ def add_points(
         Of the first segment: the key of a cell holds group + segment.
     starts : (s,) array
         First time of each segment, which is updated.
-    table, keys, moments : (t,), (k, 2), (k, 21) arrays
+    table, keys, moments : (t,), (k, 2), (k, 22) arrays
         Hash table, key and moments of each cell, which are updated.
     count : int
         Rows in use.
+    rows : (n,) int array
+        Row of each point's cell, which is filled; left as it is for points outside the segments.
 
     Returns
     -------
@@ -124,16 +226,13 @@ def add_points(
             row = table[slot]
             last_cell = cell
             last_moment = moment
+        rows[i] = row
         sums = moments[row]
-        sums[0] += 1.0
-        since = time - grid[3] - second * grid[5]
-        sums[1] += since
-        _add_place(sums, 2, 1.0, x, y, z)
-        _add_place(sums, 18, since, x, y, z)
-        _add_products(sums, 5, x, y, z)
+        _add_point(sums, time - grid[3] - second * grid[5], x, y, z)
+        if len(values) > 0:
+            sums[21] += values[i]
         if follows:
-            sums[11] += 1.0
-            _add_products(sums, 12, x - last_x, y - last_y, z - last_z)
+            _add_difference(sums, x - last_x, y - last_y, z - last_z)
         last_x = x
         last_y = y
         last_z = z
@@ -157,11 +256,24 @@ def _split(place, grid):
 
 
 @njit(cache=True, inline="always")
-def _add_place(sums, column, factor, x, y, z):
-    """Add x, y, z times a factor to the columns from one on."""
-    sums[column] += factor * x
-    sums[column + 1] += factor * y
-    sums[column + 2] += factor * z
+def _add_point(sums, since, x, y, z):
+    """Add a point, so long after the beginning and so far from the middle, to its cell's sums."""
+    sums[0] += 1.0
+    sums[1] += since
+    sums[2] += x
+    sums[3] += y
+    sums[4] += z
+    _add_products(sums, 5, x, y, z)
+    sums[18] += since * x
+    sums[19] += since * y
+    sums[20] += since * z
+
+
+@njit(cache=True, inline="always")
+def _add_difference(sums, x, y, z):
+    """Add the step from the point before."""
+    sums[11] += 1.0
+    _add_products(sums, 12, x, y, z)
 
 
 @njit(cache=True, inline="always")
@@ -175,41 +287,109 @@ def _add_products(sums, column, x, y, z):
     sums[column + 5] += z * z
 
 
+@njit(cache=True, nogil=True)
+def add_near_planes(
+    local: np.ndarray,
+    since: np.ndarray,
+    ends: np.ndarray,
+    mean: np.ndarray,
+    normal: np.ndarray,
+    limit: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Moments of those points of some groups that lie near the plane of their group.
+
+    Parameters
+    ----------
+    local : (n, 3) array
+        Points, group after group, about a place near them. Units: m.
+    since : (n,) array
+        Time since the beginning of each group. Units: s.
+    ends : (g + 1,) int array
+        Where each group begins, and the last one ends.
+    mean, normal : (g, 3) arrays
+        A point of each plane (m) and its normal.
+    limit : (g,) array
+        Largest distance from the plane. Units: m.
+
+    Returns
+    -------
+    moments : (g, 22) array
+        Here a point follows another one where no point of the group lies between them.
+    is_near : (n,) bool array
+    """
+    moments = np.zeros((len(limit), COLUMNS))
+    is_near = np.zeros(len(local), np.bool_)
+    for g in range(len(limit)):
+        sums = moments[g]
+        for i in range(ends[g], ends[g + 1]):
+            x, y, z = local[i]
+            height = (x - mean[g, 0]) * normal[g, 0]
+            height += (y - mean[g, 1]) * normal[g, 1]
+            height += (z - mean[g, 2]) * normal[g, 2]
+            if abs(height) > limit[g]:
+                continue
+            is_near[i] = True
+            _add_point(sums, since[i], x, y, z)
+            if i > ends[g] and is_near[i - 1]:
+                before = local[i - 1]
+                _add_difference(sums, x - before[0], y - before[1], z - before[2])
+    return moments, is_near
+
+
 class CellTable:
     """Cells that points may still fall into.
 
     Parameters
     ----------
     origin : (3,) array
-        Of the cells; whole metres keep their borders. Units: m.
+        Corner of a cell, near the points. Units: m.
     start : float
         Of the moments. Units: s.
-    edge, duration : float
-        Of a cell. Units: m, s.
     """
 
-    def __init__(self, origin: np.ndarray, start: float, edge: float, duration: float):
-        self._grid = np.array([*origin, start, edge, duration])
+    def __init__(self, origin: np.ndarray, start: float = 0.0):
+        self._grid = np.array([*origin, start, SETTINGS.cell, SETTINGS.moment])
         self.count = 0
         self.keys = np.empty((1 << 12, 2), np.int64)
         self.moments = np.empty((1 << 12, COLUMNS))
         self._table = hash_rows(self.keys, 0, 1 << 13)
 
-    def add(self, cloud: PointCloud, passes: np.ndarray, group: int, starts: np.ndarray) -> None:
-        """Add points, as add_points does.
+    def add(
+        self,
+        cloud: PointCloud,
+        passes: np.ndarray = ALWAYS,
+        group: int = 0,
+        starts: np.ndarray | None = None,
+        values: np.ndarray = NO_VALUES,
+    ) -> np.ndarray:
+        """Add points to their cells.
 
         Parameters
         ----------
         cloud : PointCloud
         passes : (s, 2) array
+            Start and end of the trajectory's segments; other points are left out. Units: s.
         group : int
-        starts : (s,) array
+            Of the first segment: a cell has group + segment.
+        starts : (s,) array, optional
+            First time of each segment, which is updated. Units: s.
+        values : (n,) array, optional
+            Of which cells have the sums, too.
+
+        Returns
+        -------
+        (n,) int array
+            Row of each point's cell, until cells are removed; -1 outside the segments.
         """
+        if starts is None:
+            starts = np.full(len(passes), np.inf)
+        rows = np.full(len(cloud), EMPTY)
         begin = 0
         while True:
             begin, self.count = add_points(
                 cloud.xyz,
                 cloud.gps_time,
+                values,
                 begin,
                 self._grid,
                 passes,
@@ -219,9 +399,10 @@ class CellTable:
                 self.keys,
                 self.moments,
                 self.count,
+                rows,
             )
             if begin == len(cloud):
-                return
+                return rows
             self.keys = np.concatenate([self.keys, np.empty_like(self.keys)])
             self.moments = np.concatenate([self.moments, np.empty_like(self.moments)])
             self._table = hash_rows(self.keys, self.count, 2 * len(self.keys))
@@ -231,21 +412,12 @@ class CellTable:
         """Number (count,) of each cell's moment."""
         return self.keys[: self.count, 1] >> GROUP_BITS
 
-    def of(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Some cells.
+    def of(self, rows: np.ndarray | slice = slice(None)) -> Cells:
+        """Some cells, or all of them.
 
         Parameters
         ----------
-        rows : (count,) bool array
-
-        Returns
-        -------
-        middle : (k, 3) array
-            Of the cells. Units: m.
-        begin : (k,) array
-            Of their moments. Units: s.
-        group : (k,) int array
-        moments : (k, 21) array
+        rows : (count,) bool array, optional
         """
         keys = self.keys[: self.count][rows]
         moments = self.moments[: self.count][rows]
@@ -258,7 +430,7 @@ class CellTable:
         cell[:, 0] = rest
         middle = self._grid[:3] + (cell + 0.5) * self._grid[4]
         begin = self._grid[3] + (keys[:, 1] >> GROUP_BITS) * self._grid[5]
-        return middle, begin, keys[:, 1] & ((1 << GROUP_BITS) - 1), moments
+        return Cells(middle, begin, keys[:, 1] & ((1 << GROUP_BITS) - 1), moments)
 
     def remove(self, rows: np.ndarray) -> None:
         """Make room for others.

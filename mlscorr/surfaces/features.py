@@ -1,19 +1,19 @@
-"""Tie features of a survey's clouds, found while these are read."""
+"""Planes, poles and paint of a survey's clouds, found while these are read."""
 
 from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 
+from mlscorr.surfaces._paint import Crossings, find_crossings, find_markings, window_of
+from mlscorr.surfaces._shapes import find_shapes
+from mlscorr.surfaces._thinning import thin
+from mlscorr.surfaces.cells import CellTable
+from mlscorr.surfaces.settings import SETTINGS
 from mlscorr.survey import CloudFile, PointCloud, Survey, TieFeatures, Trajectory
-from mlscorr.ties._cells import CellTable
-from mlscorr.ties._markings import Crossings, find_crossings, find_markings, window_of
-from mlscorr.ties._shapes import find_shapes
-from mlscorr.ties.settings import SETTINGS
-from mlscorr.ties.thinning import thin
 
 
-class TieCollector:
+class FeatureCollector:
     """Finds planes, poles and markings of the chunks that it is given, in any order.
 
     What it holds grows neither with the points nor with the file: cells of the last moments, whose
@@ -43,7 +43,7 @@ class TieCollector:
             self._origin = np.floor(survey.trajectory.position[0])
         else:
             self._origin = origin
-        self._cells = CellTable(self._origin, start, SETTINGS.cell, SETTINGS.moment)
+        self._cells = CellTable(self._origin, start)
         self._starts = np.full((len(survey.clouds), len(self._segments)), np.inf)
         self._start = start
         self._crossings: list[Crossings] = []
@@ -86,11 +86,11 @@ class TieCollector:
             self._loose = 0
 
     def _shapes(self, rows):
-        """Features of cells (count,), each seen from the scanner of its file."""
+        """Features of some cells, each seen from the scanner of its file."""
         cells = self._cells.of(rows)
-        scanner = self._scanner(cells[2])
+        scanner = self._scanner(cells.group)
         return TieFeatures.concatenate(
-            find_shapes(part, *(column[inside] for column in cells))
+            find_shapes(part, cells[inside])
             for part, inside in self._survey.rows_by_scanner(scanner)
         )
 
@@ -100,7 +100,7 @@ class TieCollector:
 
     def features(self) -> TieFeatures:
         """Features of all chunks so far, in order of pass and time; chunks may still follow."""
-        rest = [self._shapes(np.ones(self._cells.count, bool))]
+        rest = [self._shapes(slice(None))]
         if self._crossings:
             rest.append(find_markings(Crossings.concatenate(self._crossings), self._start))
         features = TieFeatures.concatenate([*self._kept, *rest])
@@ -120,7 +120,7 @@ def join_features(
     ----------
     parts : iterable of TieFeatures
     origin : (3,) array
-        As of TieCollector. Units: m.
+        As of FeatureCollector. Units: m.
     trajectory : Trajectory, optional
         That says where the scanner stands.
     """

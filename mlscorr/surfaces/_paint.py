@@ -8,8 +8,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from mlscorr.surfaces.settings import SETTINGS
 from mlscorr.survey import Columns, PointCloud, TieFeatures
-from mlscorr.ties.settings import SETTINGS
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -1,0 +1,74 @@
+"""Random numbers of places and moments, the same in every cloud: which of them are kept."""
+
+import numpy as np
+
+from mlscorr.surfaces.settings import SETTINGS
+
+
+def integer_hash(numbers: np.ndarray) -> np.ndarray:
+    """A 64-bit number (n,) of integers (n, k): random, but the same for the same ones.
+
+    Parameters
+    ----------
+    numbers : (n, k) int array
+    """
+    mixed = np.zeros(len(numbers), np.uint64)
+    for number in numbers.T:
+        mixed ^= number.astype(np.uint64)
+        mixed *= np.uint64(0x9E3779B97F4A7C15)  # 2^64 over the golden ratio (Fibonacci hashing)
+        mixed ^= mixed >> np.uint64(32)
+    return mixed
+
+
+def chance(*numbers: np.ndarray) -> np.ndarray:
+    """A number from 0 to 1 (n,) that depends on integers (n,) alone."""
+    return (integer_hash(np.column_stack(numbers)) >> np.uint64(11)) / float(1 << 53)
+
+
+def place_key(xyz: np.ndarray, gps_time: np.ndarray) -> np.ndarray:
+    """A number for the cell and moment of points, the same in all clouds.
+
+    Parameters
+    ----------
+    xyz : (n, 3) array
+        Units: m.
+    gps_time : (n,) array
+        Units: s.
+
+    Returns
+    -------
+    (n,) uint64 array
+    """
+    cell = np.floor(_in_cells(xyz)).astype(np.int64)
+    moment = np.floor(gps_time / SETTINGS.moment).astype(np.int64)
+    return integer_hash(np.column_stack([cell, moment]))
+
+
+def block_chance(xyz: np.ndarray) -> np.ndarray:
+    """A number from 0 to 1 (n,) for the block of the ground of points, the same in all clouds.
+
+    Parameters
+    ----------
+    xyz : (n, 3) array
+        Units: m.
+    """
+    blocks = np.floor(_in_cells(xyz[:, :2]) / SETTINGS.block_cells)
+    return chance(*blocks.T.astype(np.int64))
+
+
+def cell_corner(xyz: np.ndarray) -> np.ndarray:
+    """The least corner (n, 3) of the cells of points. Units: m.
+
+    Parameters
+    ----------
+    xyz : (n, 3) array
+        Units: m.
+    """
+    return (np.floor(_in_cells(xyz)) - 1.0 / 3.0) * SETTINGS.cell
+
+
+def _in_cells(xyz):
+    """Places in edges of a cell, whose faces stand a third off the whole numbers: models have
+    floors and walls there.
+    """
+    return xyz / SETTINGS.cell + 1.0 / 3.0
