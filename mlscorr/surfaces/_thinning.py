@@ -1,4 +1,4 @@
-"""Which of many features stay: the same number in each second and direction."""
+"""Choice among many features: as many in each second and direction."""
 
 from collections.abc import Sequence
 
@@ -32,7 +32,7 @@ def kind_number(features: TieFeatures) -> np.ndarray:
 
 
 def moment_number(gps_time: np.ndarray, trajectory: Trajectory | None = None) -> np.ndarray:
-    """Number (n,) of the moment of times; a stand is one of a pause: nothing new is seen there.
+    """Number (n,) of the moment of times; a standstill is one moment a pause long.
 
     Parameters
     ----------
@@ -47,8 +47,8 @@ def moment_number(gps_time: np.ndarray, trajectory: Trajectory | None = None) ->
     window = np.floor(trajectory.gps_time / SETTINGS.pause)
     first = np.flatnonzero(np.diff(window, prepend=-np.inf))
     position = trajectory.position
-    way = np.maximum.reduceat(position, first) - np.minimum.reduceat(position, first)
-    stands = window[first][np.linalg.norm(way, axis=1) < SETTINGS.cell]
+    extent = np.maximum.reduceat(position, first) - np.minimum.reduceat(position, first)
+    stands = window[first][np.linalg.norm(extent, axis=1) < SETTINGS.cell]
     own = np.floor(gps_time / SETTINGS.pause)
     whole = np.floor(own * SETTINGS.pause / SETTINGS.moment).astype(np.int64)
     return np.where(np.isin(own, stands), whole, moment)
@@ -57,12 +57,11 @@ def moment_number(gps_time: np.ndarray, trajectory: Trajectory | None = None) ->
 def thin(
     features: TieFeatures, origin: np.ndarray, trajectory: Trajectory | None = None
 ) -> np.ndarray:
-    """Rows (k,) of the features that stay, whatever the order in which they came.
+    """Rows (k,) of the features to keep, whatever the order in which they came.
 
-    Of each second and pass, kind and class of directions stay at most SETTINGS.features, so that
-    memory follows the time that was driven, not the points. Those stay whose block of space has
-    the least of some random numbers, the same in all passes: what is left of one pass is left of
-    the others.
+    At most SETTINGS.features are kept of each second, pass, kind and class of directions, so that
+    memory follows the time of the drive, not the points. The blocks of space with the smallest of
+    some random numbers are kept. These are the same in all passes, so the same blocks are, too.
 
     Parameters
     ----------
@@ -80,20 +79,6 @@ def thin(
     ]
     group = np.column_stack([features.pass_number, moment, bins])
     return first_of_groups(group, [features.gps_time, *chances[::-1]], SETTINGS.features)
-
-
-def some_blocks(features: TieFeatures, number: int) -> TieFeatures:
-    """About a number of features: all of some blocks of space, the same blocks in every pass.
-
-    Parameters
-    ----------
-    features : TieFeatures
-    number : int
-    """
-    if len(features) <= number:
-        return features
-    chance = integer_hash(np.floor(features.centre / SETTINGS.thinning_block).astype(np.int64))
-    return features[chance <= np.partition(chance, number)[number]]
 
 
 def first_of_groups(group: np.ndarray, order: Sequence[np.ndarray], number: int) -> np.ndarray:

@@ -17,10 +17,15 @@ from mlscorr.survey import Columns, PointCloud
 EMPTY = -1
 CELL_BITS = 21  # of a key for each axis: a million cells to each side of the origin
 GROUP_BITS = 24  # of a key for the group, below the number of the moment
-# Columns of the moments of a cell: number of points; sums of their times since the cell's moment
-# began, of x, y, z; of xx, xy, xz, yy, yz, zz; number of points that follow another one of the
-# cell, and the sums of the same products of the differences from that; sums of the times' products
-# with x, y, z; sum of a value of each point.
+# Columns of the moments of a cell:
+#  0     number of points
+#  1     sum of the times since the cell's moment began (s)
+#  2-4   sums of x, y, z from the middle (m)
+#  5-10  sums of xx, xy, xz, yy, yz, zz (m^2)
+# 11     number of points that follow another one of the cell
+# 12-17  sums of the products 5-10 of the steps from that one (m^2)
+# 18-20  sums of the times' products with x, y, z (m s)
+# 21     sum of a value of each point, if any
 COLUMNS = 22
 ROW_AXES, COLUMN_AXES = np.triu_indices(3)  # of the products: xx, xy, xz, yy, yz, zz
 ALWAYS = np.array([[-np.inf, np.inf]])  # s: a single segment, of all times
@@ -69,6 +74,11 @@ class Cells(Columns):
         return self.middle + self.offset
 
     @property
+    def covariance(self) -> np.ndarray:
+        """Covariance of the points (n, 3, 3). Units: m^2."""
+        return covariances(self.moments)
+
+    @property
     def value(self) -> np.ndarray:
         """Mean of the points' values (n,)."""
         return self.moments[:, 21] / self.points
@@ -85,7 +95,7 @@ class Cells(Columns):
 
 
 def covariances(moments: np.ndarray) -> np.ndarray:
-    """Covariances (n, 3, 3) of the points of cells. Units: m^2.
+    """Covariances (n, 3, 3) of the points of cells; zeros for no points. Units: m^2.
 
     Parameters
     ----------
@@ -241,7 +251,7 @@ def add_points(
 
 @njit(cache=True, inline="always")
 def _split(place, grid):
-    """Key of the cell that holds a place, and the way (m) to that from its middle."""
+    """Key of the cell around a place, and the offset (m) of the place from its middle."""
     x = place[0] - grid[0]
     y = place[1] - grid[1]
     z = place[2] - grid[2]

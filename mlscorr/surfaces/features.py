@@ -14,17 +14,17 @@ from mlscorr.survey import CloudFile, PointCloud, Survey, TieFeatures, Trajector
 
 
 class FeatureCollector:
-    """Finds planes, poles and markings of the chunks that it is given, in any order.
+    """Finds planes, poles and paint in the chunks of clouds, in any order.
 
-    What it holds grows neither with the points nor with the file: cells of the last moments, whose
-    points may still come, crossings of paint likewise, and of those before a bounded number of
-    features a second (see thin).
+    Its memory grows neither with the points nor with the file: it has the cells and the crossings
+    of paint of the last moments, whose points may still come, and of those before a bounded number
+    of features a second (see thin).
 
     Parameters
     ----------
     survey : Survey
-    held_cells : int, optional
-        Above as many, cells of moments that have passed are looked at and left.
+    cells_in_memory : int, optional
+        With more, those of moments that have passed give their features and are removed.
     origin : (3,) array, optional
         Whole metres, near the survey; that of its trajectory by default. Units: m.
     """
@@ -32,11 +32,11 @@ class FeatureCollector:
     def __init__(
         self,
         survey: Survey,
-        held_cells: int = SETTINGS.held_cells,
+        cells_in_memory: int = SETTINGS.cells_in_memory,
         origin: np.ndarray | None = None,
     ):
         self._survey = survey
-        self._held_cells = held_cells
+        self._cells_in_memory = cells_in_memory
         self._segments = survey.trajectory.passes
         start = np.floor(survey.trajectory.gps_time[0])
         if origin is None:
@@ -64,12 +64,12 @@ class FeatureCollector:
         group = source * len(self._segments)
         self._cells.add(chunk, self._segments, group, self._starts[source])
         self._crossings.append(find_crossings(chunk, self._segments, group))
-        if self._cells.count > self._held_cells:
+        if self._cells.count > self._cells_in_memory:
             # beams that take turns come a little late
             self._close(self._cells.moment.max() - 1)
 
     def _close(self, moment):
-        """Keep the features of the moments before one, and of all so far so many as may stay."""
+        """Find the features of the moments before one, and thin all so far where they are many."""
         rows = self._cells.moment < moment
         self._kept.append(self._shapes(rows))
         self._cells.remove(rows)
@@ -78,7 +78,7 @@ class FeatureCollector:
         self._kept.append(find_markings(crossings[~later], self._start))
         self._crossings = [crossings[later]]
         self._loose += len(self._kept[-1]) + len(self._kept[-2])
-        if self._loose > max(self._held_cells, self._kept_in_order):
+        if self._loose > max(self._cells_in_memory, self._kept_in_order):
             features = TieFeatures.concatenate(self._kept)
             rows = thin(features, self._origin, self._survey.trajectory)
             self._kept = [features[rows]]
@@ -114,7 +114,7 @@ class FeatureCollector:
 def join_features(
     parts: Iterable[TieFeatures], origin: np.ndarray, trajectory: Trajectory | None = None
 ) -> TieFeatures:
-    """Those that stay of the features of some passes, in order of pass and time.
+    """Join features of some passes and thin them, in order of pass and time.
 
     Parameters
     ----------

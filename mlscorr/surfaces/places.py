@@ -1,8 +1,13 @@
-"""Random numbers of places and moments, the same in every cloud: which of them are kept."""
+"""Random numbers of places and moments, the same in every cloud, by which some are chosen."""
+
+from typing import Generic, TypeVar
 
 import numpy as np
 
 from mlscorr.surfaces.settings import SETTINGS
+from mlscorr.survey import Columns
+
+Part = TypeVar("Part", bound=Columns)
 
 
 def integer_hash(numbers: np.ndarray) -> np.ndarray:
@@ -72,3 +77,46 @@ def _in_cells(xyz):
     floors and walls there.
     """
     return xyz / SETTINGS.cell + 1.0 / 3.0
+
+
+class BoundedChoice(Generic[Part]):
+    """At most a number of things of a stream, chosen by random numbers that each brings along.
+
+    Things of one number are kept or left together, and the order in which they come does not
+    matter.
+
+    Parameters
+    ----------
+    limit : int
+    """
+
+    def __init__(self, limit: int):
+        self._limit = limit
+        self._parts: list[tuple[Part, np.ndarray]] = []
+        self.share = 1.0  # of all numbers, from which on things are left
+
+    def add(self, part: Part, number: np.ndarray) -> None:
+        """Take things.
+
+        Parameters
+        ----------
+        part : Columns
+            Of n rows.
+        number : (n,) array
+            From 0 to 1.
+        """
+        self._parts.append((part, number))
+        self._leave()
+        while sum(len(number) for _, number in self._parts) > self._limit:
+            self.share /= 2
+            self._leave()
+
+    def _leave(self):
+        """Leave what has a number that is not below the share."""
+        self._parts = [
+            (part[number < self.share], number[number < self.share]) for part, number in self._parts
+        ]
+
+    def parts(self) -> list[Part]:
+        """All that is kept, in the order in which it came."""
+        return [part for part, _ in self._parts]

@@ -12,8 +12,8 @@ class Settings:
     # Cells
     cell: float = 1.0  # m: some hundred points of a scanner in a street, flat for most of them
     moment: float = 1.0  # s: the POS error is one value over it (a POS has a bandwidth of 1 Hz)
-    held_cells: int = 200_000  # cells in memory, 35 MB: some seconds of any scanner; guard
-    block_cells: int = 4  # cells that are kept or left together, so that neighbours stay
+    cells_in_memory: int = 200_000  # 38 MB: some seconds of any scanner; guard
+    block_cells: int = 4  # edge of the blocks of the ground that a choice keeps whole
     # Planes and poles
     feature_points: int = 24  # of a feature: with 21 degrees of freedom a variance to a third
     roughest: float = 0.05  # m about a plane: asphalt and masonry have centimetres, shrubs more

@@ -38,7 +38,7 @@ class MomentStream:
         self._number = np.append(self._number, number)
 
     def moments(self, time: float = np.inf) -> Iterator[tuple[int, PointCloud, np.ndarray]]:
-        """Number of the segment, PointCloud and numbers (k,) of each whole moment; they leave.
+        """Segment, PointCloud and numbers (k,) of each whole moment, which is given once.
 
         Parameters
         ----------

@@ -15,12 +15,12 @@ from mlscorr.estimate import (
     previewed_mounting,
 )
 from mlscorr.frames import georeferenced_anew, mounting_partials, partials_by_scanner
-from mlscorr.surfaces import some_blocks
 from mlscorr.survey import PAINTED, Matched, Mounting, Survey, TieFeatures, Trajectory
 from mlscorr.ties.agreement import narrowest_gate, placed_sigma, widest_gate
 from mlscorr.ties.pairing import candidate_pairs, pair_features
 from mlscorr.ties.search import agreeing_ties
 from mlscorr.ties.settings import SETTINGS
+from mlscorr.ties.thinning import some_blocks
 
 
 def tie_mounting(

@@ -18,6 +18,7 @@ class Settings:
     narrowest: float = SURFACES.narrowest  # m
     widest_paint: float = SURFACES.widest_paint  # m
     ties: int = 6  # of a second, direction and pass: 10 mm each make 4 mm, two may be wrong
+    thinning_block: float = SURFACES.thinning_block  # m
     coarse_features: int = 6000  # for six unknowns of a mounting; more cost time alone
     # Pairs
     pause: float = PAUSE  # s between two visits of one pass

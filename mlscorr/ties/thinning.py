@@ -1,10 +1,24 @@
-"""Which of many ties stay: the same number in each second and direction."""
+"""Choices of ties, as many in each second and direction, and of features in some blocks."""
 
 import numpy as np
 
 from mlscorr.surfaces import direction_class, first_of_groups, integer_hash
-from mlscorr.survey import Ties
+from mlscorr.survey import TieFeatures, Ties
 from mlscorr.ties.settings import SETTINGS
+
+
+def some_blocks(features: TieFeatures, number: int) -> TieFeatures:
+    """About a number of features: all of some blocks of space, the same blocks in every pass.
+
+    Parameters
+    ----------
+    features : TieFeatures
+    number : int
+    """
+    if len(features) <= number:
+        return features
+    chance = integer_hash(np.floor(features.centre / SETTINGS.thinning_block).astype(np.int64))
+    return features[chance <= np.partition(chance, number)[number]]
 
 
 def thinned_ties(ties: Ties, number: int = SETTINGS.ties) -> Ties:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mlscorr.surfaces import CellTable, covariances
+from mlscorr.surfaces import CellTable, block_chance, cell_corner, place_key
 from mlscorr.survey import PointCloud
 
 ORIGIN = np.array([447_000.0, 5_410_000.0, 120.0])  # m
@@ -30,7 +30,6 @@ def test_moments_are_those_of_numpy():
     cloud = scattered(40_000)
     table, _ = table_of(cloud)
     cells = table.of()
-    covariance = covariances(cells.moments)
     assert set(cells.group) == {4, 5}
     for i in range(0, table.count, 400):
         low = cells.begin[i]
@@ -39,7 +38,7 @@ def test_moments_are_those_of_numpy():
         local = cloud.xyz[inside] - cells.middle[i]
         assert cells.points[i] == inside.sum()
         assert np.allclose(cells.offset[i], local.mean(axis=0), atol=1e-9)
-        assert np.allclose(covariance[i], np.cov(local.T, bias=True), atol=1e-9)
+        assert np.allclose(cells.covariance[i], np.cov(local.T, bias=True), atol=1e-9)
 
 
 def test_points_without_a_pose_are_left_out():
@@ -74,3 +73,43 @@ def test_cells_that_are_removed_leave_the_others():
     assert np.array_equal(again.middle, late.middle)
     assert np.array_equal(again.begin, late.begin)
     assert np.allclose(again.moments, 2 * late.moments)
+
+
+def test_sums_do_not_depend_on_chunks():
+    "Cut anywhere, a cloud gives the same cells bit for bit but for neighbours across the cut"
+    cloud = scattered(20_000)
+    value = np.log10(1.0 + cloud.intensity)
+    whole = CellTable(ORIGIN)
+    parts = CellTable(ORIGIN)
+    whole.add(cloud, values=value)
+    for first in range(0, len(cloud), 777):
+        rows = slice(first, first + 777)
+        parts.add(cloud[rows], values=value[rows])
+    for name in ("middle", "begin", "points", "centre", "covariance", "gps_time", "value", "key"):
+        np.testing.assert_array_equal(getattr(parts.of(), name), getattr(whole.of(), name), name)
+
+
+def test_every_point_knows_its_cell():
+    "Rows of points lead to the cell around them, and the cell's value is the mean of theirs"
+    cloud = scattered(5_000)
+    value = np.arange(5_000.0)
+    table = CellTable(ORIGIN, START)
+    rows = table.add(cloud, PASSES, values=value)
+    cells = table.of()
+    inside = rows >= 0
+    assert np.abs(cloud.xyz[inside] - cells.middle[rows[inside]]).max() <= 0.5
+    since = cloud.gps_time[inside] - cells.begin[rows[inside]]
+    assert since.min() >= 0.0 and since.max() < 1.0
+    sums = np.bincount(rows[inside], value[inside])
+    np.testing.assert_allclose(cells.value, sums / np.bincount(rows[inside]))
+
+
+def test_a_key_is_that_of_the_points_whatever_the_table():
+    "Cells have the number and the block of their points, from whichever corner they are counted"
+    cloud = scattered(3_000)
+    for place in ORIGIN + np.array([[0.0, 0.0, 0.0], [70.0, -300.0, 5.0]]):
+        table = CellTable(cell_corner(place))
+        rows = table.add(cloud)
+        cells = table.of()
+        np.testing.assert_array_equal(cells.key[rows], place_key(cloud.xyz, cloud.gps_time))
+        np.testing.assert_array_equal(cells.chance[rows], block_chance(cloud.xyz))

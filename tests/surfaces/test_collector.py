@@ -21,12 +21,12 @@ def assert_same(first, second, shift=0.0):
     assert np.allclose(first.variance, second.variance, rtol=0.1)
 
 
-@pytest.mark.parametrize("held_cells", [10**9, 100])
-def test_chunks_are_as_good_as_the_whole(held_cells):
+@pytest.mark.parametrize("cells_in_memory", [10**9, 100])
+def test_chunks_are_as_good_as_the_whole(cells_in_memory):
     "Cells that straddle chunks are merged, also when those that have passed are closed early"
     survey = street.survey()
     parts = street.clouds()
-    collector = FeatureCollector(survey, held_cells)
+    collector = FeatureCollector(survey, cells_in_memory)
     for file, cloud in zip(survey.clouds, parts, strict=True):
         for first in range(0, len(cloud), 7_001):
             collector.add(file, cloud[first : first + 7_001])

@@ -6,9 +6,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mlscorr.frames import georeference, to_scanner
-from mlscorr.surfaces import some_blocks
 from mlscorr.survey import Mounting
 from mlscorr.ties import coarse_mounting, remounted
+from mlscorr.ties.thinning import some_blocks
 from tests.beds import painted_roads as road
 from tests.beds import tie_streets as street
 

@@ -12,7 +12,7 @@ import numpy as np
 from mlscorr.gap.contrast._settings import SETTINGS
 from mlscorr.gap.residuals import SETTINGS as OBSERVE
 from mlscorr.simulate.scan import recorded_platform
-from mlscorr.surfaces import MomentStream, chance
+from mlscorr.surfaces import BoundedChoice, MomentStream, chance
 from mlscorr.survey import Columns, PointCloud, Survey
 
 
@@ -54,11 +54,9 @@ class EdgeCollector:
 
     def __init__(self, survey: Survey, limit: int = SETTINGS.kept):
         self._survey = survey
-        self._limit = limit
         self._origin = survey.trajectory.position.mean(axis=0)
         self._platform = recorded_platform(survey, self._origin)
-        self._parts = [Edges(np.empty(0), np.empty((0, 3)), *np.empty((2, 0)))]
-        self.share = 1.0
+        self._edges: BoundedChoice[Edges] = BoundedChoice(limit)
         self._stream = MomentStream(survey.trajectory)
 
     def add(self, chunk: PointCloud) -> None:
@@ -77,15 +75,18 @@ class EdgeCollector:
         sight = inside.xyz - self._origin - self._platform.scanner(inside.gps_time)
         rough = max(OBSERVE.roughest, 6 * np.sqrt(6) * self._survey.scanner.range_noise)
         edges = edges_of(inside, sight, rough)
-        self._parts.append(edges[edges.chance < self.share])
-        while sum(map(len, self._parts)) > self._limit:
-            self.share /= 2
-            self._parts = [part[part.chance < self.share] for part in self._parts]
+        self._edges.add(edges, edges.chance)
 
     def edges(self) -> Edges:
         """Edges of all chunks, of which none follows."""
         self._take_until(np.inf)
-        return Edges.concatenate(self._parts)
+        nothing = Edges(np.empty(0), np.empty((0, 3)), np.empty(0), np.empty(0))
+        return Edges.concatenate([nothing, *self._edges.parts()])
+
+    @property
+    def share(self) -> float:
+        """Share of the moments whose edges are kept."""
+        return self._edges.share
 
 
 def edges_of(cloud: PointCloud, sight: np.ndarray, rough: float) -> Edges:

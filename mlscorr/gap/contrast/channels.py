@@ -16,7 +16,6 @@ from mlscorr.gap.contrast.sample import ChannelSample, of_shared_moments
 from mlscorr.gap.contrast.tables import Binning, Contrast, Measure, block_of, weights_of
 from mlscorr.gap.residuals import SETTINGS as OBSERVE
 from mlscorr.gap.residuals import Patches, scanner_origin
-from mlscorr.surfaces import covariances
 from mlscorr.survey import Columns, Survey
 
 CLASSES = ("dark", "medium", "bright")
@@ -341,7 +340,7 @@ def _sight(survey, cells):
 
 def _scatter(cells):
     """Sums of products (c, 3, 3) about the means of cells. Units: m^2."""
-    return covariances(cells.moments) * cells.points[:, None, None]
+    return cells.covariance * cells.points[:, None, None]
 
 
 def _incidence(sight, scatter, points):

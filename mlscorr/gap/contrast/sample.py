@@ -17,7 +17,15 @@ from mlscorr.gap.contrast._edges import EdgeCollector, Edges
 from mlscorr.gap.contrast._settings import SETTINGS
 from mlscorr.gap.residuals import SETTINGS as OBSERVE
 from mlscorr.gap.residuals import Patches
-from mlscorr.surfaces import Cells, CellTable, block_chance, cell_corner, chance, place_key
+from mlscorr.surfaces import (
+    BoundedChoice,
+    Cells,
+    CellTable,
+    block_chance,
+    cell_corner,
+    chance,
+    place_key,
+)
 from mlscorr.survey import PointCloud, Survey
 from mlscorr.targets import NO_POINTS
 
@@ -131,10 +139,9 @@ class CellCollector:
     ):
         self._survey = survey
         self._limit = limit
-        self._most_points = points
         self._table = CellTable(cell_corner(survey.trajectory.position[0]))
-        self._points = [NO_POINTS]
-        self.share = self.point_share = 1.0
+        self._points: BoundedChoice[PointCloud] = BoundedChoice(points)
+        self.share = 1.0
 
     def add(self, chunk: PointCloud) -> None:
         """Take the cells of a chunk."""
@@ -148,10 +155,7 @@ class CellCollector:
         while self._table.count > self._limit:
             self.share /= 2
             self._table.remove(self._table.of().chance >= self.share)
-        self._points.append(sampled(inside, self.point_share))
-        while sum(map(len, self._points)) > self._most_points:
-            self.point_share /= 2
-            self._points = [sampled(part, self.point_share) for part in self._points]
+        self._points.add(inside, cell_chance(inside))
 
     def cells(self) -> Cells:
         """Cells of all chunks so far, in the order of their keys."""
@@ -160,7 +164,12 @@ class CellCollector:
 
     def points(self) -> PointCloud:
         """All points of the cells whose points are kept."""
-        return PointCloud.concatenate(self._points)
+        return PointCloud.concatenate([NO_POINTS, *self._points.parts()])
+
+    @property
+    def point_share(self) -> float:
+        """Share of the cells whose points are kept."""
+        return self._points.share
 
 
 def sampled(cloud: PointCloud, share: float) -> PointCloud:
@@ -173,4 +182,14 @@ def sampled(cloud: PointCloud, share: float) -> PointCloud:
     """
     if share >= 1:
         return cloud
-    return cloud[chance(place_key(cloud.xyz, cloud.gps_time)) < share]
+    return cloud[cell_chance(cloud) < share]
+
+
+def cell_chance(cloud: PointCloud) -> np.ndarray:
+    """A number from 0 to 1 (n,) for the cell and moment of points, the same in all clouds.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+    """
+    return chance(place_key(cloud.xyz, cloud.gps_time))

@@ -13,6 +13,7 @@ from mlscorr.gap.residuals.rows import scanner_origin
 from mlscorr.gap.residuals.settings import SETTINGS
 from mlscorr.io.clouds import read_chunks
 from mlscorr.surfaces import (
+    BoundedChoice,
     MomentStream,
     block_chance,
     cell_corner,
@@ -192,7 +193,7 @@ def _misses(gps_time, number, first, group):
 class PatchCollector:
     """Keeps at most `pool` flat patches of the chunks that it is given, spread over the place.
 
-    Which blocks of the ground are kept is told by a hash of their place: the same in all passes.
+    A hash of their place chooses the blocks of the ground: the same in all passes.
     Patches do not depend on chunks, where points come about in order of time (see MomentStream).
 
     Parameters
@@ -203,25 +204,24 @@ class PatchCollector:
 
     def __init__(self, survey: Survey, pool: int = SETTINGS.pool):
         self._survey = survey
-        self._pool = pool
-        self._parts = []
-        self._starts = {}
-        self._share = 1.0
+        self._patches: BoundedChoice[Patches] = BoundedChoice(pool)
+        self._starts: dict[tuple[int, int], float] = {}
         self._read = 0
-        self._file: CloudFile | None = None
+        self._source = -1
         self._stream = MomentStream(survey.trajectory)
 
     def add(self, file: CloudFile, chunk: PointCloud) -> None:
         """Take a chunk of a file; the chunks of a file follow each other."""
-        if file != self._file:
+        source = self._survey.clouds.index(file)
+        if source != self._source:
             self._fit(np.inf)
-            self._file = file
+            self._source = source
             self._read = 0
         segment = self._survey.trajectory.segment(chunk.gps_time)
         for number in np.unique(segment[segment >= 0]).tolist():
             start = chunk.gps_time[segment == number].min()
-            self._starts[file, number] = min(self._starts.get((file, number), np.inf), start)
-        rows = np.flatnonzero((segment >= 0) & (block_chance(chunk.xyz) < self._share))
+            self._starts[source, number] = min(self._starts.get((source, number), np.inf), start)
+        rows = np.flatnonzero((segment >= 0) & (block_chance(chunk.xyz) < self._patches.share))
         self._stream.add(chunk[rows], self._read + rows)
         self._read += len(chunk)
         self._fit(chunk.gps_time[-1] if len(chunk) else np.inf)
@@ -231,19 +231,19 @@ class PatchCollector:
         for segment, cloud, number in self._stream.moments(time):  # memory follows the largest
             patches = fit_patches(self._survey, cloud, number)
             if patches is not None:
-                self._parts.append(((self._file, segment), patches[patches.block < self._share]))
-            while sum(len(patches) for _, patches in self._parts) > self._pool:
-                self._share /= 2
-                self._parts = [(key, p[p.block < self._share]) for key, p in self._parts]
+                place = list(self._starts).index((self._source, segment))  # until all is read
+                patches = replace(patches, pass_number=np.full(len(patches), place))
+                self._patches.add(patches, patches.block)
 
     def patches(self) -> Patches | None:
         """Patches of all chunks, of which none follows, by pass and place; None where none is."""
         self._fit(np.inf)
-        if not any(len(patches) for _, patches in self._parts):
+        parts = self._patches.parts()
+        if not any(map(len, parts)):
             return None
+        patches = Patches.concatenate(parts)
         order = number_passes(self._starts)
-        patches = Patches.concatenate(patches for _, patches in self._parts)
-        number = np.repeat([order[key] for key, _ in self._parts], [len(p) for _, p in self._parts])
+        number = np.array([order[key] for key in self._starts])[patches.pass_number]
         rows = np.lexsort((place_key(patches.xyz[:, 0], patches.time[:, 0]), number))
         return replace(patches, pass_number=number)[rows]
 
