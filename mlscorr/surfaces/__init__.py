@@ -18,4 +18,4 @@ from mlscorr.surfaces.places import (
 )
 from mlscorr.surfaces.planes import degrees_of_freedom, fit_planes, search_planes
 from mlscorr.surfaces.settings import SETTINGS
-from mlscorr.surfaces.stream import MomentStream
+from mlscorr.surfaces.stream import MomentStream, pass_numbers

@@ -10,6 +10,7 @@ from mlscorr.surfaces._shapes import find_shapes
 from mlscorr.surfaces._thinning import thin
 from mlscorr.surfaces.cells import CellTable
 from mlscorr.surfaces.settings import SETTINGS
+from mlscorr.surfaces.stream import pass_numbers
 from mlscorr.survey import CloudFile, PointCloud, Survey, TieFeatures, Trajectory
 
 
@@ -105,9 +106,8 @@ class FeatureCollector:
             rest.append(find_markings(Crossings.concatenate(self._crossings), self._start))
         features = TieFeatures.concatenate([*self._kept, *rest])
         group = features.pass_number
-        number = np.empty(self._starts.size, int)
-        number[np.argsort(self._starts.ravel(), kind="stable")] = np.arange(1, number.size + 1)
-        features = replace(features, pass_number=number[group], scanner=self._scanner(group))
+        number = pass_numbers(self._starts)[group]
+        features = replace(features, pass_number=number, scanner=self._scanner(group))
         return join_features([features], self._origin, self._survey.trajectory)
 
 

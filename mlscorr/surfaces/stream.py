@@ -1,4 +1,4 @@
-"""Points of a file that wait until those of their moments have all come."""
+"""Passes and moments of a stream of points."""
 
 from collections.abc import Iterator
 
@@ -6,6 +6,19 @@ import numpy as np
 
 from mlscorr.surfaces.settings import SETTINGS
 from mlscorr.survey import PointCloud, Trajectory
+
+
+def pass_numbers(starts: np.ndarray) -> np.ndarray:
+    """Numbers (n,) of passes from 1 in time.
+
+    Parameters
+    ----------
+    starts : array of n values
+        First time of each, infinite where there is none: those come last. Units: s.
+    """
+    number = np.empty(starts.size, int)
+    number[np.argsort(starts, axis=None, kind="stable")] = np.arange(1, starts.size + 1)
+    return number
 
 
 class MomentStream:

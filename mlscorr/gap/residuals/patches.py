@@ -17,12 +17,12 @@ from mlscorr.surfaces import (
     MomentStream,
     block_chance,
     cell_corner,
+    pass_numbers,
     place_key,
     search_planes,
 )
 from mlscorr.survey import CloudFile, Columns, PointCloud, Survey
 from mlscorr.targets import SETTINGS as TARGETS
-from mlscorr.targets import number_passes
 
 
 @dataclass(frozen=True, repr=False)
@@ -205,7 +205,7 @@ class PatchCollector:
     def __init__(self, survey: Survey, pool: int = SETTINGS.pool):
         self._survey = survey
         self._patches: BoundedChoice[Patches] = BoundedChoice(pool)
-        self._starts: dict[tuple[int, int], float] = {}
+        self._starts = np.full((len(survey.clouds), len(survey.trajectory.passes)), np.inf)
         self._read = 0
         self._source = -1
         self._stream = MomentStream(survey.trajectory)
@@ -218,10 +218,9 @@ class PatchCollector:
             self._source = source
             self._read = 0
         segment = self._survey.trajectory.segment(chunk.gps_time)
-        for number in np.unique(segment[segment >= 0]).tolist():
-            start = chunk.gps_time[segment == number].min()
-            self._starts[source, number] = min(self._starts.get((source, number), np.inf), start)
-        rows = np.flatnonzero((segment >= 0) & (block_chance(chunk.xyz) < self._patches.share))
+        inside = segment >= 0
+        np.minimum.at(self._starts[source], segment[inside], chunk.gps_time[inside])
+        rows = np.flatnonzero(inside & (block_chance(chunk.xyz) < self._patches.share))
         self._stream.add(chunk[rows], self._read + rows)
         self._read += len(chunk)
         self._fit(chunk.gps_time[-1] if len(chunk) else np.inf)
@@ -231,8 +230,8 @@ class PatchCollector:
         for segment, cloud, number in self._stream.moments(time):  # memory follows the largest
             patches = fit_patches(self._survey, cloud, number)
             if patches is not None:
-                place = list(self._starts).index((self._source, segment))  # until all is read
-                patches = replace(patches, pass_number=np.full(len(patches), place))
+                group = self._source * self._starts.shape[1] + segment  # until all is read
+                patches = replace(patches, pass_number=np.full(len(patches), group))
                 self._patches.add(patches, patches.block)
 
     def patches(self) -> Patches | None:
@@ -242,8 +241,7 @@ class PatchCollector:
         if not any(map(len, parts)):
             return None
         patches = Patches.concatenate(parts)
-        order = number_passes(self._starts)
-        number = np.array([order[key] for key in self._starts])[patches.pass_number]
+        number = pass_numbers(self._starts)[patches.pass_number]
         rows = np.lexsort((place_key(patches.xyz[:, 0], patches.time[:, 0]), number))
         return replace(patches, pass_number=number)[rows]
 
