@@ -93,7 +93,7 @@ class BoundedChoice(Generic[Part]):
     def __init__(self, limit: int):
         self._limit = limit
         self._parts: list[tuple[Part, np.ndarray]] = []
-        self.share = 1.0  # of all numbers, from which on things are left
+        self.share = 1.0  # of all numbers: things with larger ones are left out
 
     def add(self, part: Part, number: np.ndarray) -> None:
         """Take things.
@@ -105,17 +105,15 @@ class BoundedChoice(Generic[Part]):
         number : (n,) array
             From 0 to 1.
         """
-        self._parts.append((part, number))
-        self._leave()
+        self._parts.append(self._chosen(part, number))
         while sum(len(number) for _, number in self._parts) > self._limit:
             self.share /= 2
-            self._leave()
+            self._parts = [self._chosen(*pair) for pair in self._parts]
 
-    def _leave(self):
-        """Leave what has a number that is not below the share."""
-        self._parts = [
-            (part[number < self.share], number[number < self.share]) for part, number in self._parts
-        ]
+    def _chosen(self, part, number):
+        """The rows with a number below the share, and their numbers."""
+        rows = number < self.share
+        return part[rows], number[rows]
 
     def parts(self) -> list[Part]:
         """All that is kept, in the order in which it came."""
