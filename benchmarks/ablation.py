@@ -46,6 +46,7 @@ ROOMS = {  # name: module of the settings, function of seeds that returns a dict
     "report": ("report.settings", room_figures.report),
     "report/gap": ("report.gap._settings", room_figures.diagnosis_page),
     "simulate": ("simulate.settings", room_figures.simulated),
+    "surfaces": ("surfaces.settings", room_figures.ties),
     "targets": ("targets.settings", room_figures.targets),
     "ties": ("ties.settings", room_figures.ties),
 }

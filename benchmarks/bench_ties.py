@@ -23,7 +23,8 @@ from rich.table import Table
 import mlscorr
 from mlscorr.io.clouds import read_chunks
 from mlscorr.simulate import Scenario, simulate
-from mlscorr.ties import TieCollector, search_ties
+from mlscorr.surfaces import FeatureCollector
+from mlscorr.ties import search_ties
 
 CHUNK = 1_000_000  # points
 # m, of the ICP
@@ -58,7 +59,7 @@ def ties(folder):
     """Processor seconds of features and pairs, without decoding; number of both."""
     survey = mlscorr.read_survey(folder)
     for _ in range(2):  # compiled kernels are loaded by the first
-        collector = TieCollector(survey)
+        collector = FeatureCollector(survey)
         used = 0.0
         for file in survey.clouds:
             for chunk in read_chunks(file, CHUNK):

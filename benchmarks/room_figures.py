@@ -23,8 +23,9 @@ from mlscorr.estimate import estimate_correction, with_ties
 from mlscorr.evaluate import datum_differences
 from mlscorr.pipeline.project import correct_project
 from mlscorr.simulate import Scenario, simulate
+from mlscorr.surfaces import FeatureCollector
 from mlscorr.survey import Pos
-from mlscorr.ties import TieCollector, search_ties
+from mlscorr.ties import search_ties
 
 SCENARIOS = ("demo", "mems")  # a steady drive, and one with outages and multipath
 TIED = {"facade": 30, "road": 15, "cross wall": 5}  # ties by kind: few, so that it takes seconds
@@ -166,7 +167,7 @@ def ties(seeds):
     figures = {}
     for seed in seeds:
         survey = mlscorr.read_survey(written(THERE_AND_BACK, seed))
-        collector = TieCollector(survey)
+        collector = FeatureCollector(survey)
         for file in survey.clouds:
             for cloud in mlscorr.io.clouds.read_chunks(file):
                 collector.add(file, cloud)

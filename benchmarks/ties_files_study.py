@@ -31,8 +31,9 @@ from mlscorr.estimate._tied_adjustment import TieEquations
 from mlscorr.io.clouds import read_chunks
 from mlscorr.pipeline.finding import find_control
 from mlscorr.simulate import read_scenario, simulate
+from mlscorr.surfaces import FeatureCollector
 from mlscorr.survey import PAINTED, Ties, Trajectory
-from mlscorr.ties import TieCollector, tie_passes
+from mlscorr.ties import tie_passes
 
 POINTS_PER_LINE = 400  # of 700: a survey takes two minutes
 DURATION = 150.0  # s of each pass
@@ -92,7 +93,7 @@ def scenario(scanners=1, duration=DURATION, rng=None, road=False, spinning=False
 
 def read(survey):
     """The control points that are found in the clouds, and planes and poles; read once."""
-    collector = TieCollector(survey)
+    collector = FeatureCollector(survey)
 
     def chunks(file):
         for chunk in read_chunks(file):

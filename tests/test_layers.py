@@ -20,7 +20,7 @@ FLOORS = (  # from the ground up; rooms on one floor do not know each other
     ("correction", "collocation"),
     ("pos",),
     ("effects", "io", "matching"),
-    ("simulate", "baselines", "targets", "estimate"),
+    ("simulate", "baselines", "targets", "estimate", "surfaces"),
     ("ties",),
     ("gap", "evaluate"),
     ("blind", "report"),

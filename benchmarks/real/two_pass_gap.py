@@ -25,6 +25,7 @@ from mlscorr.gap.evidence import infer_causes
 from mlscorr.gap.residuals import background, find_patches
 from mlscorr.gap.residuals._surfaces import shared_rows
 from mlscorr.gap.signatures import signatures
+from mlscorr.surfaces import FeatureCollector
 from mlscorr.survey import (
     CloudFile,
     ControlPoints,
@@ -36,7 +37,7 @@ from mlscorr.survey import (
     Survey,
     Trajectory,
 )
-from mlscorr.ties import TieCollector, tie_mounting
+from mlscorr.ties import tie_mounting
 
 DATA = SHARED / "routescene_uav"
 FILES = "{}_points_time_derived.npz"  # of the name of a scene
@@ -150,7 +151,7 @@ def _epochs(time, place, attitude):
 def study(scene, rng, folds=FOLDS, chance=CHANCE):
     """All numbers of a scene and its points as calibrated, or None where nothing was seen twice."""
     survey = scene.survey
-    collector = TieCollector(survey)
+    collector = FeatureCollector(survey)
     collector.add(survey.clouds[0], scene.cloud)
     start = believed_mounting(survey.trajectory, survey.mountings, Matched.none(), survey.pos)
     calibration = tie_mounting(survey, start, Matched.none(), collector.features())

@@ -28,8 +28,9 @@ from mlscorr.pipeline.finding import (
     read_into,
 )
 from mlscorr.pipeline.settings import SETTINGS
+from mlscorr.surfaces import FeatureCollector
 from mlscorr.survey import Matched, Survey, SurveyFileError, TieFeatures, check_survey
-from mlscorr.ties import TieCollector, tie_mounting
+from mlscorr.ties import tie_mounting
 
 NOTHING_CALIBRATES = (
     "{} has nothing to calibrate with: {} control points were found (at least 3 are needed, at "
@@ -101,7 +102,7 @@ def calibrate(
         ties = survey.use_ties
 
     if ties:
-        collector = TieCollector(survey)
+        collector = FeatureCollector(survey)
         read = read_into(collector.add)
         finding, notes = find_or_compare_surfaces(survey, read, None, progress, rng)
         features = collector.features()

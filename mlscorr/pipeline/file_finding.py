@@ -13,9 +13,9 @@ from mlscorr.pipeline.finding import (
     read_into,
     unmatched,
 )
+from mlscorr.surfaces import FeatureCollector
 from mlscorr.survey import PointCloud, Survey, TieFeatures
 from mlscorr.targets import NO_POINTS, Candidates, PassTarget, number_passes
-from mlscorr.ties import TieCollector
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def find_in_file(survey: Survey, origin: np.ndarray, with_ties: bool = True) -> 
     with_ties : bool
         Whether planes and poles are looked for.
     """
-    collector = TieCollector(survey, origin=origin)
+    collector = FeatureCollector(survey, origin=origin)
     if with_ties:
         read = read_into(collector.add)
     else:

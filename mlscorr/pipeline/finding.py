@@ -22,6 +22,7 @@ from mlscorr.matching import Matches, match
 from mlscorr.pipeline.beams import with_beam_origin
 from mlscorr.pipeline.control_checks import check_control
 from mlscorr.pipeline.settings import SETTINGS
+from mlscorr.surfaces import FeatureCollector
 from mlscorr.survey import (
     CloudFile,
     Matched,
@@ -48,7 +49,6 @@ from mlscorr.targets import (
     search_radius,
     why_useless,
 )
-from mlscorr.ties import TieCollector
 from mlscorr.wording import counted
 
 if TYPE_CHECKING:
@@ -478,7 +478,7 @@ def find_targets(
     reading = (progress or silent)("Reading the cloud", survey.points)
     if not with_ties:
         return fit_while_reading(survey, read_chunks, rng, reading)
-    collector = TieCollector(survey)
+    collector = FeatureCollector(survey)
     targets = fit_while_reading(survey, read_into(collector.add), rng, reading)
     return replace(targets, features=collector.features())
 

@@ -14,10 +14,10 @@ from mlscorr.io.clouds import read_chunks
 from mlscorr.io.tables import write_ties_csv
 from mlscorr.pipeline._result import KnownResult, ResultFiles
 from mlscorr.pipeline.finding import silent
+from mlscorr.surfaces import FeatureCollector
 from mlscorr.survey import TIE_KINDS, Survey, TieFeatures, check_survey
 from mlscorr.ties import (
     SETTINGS,
-    TieCollector,
     TieSearch,
     group_by_time,
     information,
@@ -76,7 +76,7 @@ def find_ties(
 def _read_features(survey, progress):
     """Planes, poles and paint of all clouds."""
     done = (progress or silent)("Searching the cloud", survey.points)
-    collector = TieCollector(survey)
+    collector = FeatureCollector(survey)
     for file in survey.clouds:
         for chunk in read_chunks(file):
             collector.add(file, chunk)

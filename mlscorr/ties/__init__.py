@@ -1,4 +1,4 @@
-"""What two passes both saw: features of each, pairs of them, which agree, and what they correct.
+"""What two passes both saw: pairs of features, which agree, and what they correct.
 
 Pairs and corrections come in turn: what the first pairs correct shows which are pairs at all.
 """
@@ -15,8 +15,7 @@ from mlscorr.ties.agreement import (
     weigh_by_time,
 )
 from mlscorr.ties.coarse import coarse_correction
-from mlscorr.ties.collector import TieCollector, join_features
 from mlscorr.ties.pairing import pair_features
 from mlscorr.ties.search import TieSearch, feature_sigma, least_pause, search_ties
 from mlscorr.ties.settings import SETTINGS
-from mlscorr.ties.thinning import integer_hash, thinned_ties
+from mlscorr.ties.thinning import thinned_ties

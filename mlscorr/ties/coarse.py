@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from mlscorr.surfaces import direction_class
 from mlscorr.survey import TieFeatures
 from mlscorr.ties.settings import SETTINGS
-from mlscorr.ties.thinning import direction_class
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,12 @@ import numpy as np
 from numba import njit
 from scipy.spatial import cKDTree
 
+from mlscorr.surfaces import direction_class, integer_hash, kind_number
 from mlscorr.survey import PAINTED, TIE_KINDS, TieFeatures, Ties
-from mlscorr.ties._cells import CELL_BITS
 from mlscorr.ties.settings import SETTINGS
-from mlscorr.ties.thinning import direction_class, integer_hash, kind_number
 
 _, POLE, LINE, DASH = range(len(TIE_KINDS))
+CELL_BITS = 21  # of a cell's number along one axis: a million to each side of the origin
 
 
 def pair_features(

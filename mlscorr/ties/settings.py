@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass
 
-from mlscorr.survey import COORDINATE_ROUNDING, PAUSE
+from mlscorr.surfaces import SETTINGS as SURFACES
+from mlscorr.survey import PAUSE
 
 
 @dataclass(frozen=True)
@@ -10,24 +11,15 @@ class Settings:
     """Limits and sizes, each with its unit and reason."""
 
     # Features
-    cell: float = 1.0  # m: some hundred points of a scanner in a street, flat for most of them
-    moment: float = 1.0  # s: the POS error is one value over it (a POS has a bandwidth of 1 Hz)
-    held_cells: int = 200_000  # cells in memory, 35 MB: some seconds of any scanner; guard
-    feature_points: int = 24  # of a feature: with 21 degrees of freedom a variance to a third
-    roughest: float = 0.05  # m about a plane: asphalt and masonry have centimetres, shrubs more
-    narrowest: float = 0.15  # m, one sigma along a side: half a cell (1 / sqrt(12) for a whole one)
-    rounding: float = COORDINATE_ROUNDING  # m
-    least_plane_sine: float = 0.05  # of beam to plane: a road 50 m from a scanner 2.5 m above it
-    thickest: float = 0.18  # m: radius of a pole or young trunk; people are wider
-    largest_lean: float = 0.2  # rad: of a pole, branches lean more; of a road, ramps lean less
-    roundness: float = 0.1  # of the radius, one sigma: a square mast's axis lies 1 - pi/4 deeper
-    widest_paint: float = 0.75  # m along a scan line: a stop line of 0.5 m, seen 45 deg askew
-    contrast: float = 5.0  # sigmas of the road's intensity, of 15 %: worn paint has twice it
-    crossings: int = 6  # of a line: a scatter of 4 degrees of freedom is known to a third
-    features: int = 32  # of a second and direction of a pass: two blocks of a wall, or of the road
+    cell: float = SURFACES.cell  # m
+    moment: float = SURFACES.moment  # s
+    feature_points: int = SURFACES.feature_points
+    roughest: float = SURFACES.roughest  # m
+    narrowest: float = SURFACES.narrowest  # m
+    widest_paint: float = SURFACES.widest_paint  # m
     ties: int = 6  # of a second, direction and pass: 10 mm each make 4 mm, two may be wrong
+    thinning_block: float = SURFACES.thinning_block  # m
     coarse_features: int = 6000  # for six unknowns of a mounting; more cost time alone
-    thinning_block: float = 4.0  # m: neighbours are kept together, so that passes keep the same
     # Pairs
     pause: float = PAUSE  # s between two visits of one pass
     parallel: float = 0.14  # rad, 8 deg: normals of few points, and a boresight off by 4 deg

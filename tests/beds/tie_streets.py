@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from mlscorr.frames import attitude_from_angles
 from mlscorr.io.tables.control import NO_POINTS
+from mlscorr.surfaces import FeatureCollector
 from mlscorr.survey import CloudFile, PointCloud, Scanner, Survey, Trajectory
-from mlscorr.ties import TieCollector
 
 ORIGIN = np.array([447_000.3, 5_410_000.6, 120.2])  # m
 START = 413_200.25  # s
@@ -123,7 +123,7 @@ def clouds(seed=1, passes=2, car=None):
 
 def collect(recorded, parts):
     "TieFeatures of clouds, one a file"
-    collector = TieCollector(recorded)
+    collector = FeatureCollector(recorded)
     for file, cloud in zip(recorded.clouds, parts, strict=True):
         collector.add(file, cloud)
     return collector.features()

@@ -18,7 +18,8 @@ from mlscorr.correction import PointSigma
 from mlscorr.estimate import believed_correction, corrected_mounting
 from mlscorr.evaluate import BeamCheck
 from mlscorr.io.clouds import read_chunks
-from mlscorr.ties import TieCollector, tie_passes
+from mlscorr.surfaces import FeatureCollector
+from mlscorr.ties import tie_passes
 from tests.beds import scanner_pair
 from tests.beds.documents import undocumented
 
@@ -216,7 +217,7 @@ def test_two_scanners_tie_a_pass_to_itself(commanded):
     "Calibrated, both see the walls of one pass within seconds, and most such ties hold"
     survey = replace(mlscorr.read_survey(commanded[0]), search_radius=0.1)  # m, for speed
     there = survey.trajectory.passes[0, 1]
-    collector = TieCollector(survey)
+    collector = FeatureCollector(survey)
     for file in survey.clouds:
         for chunk in read_chunks(file):
             collector.add(file, chunk[chunk.gps_time < there])

@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 
 from mlscorr.gap.closure.surroundings import SightedTarget, Surroundings, sightings_of
-from mlscorr.gap.residuals import Patches, Rows, place_key
+from mlscorr.gap.residuals import Patches, Rows
 from mlscorr.simulate import SceneScenario, scan
 from mlscorr.simulate.scene import read_mesh
+from mlscorr.surfaces import place_key
 from mlscorr.survey import PointCloud, Survey
 
 

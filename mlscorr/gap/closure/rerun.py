@@ -15,16 +15,10 @@ from mlscorr.effects import Effect
 from mlscorr.gap.closure._settings import SETTINGS
 from mlscorr.gap.closure.beams import Beams
 from mlscorr.gap.residuals import SETTINGS as OBSERVE
-from mlscorr.gap.residuals import (
-    Rows,
-    freedom,
-    gate,
-    log_roughness,
-    moments,
-    rounding_sigma,
-)
+from mlscorr.gap.residuals import Rows, gate, log_roughness, rounding_sigma
 from mlscorr.gap.signatures import check_mounting, expected, joined
 from mlscorr.simulate.scan import Draws, Met, Planes, Replay, TargetWorld, true_targets
+from mlscorr.surfaces import fit_planes
 from mlscorr.survey import PointCloud, Survey
 from mlscorr.targets import BY_EDGES, BrightRegion, ScannerPath, diameter, fit_targets
 from mlscorr.targets import SETTINGS as TARGETS
@@ -208,21 +202,20 @@ class _Patches:
     @classmethod
     def of(cls, beams, xyz, kept, met):
         flat = beams.target[beams.view] < 0
-        view = beams.view[flat]
         count = int((beams.target < 0).sum())
-        local = xyz[flat] - beams.origin - beams.point[view]
-        weight = (kept & met)[flat].astype(float)
-        local[weight == 0] = 0.0
-        mean, values, axis = moments(local, weight, np.searchsorted(view, np.arange(count)))
-        points, fired = (np.bincount(view, v, len(beams)) for v in (weight, met[flat]))
-        full = points[:count] >= OBSERVE.plane_points
+        fired = np.bincount(beams.view[flat & met], minlength=len(beams))
+        measured = flat & kept & met
+        view = beams.view[measured]
+        points = np.bincount(view, minlength=len(beams))
+        local = xyz[measured] - beams.origin - beams.point[view]
+        planes = fit_planes(local, np.searchsorted(view, np.arange(count + 1)))
+        full = planes.points >= OBSERVE.plane_points
         centre, normal = np.full((2, len(beams), 3), np.nan)
-        centre[:count] = np.where(full[:, None], mean + beams.point[:count], np.nan)
-        turned = np.sign(np.einsum("li,li->l", axis, beams.normal[:count]))
-        normal[:count] = axis * turned[:, None]
-        unbiased = values[:, 0] * points[:count] / freedom(points[:count])
+        centre[:count] = np.where(full[:, None], planes.mean + beams.point[:count], np.nan)
+        turned = np.sign(np.einsum("li,li->l", planes.normal, beams.normal[:count]))
+        normal[:count] = planes.normal * turned[:, None]
         variance = np.full(len(beams), np.nan)
-        variance[:count] = np.where(full, unbiased, np.nan)
+        variance[:count] = np.where(full, planes.variance, np.nan)
         return cls(centre, normal, variance, points, fired)
 
 

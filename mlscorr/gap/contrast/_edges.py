@@ -11,10 +11,9 @@ import numpy as np
 
 from mlscorr.gap.contrast._settings import SETTINGS
 from mlscorr.gap.residuals import SETTINGS as OBSERVE
-from mlscorr.gap.residuals import chance, moments_before
 from mlscorr.simulate.scan import recorded_platform
+from mlscorr.surfaces import BoundedChoice, MomentStream, chance
 from mlscorr.survey import Columns, PointCloud, Survey
-from mlscorr.targets import NO_POINTS
 
 
 @dataclass(frozen=True, repr=False)
@@ -55,41 +54,39 @@ class EdgeCollector:
 
     def __init__(self, survey: Survey, limit: int = SETTINGS.kept):
         self._survey = survey
-        self._limit = limit
         self._origin = survey.trajectory.position.mean(axis=0)
         self._platform = recorded_platform(survey, self._origin)
-        self._parts = [Edges(np.empty(0), np.empty((0, 3)), *np.empty((2, 0)))]
-        self.share = 1.0
-        self._held = NO_POINTS
+        self._edges: BoundedChoice[Edges] = BoundedChoice(limit)
+        self._stream = MomentStream(survey.trajectory)
 
     def add(self, chunk: PointCloud) -> None:
         """Take the edges of a chunk, but those of the moments about its last point."""
-        inside = chunk[self._survey.trajectory.segment(chunk.gps_time) >= 0]
-        self._held = PointCloud.concatenate([self._held, inside])
-        self._close(chunk.gps_time[-1] if len(chunk) else np.inf)
+        rows = np.flatnonzero(self._survey.trajectory.segment(chunk.gps_time) >= 0)
+        self._stream.add(chunk[rows], rows)
+        self._take_until(chunk.gps_time[-1] if len(chunk) else np.inf)
 
-    def _close(self, time):
-        """Take the edges of held points, but those of the moments about a time (s)."""
-        segment = self._survey.trajectory.segment(self._held.gps_time)
-        moments, is_open = moments_before(time, self._held.gps_time, segment)
-        for rows in moments:
-            self._take(self._held[rows[np.argsort(self._held.gps_time[rows], kind="stable")]])
-        self._held = self._held[is_open]
+    def _take_until(self, time):
+        """Take the edges of the moments that are whole at a time (s)."""
+        for _, cloud, _ in self._stream.moments(time):
+            self._take(cloud[np.argsort(cloud.gps_time, kind="stable")])
 
     def _take(self, inside):
         """Take the edges of the points of a moment, in order of time."""
         sight = inside.xyz - self._origin - self._platform.scanner(inside.gps_time)
         rough = max(OBSERVE.roughest, 6 * np.sqrt(6) * self._survey.scanner.range_noise)
         edges = edges_of(inside, sight, rough)
-        self._parts.append(edges[edges.chance < self.share])
-        while sum(map(len, self._parts)) > self._limit:
-            self.share /= 2
-            self._parts = [part[part.chance < self.share] for part in self._parts]
+        self._edges.add(edges, edges.chance)
 
     def edges(self) -> Edges:
         """Edges of all chunks, of which none follows."""
-        self._close(np.inf)
-        return Edges.concatenate(self._parts)
+        self._take_until(np.inf)
+        nothing = Edges(np.empty(0), np.empty((0, 3)), np.empty(0), np.empty(0))
+        return Edges.concatenate([nothing, *self._edges.parts()])
+
+    @property
+    def share(self) -> float:
+        """Share of the moments whose edges are kept."""
+        return self._edges.share
 
 
 def edges_of(cloud: PointCloud, sight: np.ndarray, rough: float) -> Edges:

@@ -318,9 +318,9 @@ def paired_cells(survey: Survey, real: ChannelSample, simulated: ChannelSample) 
     def mean(values):
         return (points[..., None] * spread(values)).sum(axis=0) / total[:, None]
 
-    sight = mean([cells.sight(survey) for cells in clouds])
-    scatter = spread([cells.scatter for cells in clouds]).sum(axis=0)
-    brightness = spread([cells.brightness for cells in clouds])
+    sight = mean([_sight(survey, cells) for cells in clouds])
+    scatter = spread([_scatter(cells) for cells in clouds]).sum(axis=0)
+    brightness = spread([cells.value for cells in clouds])
     brightness[:, (points < OBSERVE.samples).any(axis=0)] = np.nan
     return PairedCells(
         points=points.T,
@@ -329,6 +329,18 @@ def paired_cells(survey: Survey, real: ChannelSample, simulated: ChannelSample) 
         incidence=_incidence(sight, scatter, total),
         block=block_of(mean([cells.centre for cells in clouds])),
     )
+
+
+def _sight(survey, cells):
+    """From the scanner to the centres of cells (c, 3), at the mean time of the points. m."""
+    segment = survey.trajectory.segment(cells.gps_time)
+    first, last = survey.trajectory.passes[np.maximum(segment, 0)].T
+    return cells.centre - scanner_origin(survey, np.clip(cells.gps_time, first, last))
+
+
+def _scatter(cells):
+    """Sums of products (c, 3, 3) about the means of cells. Units: m^2."""
+    return cells.covariance * cells.points[:, None, None]
 
 
 def _incidence(sight, scatter, points):

@@ -15,7 +15,8 @@ from scipy.spatial.distance import cdist, pdist
 from mlscorr.gap.contrast._settings import SETTINGS
 from mlscorr.gap.contrast.sample import ChannelSample, of_shared_moments, sampled
 from mlscorr.gap.evidence import Inference, Observations
-from mlscorr.gap.residuals import Background, Rows, chance
+from mlscorr.gap.residuals import Background, Rows
+from mlscorr.surfaces import chance
 
 UNITS = {"points": "m", "intensity": "decades", "density": "decades"}  # of clouds; else sigmas
 

@@ -9,18 +9,7 @@ from mlscorr.gap.residuals.channels import (
     with_loss_variance,
 )
 from mlscorr.gap.residuals.pairing import Pairing, build_rows
-from mlscorr.gap.residuals.patches import (
-    PatchCollector,
-    Patches,
-    block_chance,
-    cell_corner,
-    chance,
-    find_patches,
-    freedom,
-    moments,
-    moments_before,
-    place_key,
-)
+from mlscorr.gap.residuals.patches import PatchCollector, Patches, find_patches
 from mlscorr.gap.residuals.rows import (
     Background,
     Rows,

@@ -8,9 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from mlscorr.gap.residuals.patches import Patches, freedom
+from mlscorr.gap.residuals.patches import Patches
 from mlscorr.gap.residuals.rows import Rows, scanner_origin
 from mlscorr.gap.residuals.settings import SETTINGS
+from mlscorr.surfaces import degrees_of_freedom
 from mlscorr.survey import Survey
 
 
@@ -58,7 +59,8 @@ def log_roughness(
     points : (p,) array
         On each plane.
     """
-    return np.log(variance / believed) + 1 / freedom(points), 2 / freedom(points)
+    freedom = degrees_of_freedom(points)
+    return np.log(variance / believed) + 1 / freedom, 2 / freedom
 
 
 def roughness(

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from mlscorr.surfaces import SETTINGS as SURFACES
 from mlscorr.ties import SETTINGS as TIES
 
 
@@ -14,15 +15,15 @@ class Settings:
     """
 
     # patches
-    cell: float = TIES.cell  # m
-    moment: float = TIES.moment  # s
-    block_cells: int = 4  # cells that are kept or left together, so that neighbours stay
-    plane_points: int = TIES.feature_points  # of a plane
+    cell: float = SURFACES.cell  # m
+    moment: float = SURFACES.moment  # s
+    plane_points: int = SURFACES.feature_points  # of a plane
     samples: int = 12  # pulses that stand for a patch: their mean has a third of their scatter
-    trims: tuple[float, ...] = (2.0, 2.5, 3.0, 3.5)  # sigmas; the last takes 0.05 % of the noise
+    trims: tuple[float, ...] = SURFACES.trims  # sigmas
     rule: float = 0.9  # share from which on a part stands for the whole: of points, of pauses
-    roughest: float = TIES.roughest  # m about a plane
+    roughest: float = SURFACES.roughest  # m about a plane
     narrowest_patch: float = 0.12  # m, one sigma across: a normal to 1 deg from noise of 2 mm
+    rounding: float = SURFACES.rounding  # m
     file_step: float = 1e-3  # m: the usual scale factor of LAS coordinates
     patches: int = 1000  # on surfaces, of up to three rows; 200 were enough in gap_study
     patch_pulses: int = 400  # of a patch, fired again: a mean to a twentieth of the noise

@@ -15,6 +15,7 @@ from mlscorr.io.store import digest
 from mlscorr.io.trajectories import join_sessions, with_sigmas
 from mlscorr.pipeline.estimation import estimate_together
 from mlscorr.pipeline.finding import MatchedTargets
+from mlscorr.surfaces import join_features
 from mlscorr.survey import (
     WEEK,
     ControlPoints,
@@ -26,7 +27,6 @@ from mlscorr.survey import (
     Trajectory,
 )
 from mlscorr.ties import SETTINGS as TIES
-from mlscorr.ties import join_features
 
 
 @dataclass(frozen=True)

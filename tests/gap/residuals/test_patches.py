@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from mlscorr.gap.residuals import SETTINGS, Patches, cell_corner
+from mlscorr.gap.residuals import SETTINGS, Patches
+from mlscorr.surfaces import SETTINGS as SURFACES
+from mlscorr.surfaces import cell_corner
 
 
 def test_patches_are_small_and_short(patches):
@@ -53,7 +55,7 @@ def test_no_more_returned_than_was_fired(patches):
 def test_neighbours_are_kept_or_left_together(patches):
     "Patches of one square of 4 cells have one number, and these spread evenly from 0 to 1"
     assert patches.block.min() >= 0.0 and patches.block.max() < 1.0
-    side = SETTINGS.block_cells * SETTINGS.cell
+    side = SURFACES.block_cells * SETTINGS.cell
     square = np.floor(cell_corner(patches.xyz[:, 0])[:, :2] / side + 0.5 / side).astype(int)
     numbers = {}
     for key, block in zip(map(tuple, square), patches.block, strict=True):

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.gap.residuals import place_key
 from mlscorr.gap.residuals.patches import fit_patches
 from mlscorr.survey import PointCloud
 
@@ -33,7 +32,7 @@ def wall(survey, rng, bent=0.0, beyond=0.5):
 def test_a_wall_gives_its_normal_and_its_noise(survey):
     "One patch whose normal is known to 2 mrad, its variance to 10 %, with at most 400 points"
     cloud = wall(survey, np.random.default_rng(1))
-    patches = fit_patches(survey, cloud, *[np.arange(len(cloud))] * 2)
+    patches = fit_patches(survey, cloud, np.arange(len(cloud)))
     assert len(patches) == 1
     assert np.abs(patches.normal[0] @ [1.0, 0.0, 0.0]) == pytest.approx(1.0, abs=2e-6)
     assert np.sqrt(patches.variance[0]) == pytest.approx(NOISE, rel=0.1)
@@ -44,7 +43,7 @@ def test_a_wall_gives_its_normal_and_its_noise(survey):
 def test_a_wall_on_a_whole_metre_has_all_of_its_noise(survey):
     "Models have walls and floors there: no cell's face halves their noise"
     cloud = wall(survey, np.random.default_rng(1), beyond=0.0)
-    patches = fit_patches(survey, cloud, *[np.arange(len(cloud))] * 2)
+    patches = fit_patches(survey, cloud, np.arange(len(cloud)))
     assert np.sqrt(patches.variance) == pytest.approx([NOISE], rel=0.1)
     assert patches.centre[0, 0] == pytest.approx(cloud.xyz[:, 0].mean(), abs=NOISE / 20)  # m
 
@@ -56,26 +55,17 @@ def test_points_in_a_line_are_no_wall(survey):
         along = np.random.default_rng(seed).uniform(-0.3, 0.3, len(cloud))
         place = np.floor(cloud.xyz[:1]) + 0.4 + along[:, None] * [0.36, 0.48, 0.8]
         line = replace(cloud, xyz=place)
-        assert fit_patches(survey, line, *[np.arange(len(line))] * 2) is None
+        assert fit_patches(survey, line, np.arange(len(line))) is None
 
 
 def test_a_wall_in_a_face_of_cells_is_left(survey):
     "Both cells would hold half of its noise, 0.8 sigmas off the wall"
     cloud = wall(survey, np.random.default_rng(1), beyond=2.0 / 3.0)
-    assert fit_patches(survey, cloud, *[np.arange(len(cloud))] * 2) is None
+    assert fit_patches(survey, cloud, np.arange(len(cloud))) is None
 
 
 def test_what_is_bent_is_rougher_than_its_noise(survey):
     "A bow of 5 cm has ten times the variance of the noise, or is no patch at all"
     cloud = wall(survey, np.random.default_rng(1), bent=0.3)
-    patches = fit_patches(survey, cloud, *[np.arange(len(cloud))] * 2)
+    patches = fit_patches(survey, cloud, np.arange(len(cloud)))
     assert patches is None or patches.ripple[0] > 3
-
-
-def test_a_key_tells_cells_and_moments_apart():
-    "Points of one cubic metre and second share a number; those of the next ones don't"
-    place = np.array([[523_000.2, 3_378_000.3, 40.4]] * 4)
-    place[1] += 0.2
-    place[2, 0] += 1.0
-    key = place_key(place, np.array([413_200.1, 413_200.9, 413_200.1, 413_201.1]))
-    assert key[0] == key[1] and len(set(key.tolist())) == 3

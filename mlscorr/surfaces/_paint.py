@@ -8,8 +8,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from mlscorr.surfaces.settings import SETTINGS
 from mlscorr.survey import Columns, PointCloud, TieFeatures
-from mlscorr.ties.settings import SETTINGS
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -90,7 +90,7 @@ def bright_runs(xyz: np.ndarray, intensity: np.ndarray, limits: np.ndarray) -> n
         z = xyz[i, 2] - xyz[i - 1, 2]
         step = np.sqrt(x * x + y * y + z * z)
         value = float(intensity[i])
-        if step > widest / 5:  # fewer points don't tell the ground's intensity
+        if step > widest / 5:  # fewer points don't show the ground's intensity
             first = -1
             end = -1
             known = 0.0
@@ -114,8 +114,8 @@ def bright_runs(xyz: np.ndarray, intensity: np.ndarray, limits: np.ndarray) -> n
                 a = xyz[first - 1]
                 b = xyz[end]
                 rise = abs(b[2] - a[2])
-                way = np.hypot(b[0] - a[0], b[1] - a[1])
-                if end - first > 1 and rise <= steepest * way:
+                distance = np.hypot(b[0] - a[0], b[1] - a[1])
+                if end - first > 1 and rise <= steepest * distance:
                     runs[count] = first - 1, first, end - 1, end
                     count += 1
                 first = -1
@@ -294,9 +294,9 @@ def fit_stripes(crossings: Crossings, number: np.ndarray) -> Stripes:
     covariance = np.stack([mean(x * x), mean(x * y), mean(x * y), mean(y * y)], axis=1)
     values, axes = np.linalg.eigh(covariance.reshape(-1, 2, 2))
     along = np.column_stack([axes[:, :, 1], np.zeros(len(count))])
-    way = x * along[number, 0] + y * along[number, 1]
+    distance = x * along[number, 0] + y * along[number, 1]
     ends, times = (np.tile([np.inf, -np.inf], (len(count), 1)) for _ in range(2))
-    for extremes, column in ((ends, way), (times, time)):
+    for extremes, column in ((ends, distance), (times, time)):
         np.minimum.at(extremes[:, 0], number, column)
         np.maximum.at(extremes[:, 1], number, column)
     length = np.maximum(values[:, 1], SETTINGS.rounding**2)
@@ -311,7 +311,7 @@ def fit_stripes(crossings: Crossings, number: np.ndarray) -> Stripes:
         end=times[:, 1],
         length=length,
         width=np.maximum(values[:, 0], 0.0) * count / np.maximum(count - 2, 1),
-        pace=mean((time - gps_time[number]) * way) / length,
+        pace=mean((time - gps_time[number]) * distance) / length,
         edges=mean(crossings.variance),
     )
     kept = (count >= SETTINGS.crossings) & (stripes.width <= SETTINGS.roughest**2)

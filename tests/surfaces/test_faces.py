@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from mlscorr.surfaces import CellTable
+from mlscorr.surfaces._shapes import join_across_faces
 from mlscorr.survey import PointCloud
-from mlscorr.ties._cells import CellTable
-from mlscorr.ties._shapes import join_across_faces
 
 # m, s
 ORIGIN = np.array([447_000.0, 5_410_000.0, 120.0])
@@ -22,10 +22,10 @@ def joined(axis, side=0.0):
     place = rng.uniform(0.0, 1.0, (POINTS, 3))
     place[:, axis] = side + NOISE * rng.normal(size=POINTS)
     time = np.sort(START + rng.uniform(0.0, 1.0, POINTS))
-    table = CellTable(ORIGIN, START, 1.0, 1.0)
+    table = CellTable(ORIGIN, START)
     table.add(PointCloud(ORIGIN + place, time, np.ones(POINTS)), PASSES, 4, np.full(1, np.inf))
-    middle, begin, group, moments = table.of(np.ones(table.count, bool))
-    return ORIGIN + place, time, middle, join_across_faces(middle, begin, group, moments)[0]
+    cells, _ = join_across_faces(table.of())
+    return ORIGIN + place, time, cells.middle, cells.moments
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])

@@ -1,30 +1,31 @@
-"""Tie features of a survey's clouds, found while these are read."""
+"""Planes, poles and paint of a survey's clouds, found while these are read."""
 
 from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 
+from mlscorr.surfaces._paint import Crossings, find_crossings, find_markings, window_of
+from mlscorr.surfaces._shapes import find_shapes
+from mlscorr.surfaces._thinning import thin
+from mlscorr.surfaces.cells import CellTable
+from mlscorr.surfaces.settings import SETTINGS
+from mlscorr.surfaces.stream import pass_numbers
 from mlscorr.survey import CloudFile, PointCloud, Survey, TieFeatures, Trajectory
-from mlscorr.ties._cells import CellTable
-from mlscorr.ties._markings import Crossings, find_crossings, find_markings, window_of
-from mlscorr.ties._shapes import find_shapes
-from mlscorr.ties.settings import SETTINGS
-from mlscorr.ties.thinning import thin
 
 
-class TieCollector:
-    """Finds planes, poles and markings of the chunks that it is given, in any order.
+class FeatureCollector:
+    """Finds planes, poles and paint in the chunks of clouds, in any order.
 
-    What it holds grows neither with the points nor with the file: cells of the last moments, whose
-    points may still come, crossings of paint likewise, and of those before a bounded number of
-    features a second (see thin).
+    Its memory grows neither with the points nor with the file: it has the cells and the crossings
+    of paint of the last moments, whose points may still come, and of those before a bounded number
+    of features a second (see thin).
 
     Parameters
     ----------
     survey : Survey
-    held_cells : int, optional
-        Above as many, cells of moments that have passed are looked at and left.
+    cells_in_memory : int, optional
+        With more, those of moments that have passed give their features and are removed.
     origin : (3,) array, optional
         Whole metres, near the survey; that of its trajectory by default. Units: m.
     """
@@ -32,18 +33,18 @@ class TieCollector:
     def __init__(
         self,
         survey: Survey,
-        held_cells: int = SETTINGS.held_cells,
+        cells_in_memory: int = SETTINGS.cells_in_memory,
         origin: np.ndarray | None = None,
     ):
         self._survey = survey
-        self._held_cells = held_cells
+        self._cells_in_memory = cells_in_memory
         self._segments = survey.trajectory.passes
         start = np.floor(survey.trajectory.gps_time[0])
         if origin is None:
             self._origin = np.floor(survey.trajectory.position[0])
         else:
             self._origin = origin
-        self._cells = CellTable(self._origin, start, SETTINGS.cell, SETTINGS.moment)
+        self._cells = CellTable(self._origin, start)
         self._starts = np.full((len(survey.clouds), len(self._segments)), np.inf)
         self._start = start
         self._crossings: list[Crossings] = []
@@ -64,12 +65,12 @@ class TieCollector:
         group = source * len(self._segments)
         self._cells.add(chunk, self._segments, group, self._starts[source])
         self._crossings.append(find_crossings(chunk, self._segments, group))
-        if self._cells.count > self._held_cells:
+        if self._cells.count > self._cells_in_memory:
             # beams that take turns come a little late
             self._close(self._cells.moment.max() - 1)
 
     def _close(self, moment):
-        """Keep the features of the moments before one, and of all so far so many as may stay."""
+        """Find the features of the moments before one, and thin all so far where they are many."""
         rows = self._cells.moment < moment
         self._kept.append(self._shapes(rows))
         self._cells.remove(rows)
@@ -78,7 +79,7 @@ class TieCollector:
         self._kept.append(find_markings(crossings[~later], self._start))
         self._crossings = [crossings[later]]
         self._loose += len(self._kept[-1]) + len(self._kept[-2])
-        if self._loose > max(self._held_cells, self._kept_in_order):
+        if self._loose > max(self._cells_in_memory, self._kept_in_order):
             features = TieFeatures.concatenate(self._kept)
             rows = thin(features, self._origin, self._survey.trajectory)
             self._kept = [features[rows]]
@@ -86,11 +87,11 @@ class TieCollector:
             self._loose = 0
 
     def _shapes(self, rows):
-        """Features of cells (count,), each seen from the scanner of its file."""
+        """Features of some cells, each seen from the scanner of its file."""
         cells = self._cells.of(rows)
-        scanner = self._scanner(cells[2])
+        scanner = self._scanner(cells.group)
         return TieFeatures.concatenate(
-            find_shapes(part, *(column[inside] for column in cells))
+            find_shapes(part, cells[inside])
             for part, inside in self._survey.rows_by_scanner(scanner)
         )
 
@@ -100,27 +101,26 @@ class TieCollector:
 
     def features(self) -> TieFeatures:
         """Features of all chunks so far, in order of pass and time; chunks may still follow."""
-        rest = [self._shapes(np.ones(self._cells.count, bool))]
+        rest = [self._shapes(slice(None))]
         if self._crossings:
             rest.append(find_markings(Crossings.concatenate(self._crossings), self._start))
         features = TieFeatures.concatenate([*self._kept, *rest])
         group = features.pass_number
-        number = np.empty(self._starts.size, int)
-        number[np.argsort(self._starts.ravel(), kind="stable")] = np.arange(1, number.size + 1)
-        features = replace(features, pass_number=number[group], scanner=self._scanner(group))
+        number = pass_numbers(self._starts)[group]
+        features = replace(features, pass_number=number, scanner=self._scanner(group))
         return join_features([features], self._origin, self._survey.trajectory)
 
 
 def join_features(
     parts: Iterable[TieFeatures], origin: np.ndarray, trajectory: Trajectory | None = None
 ) -> TieFeatures:
-    """Those that stay of the features of some passes, in order of pass and time.
+    """Join features of some passes and thin them, in order of pass and time.
 
     Parameters
     ----------
     parts : iterable of TieFeatures
     origin : (3,) array
-        As of TieCollector. Units: m.
+        As of FeatureCollector. Units: m.
     trajectory : Trajectory, optional
         That says where the scanner stands.
     """

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.ties._markings import find_crossings
+from mlscorr.surfaces._paint import find_crossings
 from tests.beds import painted_roads as road
 
 

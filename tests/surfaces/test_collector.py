@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from mlscorr.surfaces import FeatureCollector
 from mlscorr.survey import MountedScanner, Mounting, PointCloud, Scanner
-from mlscorr.ties import TieCollector
 from tests.beds import tie_streets as street
 
 
@@ -21,12 +21,12 @@ def assert_same(first, second, shift=0.0):
     assert np.allclose(first.variance, second.variance, rtol=0.1)
 
 
-@pytest.mark.parametrize("held_cells", [10**9, 100])
-def test_chunks_are_as_good_as_the_whole(held_cells):
+@pytest.mark.parametrize("cells_in_memory", [10**9, 100])
+def test_chunks_are_as_good_as_the_whole(cells_in_memory):
     "Cells that straddle chunks are merged, also when those that have passed are closed early"
     survey = street.survey()
     parts = street.clouds()
-    collector = TieCollector(survey, held_cells)
+    collector = FeatureCollector(survey, cells_in_memory)
     for file, cloud in zip(survey.clouds, parts, strict=True):
         for first in range(0, len(cloud), 7_001):
             collector.add(file, cloud[first : first + 7_001])
@@ -36,7 +36,7 @@ def test_chunks_are_as_good_as_the_whole(held_cells):
 def test_the_order_of_chunks_does_not_matter():
     "Chunks and files in any order give the same features and numbers of passes"
     survey = street.survey()
-    collector = TieCollector(survey)
+    collector = FeatureCollector(survey)
     pieces = [
         (file, cloud[first : first + 9_001])
         for file, cloud in zip(survey.clouds, street.clouds(), strict=True)
@@ -70,7 +70,7 @@ def test_clouds_without_features_have_none():
     "No points, points in the air and a hundred times the same point: no feature, no warning"
     survey = street.survey()
     rng = np.random.default_rng(1)
-    collector = TieCollector(survey)
+    collector = FeatureCollector(survey)
     assert len(collector.features()) == 0
     scattered = rng.normal(0, 30, (5_000, 3))
     for points in (np.empty((0, 3)), scattered, np.tile([3.0, 4.0, 1.0], (100, 1))):

@@ -1,14 +1,19 @@
 """Planes and poles among cells, from the moments of their points alone."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mlscorr.frames import scanner_position
+from mlscorr.surfaces.cells import (
+    COLUMN_AXES,
+    ROW_AXES,
+    Cells,
+    neighbour_covariances,
+)
+from mlscorr.surfaces.settings import SETTINGS
 from mlscorr.survey import Columns, Survey, TieFeatures
-from mlscorr.ties.settings import SETTINGS
 
-ROWS, COLUMNS = np.triu_indices(3)  # of the products: xx, xy, xz, yy, yz, zz
 # Visible is the half of a pole that faces the scanner, its points evenly spread across the beam:
 # their mean lies pi / 4 of the radius before the axis, their variance across is radius^2 / 3, and
 # that along the beam (2/3 - pi^2 / 16) radius^2. Of a square one that shows two sides they lie
@@ -21,7 +26,7 @@ ALONG = 2 / 3 - np.pi**2 / 16
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Shapes(Columns):
-    """What cells hold: as in TieFeatures, and the way from the mean of the points to the centre.
+    """Planes or poles of cells: as in TieFeatures, and where their centres are.
 
     Parameters
     ----------
@@ -30,7 +35,7 @@ class Shapes(Columns):
     direction : (n, 3) array
     variance, tilt, extent : (n,) array
     shift : (n, 3) array
-        Units: m.
+        From the mean of the points to the centre. Units: m.
     """
 
     rows: np.ndarray
@@ -41,89 +46,50 @@ class Shapes(Columns):
     shift: np.ndarray
 
 
-def covariances(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Covariances of the points of cells, and of their noise by differences of neighbours.
-
-    Parameters
-    ----------
-    moments : (n, 21) array
-        See mlscorr.ties._cells.
-
-    Returns
-    -------
-    covariance : (n, 3, 3) array
-        Units: m^2.
-    noise : (n, 3, 3) array
-        Half the mean product of the differences; NaN where neighbours are too rare. Units: m^2.
-    """
-    count = moments[:, :1]
-    followers = moments[:, 11:12]
-    mean = moments[:, 2:5] / count
-    products = moments[:, 5:11] / count - mean[:, ROWS] * mean[:, COLUMNS]
-    differences = moments[:, 12:18] / np.maximum(2 * followers, 1.0)
-    differences[~_is_ordered(moments)] = np.nan  # points in no order, or beams that take turns
-    return _symmetric(products), _symmetric(differences)
-
-
-def _symmetric(products):
-    matrix = np.empty((len(products), 3, 3))
-    matrix[:, ROWS, COLUMNS] = matrix[:, COLUMNS, ROWS] = products
-    return matrix
-
-
-def find_shapes(
-    survey: Survey, middle: np.ndarray, begin: np.ndarray, group: np.ndarray, moments: np.ndarray
-) -> TieFeatures:
+def find_shapes(survey: Survey, cells: Cells) -> TieFeatures:
     """The planes and poles among cells.
 
     Parameters
     ----------
     survey : Survey
-    middle : (n, 3) array
-        Of the cells. Units: m.
-    begin : (n,) array
-        Of the cells' moments. Units: s.
-    group : (n,) int array
-        Of each cell; it stands for pass_number and scanner in what is returned.
-    moments : (n, 21) array
-        See mlscorr.ties._cells.
+    cells : Cells
+        Their group stands for pass_number and scanner in what is returned.
     """
-    moments, way = join_across_faces(middle, begin, group, moments)
-    full = np.flatnonzero(moments[:, 0] >= SETTINGS.feature_points)
-    covariance, noise = covariances(moments[full])
+    cells, step = join_across_faces(cells)
+    full = np.flatnonzero(cells.points >= SETTINGS.feature_points)
+    covariance = cells[full].covariance
     # lambda_0 is not below det / (sum of the principal minors): spares what is no plane its axes
     minors = (np.trace(covariance, axis1=1, axis2=2) ** 2 - (covariance**2).sum(axis=(1, 2))) / 2
     is_thin = np.linalg.det(covariance) <= SETTINGS.roughest**2 * minors
     is_thin |= covariance[:, 0, 0] + covariance[:, 1, 1] <= SETTINGS.thickest**2
-    rows = np.flatnonzero(is_thin)
-    cells = middle, begin, group, moments, way
-    middle, begin, group, moments, way = (column[full[rows]] for column in cells)
-    values, axes = np.linalg.eigh(covariance[rows])
+    rows = full[is_thin]
+    cells = cells[rows]
+    step = step[rows]
+    values, axes = np.linalg.eigh(covariance[is_thin])
     values = np.maximum(values, SETTINGS.rounding**2)  # points of a file may be the same
-    count = moments[:, 0]
-    time = begin + moments[:, 1] / count
-    local = moments[:, 2:5] / count[:, None]
-    sight = middle + local - scanner_position(survey.trajectory, survey.mounting, time)
+    moments = cells.moments
+    sight = cells.centre - scanner_position(survey.trajectory, survey.mounting, cells.gps_time)
     sight /= np.linalg.norm(sight, axis=1, keepdims=True)
-    believed = survey.scanner.range_noise**2 * np.eye(3)
-    between = np.where(np.isnan(noise[rows]), believed, noise[rows])
-    planes = _planes(moments, values, axes, between, sight)
-    poles = _poles(moments, values, axes, between, sight, way)
-    poles = poles[_stacked(middle[poles.rows], begin[poles.rows], group[poles.rows])]
+    noise = neighbour_covariances(moments)
+    # points in no order, or beams that take turns
+    noise[~_is_ordered(moments)] = survey.scanner.range_noise**2 * np.eye(3)
+    planes = _planes(moments, values, axes, noise, sight)
+    poles = _poles(moments, values, axes, noise, sight, step)
+    poles = poles[_stacked(cells[poles.rows])]
     rows = np.concatenate([planes.rows, poles.rows])
     shapes = Shapes.concatenate([planes, poles])
     kind = np.repeat(["plane", "pole"], [len(planes), len(poles)])
     return TieFeatures(
-        pass_number=group[rows],
-        scanner=group[rows],
+        pass_number=cells.group[rows],
+        scanner=cells.group[rows],
         kind=kind,
-        gps_time=time[rows],
-        centre=middle[rows] + (local[rows] + shapes.shift),
+        gps_time=cells.gps_time[rows],
+        centre=cells.middle[rows] + (cells.offset[rows] + shapes.shift),
         direction=shapes.direction,
         variance=shapes.variance,
         tilt=shapes.tilt,
         extent=shapes.extent,
-        points=count[rows].astype(int),
+        points=cells.points[rows].astype(int),
         sweep=_sweep(moments[rows], values[rows], axes[rows], kind == "pole"),
     )
 
@@ -143,7 +109,7 @@ def _with_time(moments):
 
 
 def _planes(moments, values, axes, noise, sight):
-    """Those of cells that hold a plane."""
+    """Planes among the cells."""
     normal = axes[:, :, 0]
     points = moments[:, 0]
     variance, of_mean = _scatter(values[:, 0], moments, _along(normal, noise))
@@ -176,19 +142,19 @@ def _scatter(variance, moments, between):
 
 
 def _lines(moments):
-    """Number of scan lines (n,), or about so where the order of points doesn't tell."""
+    """Number of scan lines (n,); a guess where the order of points does not show them."""
     points = moments[:, 0]
     followers = moments[:, 11]
     return np.where(_is_ordered(moments), points - followers, np.sqrt(points))
 
 
 def _is_ordered(moments):
-    """Whether enough points (n,) follow another one of their cell: else noise can't be told."""
+    """Cells (n,) in which enough points follow another one to show their noise."""
     return moments[:, 11] >= moments[:, 0] / 4
 
 
-def _poles(moments, values, axes, noise, sight, way):
-    """Those of cells that hold a pole and nothing else."""
+def _poles(moments, values, axes, noise, sight, step):
+    """Poles among the cells that have nothing else."""
     points = moments[:, 0]
     axis = axes[:, :, 2] * np.where(axes[:, 2, 2:] < 0, -1.0, 1.0)
     across = np.cross(axis, sight)
@@ -213,15 +179,15 @@ def _poles(moments, values, axes, noise, sight, way):
     # is thick is joined with what is beyond, and as wide there; what is flat may be a wall's border
     spread = np.sqrt(np.einsum("nii->ni", matrix)[:, :2])
     spread = np.where(is_thick[:, None], spread.max(axis=1, keepdims=True), spread)
-    way = np.where(is_thick[:, None], way[:, :2], 0.0)
-    from_middle = moments[:, 2:4] / points[:, None] - way * SETTINGS.cell / 2
-    to_border = (1 + np.abs(way)) * SETTINGS.cell / 2 - np.abs(from_middle)
+    step = np.where(is_thick[:, None], step[:, :2], 0.0)
+    from_middle = moments[:, 2:4] / points[:, None] - step * SETTINGS.cell / 2
+    to_border = (1 + np.abs(step)) * SETTINGS.cell / 2 - np.abs(from_middle)
     is_pole &= (to_border >= 2.5 * spread).all(axis=1)
     time = np.einsum("ni,ni->n", across, _with_time(moments)) / np.sqrt(np.maximum(side, 1e-12))
     to_end = SETTINGS.moment / 2 - np.abs(moments[:, 1] / points - SETTINGS.moment / 2)
     is_pole &= to_end >= 2.5 * np.abs(time)
     of_radius = radius**2 / (5 * points)  # a uniform distribution's variance^2 is known to 0.8 / m
-    # evenly spaced, scan lines leave the middle open by half of a step; one tells no width
+    # evenly spaced, scan lines leave the middle open by half of a step; one shows no width
     lines = _lines(moments)
     is_pole &= lines > 1
     variance = side / lines**2 + depth**2 * of_radius + (SETTINGS.roundness * radius) ** 2
@@ -237,40 +203,34 @@ def _along(vector, matrix):
     return np.einsum("ni,nij,nj->n", vector, matrix, vector)
 
 
-def _stacked(middle, begin, group):
-    """Whether a pole (n,) goes on in the cell above or below: people and bollards don't."""
-    order = np.lexsort([*middle.T[::-1], begin, group])
-    column = np.column_stack([middle, begin, group])[order]
+def _stacked(cells):
+    """Poles (n,) that go on in the cell above or below: people and bollards don't."""
+    order = np.lexsort([*cells.middle.T[::-1], cells.begin, cells.group])
+    column = np.column_stack([cells.middle, cells.begin, cells.group])[order]
     goes_on = (np.diff(column, axis=0) == [0, 0, SETTINGS.cell, 0, 0]).all(axis=1)
     stacked = np.zeros(len(order), bool)
     stacked[order[1:][goes_on]] = stacked[order[:-1][goes_on]] = True
     return stacked
 
 
-def join_across_faces(
-    middle: np.ndarray, begin: np.ndarray, group: np.ndarray, moments: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Moments of cells, of which those of two that share a plane or pole in their face are joined.
+def join_across_faces(cells: Cells) -> tuple[Cells, np.ndarray]:
+    """Cells, of which those of two that share a plane or pole in their face are joined.
 
     Each would hold half of the plane's noise, whose mean lies 0.8 sigmas off the plane, or a part
     of the pole, whose middle is not the whole's.
 
     Parameters
     ----------
-    middle : (n, 3) array
-        Of the cells. Units: m.
-    begin : (n,) array
-        Of the cells' moments. Units: s.
-    group : (n,) int array
-    moments : (n, 21) array
-        See mlscorr.ties._cells.
+    cells : Cells
 
     Returns
     -------
-    joined : (n, 21) array
-    way : (n, 3) array
+    joined : Cells
+        A cell that another one took up has no points.
+    step : (n, 3) array
         To the cells beyond, whose points stand in each one too, if there are any. Units: cells.
     """
+    moments = cells.moments
     points = moments[:, 0]
     mean = moments[:, 2:5] / points[:, None]
     spread = moments[:, [5, 8, 10]] / points[:, None] - mean**2
@@ -286,40 +246,42 @@ def join_across_faces(
     is_cut &= SETTINGS.cell / 2 - np.abs(mean) < 2.5 * spread
     rank = np.argsort(np.argsort(points, kind="stable"))
     joined = moments.copy()
-    ways = np.zeros_like(mean)
+    steps = np.zeros_like(mean)
     for axis in np.flatnonzero(is_cut.any(axis=0)):
         rows = np.flatnonzero(is_cut[:, axis])
-        way = np.sign(mean[rows, axis, None]) * np.eye(3)[axis]
-        ways[rows] += way
-        beyond = _cells_at(middle, begin, group, rows, way)
-        rows, beyond, way = (part[beyond >= 0] for part in (rows, beyond, way))
-        is_half = is_cut[beyond, axis] & (mean[beyond, axis] * way[:, axis] < 0)
+        step = np.sign(mean[rows, axis, None]) * np.eye(3)[axis]
+        steps[rows] += step
+        beyond = _cells_at(cells, rows, step)
+        rows, beyond, step = (part[beyond >= 0] for part in (rows, beyond, step))
+        is_half = is_cut[beyond, axis] & (mean[beyond, axis] * step[:, axis] < 0)
         kept = ~(is_half & (rank[rows] < rank[beyond]))  # the smaller half takes part there
-        rows, beyond, way, is_half = (part[kept] for part in (rows, beyond, way, is_half))
-        joined[rows] += _moved(joined[beyond], SETTINGS.cell * way)
+        rows, beyond, step, is_half = (part[kept] for part in (rows, beyond, step, is_half))
+        joined[rows] += _moved(joined[beyond], SETTINGS.cell * step)
         joined[beyond[is_half]] = 0.0
-    return joined, ways
+    return replace(cells, moments=joined), steps
 
 
-def _cells_at(middle, begin, group, rows, way):
-    """Rows (k,) of the cells a way of cells (k, 3) from rows, of their moment and group; or -1."""
-    place = np.round((middle - middle.min(axis=0)) / SETTINGS.cell).astype(np.int64) + 1
-    own = np.unique(np.column_stack([begin, group]), axis=0, return_inverse=True)[1].ravel()
+def _cells_at(cells, rows, step):
+    """Rows (k,) of the cells some steps (k, 3) from rows, of their moment and group; or -1."""
+    corner = cells.middle.min(axis=0)
+    place = np.round((cells.middle - corner) / SETTINGS.cell).astype(np.int64) + 1
+    moment = np.column_stack([cells.begin, cells.group])
+    own = np.unique(moment, axis=0, return_inverse=True)[1].ravel()
     size = (own.max() + 1, *(place.max(axis=0) + 2))
     keys = np.ravel_multi_index((own, *place.T), size)
-    partner = np.ravel_multi_index((own[rows], *(place[rows] + way.astype(np.int64)).T), size)
+    partner = np.ravel_multi_index((own[rows], *(place[rows] + step.astype(np.int64)).T), size)
     order = np.argsort(keys)
     nearest = order[np.minimum(np.searchsorted(keys, partner, sorter=order), len(keys) - 1)]
     return np.where(keys[nearest] == partner, nearest, -1)
 
 
-def _moved(moments, way):
-    """Moments (k, 21) about the middle of cells a way (k, 3) before. Units of the way: m."""
+def _moved(moments, shift):
+    """Moments (k, 22) about the middles of other cells, a shift (k, 3) before. Units: m."""
     points = moments[:, :1]
     sums = moments[:, 2:5]
     moved = moments.copy()
-    moved[:, 2:5] += points * way
-    cross = sums[:, ROWS] * way[:, COLUMNS] + way[:, ROWS] * sums[:, COLUMNS]
-    moved[:, 5:11] += cross + points * way[:, ROWS] * way[:, COLUMNS]
-    moved[:, 18:21] += moments[:, 1:2] * way
+    moved[:, 2:5] += points * shift
+    cross = sums[:, ROW_AXES] * shift[:, COLUMN_AXES] + shift[:, ROW_AXES] * sums[:, COLUMN_AXES]
+    moved[:, 5:11] += cross + points * shift[:, ROW_AXES] * shift[:, COLUMN_AXES]
+    moved[:, 18:21] += moments[:, 1:2] * shift
     return moved

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
+from mlscorr.surfaces import FeatureCollector, direction_class
 from mlscorr.survey import PointCloud
-from mlscorr.ties import TieCollector
-from mlscorr.ties.thinning import direction_class
 from tests.beds import tie_streets as street
 
 
@@ -27,7 +26,7 @@ def collected(points, number=0, rng=None, noise=street.NOISE):
     "Features of some points that one pass measures"
     rng = np.random.default_rng(1) if rng is None else rng
     survey = street.survey(number + 1)
-    collector = TieCollector(survey)
+    collector = FeatureCollector(survey)
     collector.add(survey.clouds[number], street.scan(points, number, rng, noise))
     return collector.features()
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.ties import TieCollector
-from mlscorr.ties._markings import Crossings, find_crossings, find_markings
+from mlscorr.surfaces import FeatureCollector
+from mlscorr.surfaces._paint import Crossings, find_crossings, find_markings
 from tests.beds import painted_roads as road
-from tests.ties.test_collector import assert_same
+from tests.surfaces.test_collector import assert_same
 
 AZIMUTHS = [0.0, 45.0, 70.0, 135.0]  # deg
 
@@ -79,7 +79,7 @@ def test_chunks_and_their_order_do_not_matter():
         for file, part in zip(survey.clouds, parts, strict=True)
         for first in range(0, len(part), 50_000)
     ]
-    whole, chunks, early = (TieCollector(survey, held) for held in (10**9, 10**9, 100))
+    whole, chunks, early = (FeatureCollector(survey, held) for held in (10**9, 10**9, 100))
     for file, part in zip(survey.clouds, parts, strict=True):
         whole.add(file, part)
     for row in rng.permutation(len(pieces)):
