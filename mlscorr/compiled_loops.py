@@ -3,6 +3,14 @@
 import os
 import tempfile
 from pathlib import Path
+from typing import Any
+
+# Options of every loop. numba compiles what it offers itself (np.empty, max ...) anew for each set
+# of options, so that all loops share one. Division by zero gives infinity, as NumPy has it: each
+# check and its message are code. Nobody calls a loop from C.
+LOOP: Any = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+# Of those that only other loops call: what would unpack their arguments from Python is left out
+INNER: Any = {**LOOP, "no_cpython_wrapper": True}
 
 
 def choose_folder(*usual: str | Path) -> None:

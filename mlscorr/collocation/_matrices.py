@@ -3,10 +3,12 @@
 import numpy as np
 from numba import njit
 
+from mlscorr.compiled_loops import LOOP
+
 SINGULAR = 1e-15  # share of an observation's prior variance below which nothing is left of it
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def assign(out: np.ndarray, values: np.ndarray) -> None:
     """Put values in the place of a matrix; by slices the words of an error take long to compile.
 
@@ -19,7 +21,7 @@ def assign(out: np.ndarray, values: np.ndarray) -> None:
             out[i, j] = values[i, j]
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """A b. Plain loops: on matrices this small they are as fast as BLAS, and quick to compile.
 
@@ -35,7 +37,7 @@ def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return out
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def multiply_transposed(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """a^T b.
 
@@ -46,7 +48,7 @@ def multiply_transposed(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return multiply(a.T, b)
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def subtract_product(x: np.ndarray, a: np.ndarray, b: np.ndarray) -> None:
     """X <- x - a b, in place.
 
@@ -60,7 +62,7 @@ def subtract_product(x: np.ndarray, a: np.ndarray, b: np.ndarray) -> None:
                 x[i, j] -= a[i, k] * b[k, j]
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def make_symmetric(x: np.ndarray) -> None:
     """Make x symmetric, in place.
 
@@ -73,7 +75,7 @@ def make_symmetric(x: np.ndarray) -> None:
             x[i, j] = x[j, i] = 0.5 * (x[i, j] + x[j, i])
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def whitening_root(s: np.ndarray, prior: np.ndarray) -> np.ndarray:
     """L^-1 with L L^T = s (r, r); a first element that is no number where s is singular.
 

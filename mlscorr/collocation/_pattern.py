@@ -19,6 +19,8 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import depth_first_order
 from scipy.sparse.linalg import spilu
 
+from mlscorr.compiled_loops import LOOP
+
 
 class Pattern(NamedTuple):
     """Where the blocks of a matrix, of its factor and of its inverse stand.
@@ -134,7 +136,7 @@ def _postorder(row, column):
     return np.argsort(visited[:0:-1])
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def _ends_front(row, column, first):
     """Which nodes (k,) end a front: the next isn't their parent, or they cost less apart.
 
@@ -159,12 +161,12 @@ def _ends_front(row, column, first):
     return ends
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def _work(width, below):
     return width**3 / 3 + width * below * (width + below) + 4 * below**2
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def _fill_in(pointer, index):
     """Nodes below the diagonal of each column of the factor, and where each column begins.
 
@@ -197,7 +199,7 @@ def _fill_in(pointer, index):
     return row[:end].copy(), column
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def _enter(nodes, j, mark, row, end):
     """Write those of some nodes behind the end that column j lacks; its new end."""
     for i in nodes:
@@ -208,7 +210,7 @@ def _enter(nodes, j, mark, row, end):
     return end
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def locate(pattern: Pattern, i: int, j: int) -> int:
     """Where block (i, j) of the lower triangle begins in values.
 
@@ -244,7 +246,7 @@ def locate(pattern: Pattern, i: int, j: int) -> int:
     return pattern.start[front] + pattern.height[low] * width + left
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def panel_width(pattern: Pattern, j: int) -> int:
     """Number of values from one row of a block below node j to the next.
 
@@ -257,7 +259,7 @@ def panel_width(pattern: Pattern, j: int) -> int:
     return pattern.first[pattern.node[front + 1]] - pattern.first[pattern.node[front]]
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def diagonal(pattern: Pattern, values: np.ndarray) -> np.ndarray:
     """Diagonal of a matrix, or of a factor.
 

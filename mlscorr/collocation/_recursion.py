@@ -38,6 +38,7 @@ from mlscorr.collocation._states import (
     observe,
     send_back,
 )
+from mlscorr.compiled_loops import LOOP
 
 
 class Recursion(NamedTuple):
@@ -61,7 +62,7 @@ class Recursion(NamedTuple):
     whiteners: np.ndarray
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def filter_covariance(
     layout: Layout, size: int, steps: np.ndarray, mixing: np.ndarray, noise: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -121,7 +122,7 @@ def filter_covariance(
     return transitions, gains, whiteners, covariances
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def _joseph(first, mixing, noise, p, gain, observed):
     """(I - K H) P- (I - K H)^T + K R K^T from K^T and H P-."""
     subtract_product(p, gain.T, observed)
@@ -132,7 +133,7 @@ def _joseph(first, mixing, noise, p, gain, observed):
     return p
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def filter_columns(recursion: Recursion, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Filter columns of observations.
 
@@ -167,7 +168,7 @@ def filter_columns(recursion: Recursion, columns: np.ndarray) -> tuple[np.ndarra
     return whitened, states
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def smooth_columns(recursion: Recursion, whitened: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """From whitened columns back.
 
@@ -199,7 +200,7 @@ def smooth_columns(recursion: Recursion, whitened: np.ndarray) -> tuple[np.ndarr
     return weights, adjoints
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def smooth_covariance(
     recursion: Recursion, steps: np.ndarray, covariances: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -257,7 +258,7 @@ def smooth_covariance(
     return blocks, future, same, following
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def precision_between(
     recursion: Recursion, future: np.ndarray, early: int, late: int
 ) -> np.ndarray:

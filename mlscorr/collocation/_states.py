@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 
 from mlscorr.collocation.covariance import process_noise, transition
+from mlscorr.compiled_loops import LOOP
 
 if TYPE_CHECKING:
     from mlscorr.collocation.model import Signal
@@ -54,7 +55,7 @@ class Layout(NamedTuple):
         return int(self.states[self.signal].sum())
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def fill_transition(layout: Layout, spans: np.ndarray, out: np.ndarray) -> None:
     """F of each signal over a span of its clock.
 
@@ -71,7 +72,7 @@ def fill_transition(layout: Layout, spans: np.ndarray, out: np.ndarray) -> None:
             out[s, k // 3, k % 3] = f[k]
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def fill_noise(layout: Layout, spans: np.ndarray, out: np.ndarray) -> None:
     """Q of each signal over a span of its clock.
 
@@ -95,7 +96,7 @@ def fill_noise(layout: Layout, spans: np.ndarray, out: np.ndarray) -> None:
         out[s, 2, 2] = q[5]
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def carry(layout: Layout, blocks: np.ndarray, x: np.ndarray, transposed: bool) -> None:
     """X <- F x, or F^T x, in place.
 
@@ -133,7 +134,7 @@ def carry(layout: Layout, blocks: np.ndarray, x: np.ndarray, transposed: bool) -
                 x[a + 2, c] = f20 * x0 + f21 * x1 + f22 * x2
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def carry_square(layout: Layout, blocks: np.ndarray, x: np.ndarray, transposed: bool) -> np.ndarray:
     """F x F^T, or F^T x F, of a symmetric x; a new array.
 
@@ -152,7 +153,7 @@ def carry_square(layout: Layout, blocks: np.ndarray, x: np.ndarray, transposed: 
     return whole
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def add_blocks(layout: Layout, blocks: np.ndarray, x: np.ndarray) -> None:
     """Add each process's block of states to the diagonal of x.
 
@@ -170,7 +171,7 @@ def add_blocks(layout: Layout, blocks: np.ndarray, x: np.ndarray) -> None:
                 x[a + p, a + q] += blocks[layout.signal[j], p, q]
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def observe(first: np.ndarray, mixing: np.ndarray, x: np.ndarray) -> np.ndarray:
     """H x of states: (r, c).
 
@@ -188,7 +189,7 @@ def observe(first: np.ndarray, mixing: np.ndarray, x: np.ndarray) -> np.ndarray:
     return out
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def send_back(first: np.ndarray, mixing: np.ndarray, y: np.ndarray, x: np.ndarray) -> None:
     """X <- x + H^T y, in place.
 

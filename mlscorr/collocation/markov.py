@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -215,9 +215,7 @@ class MarkovSolver:
         """
         nodes = self._smooth(self._without_shared(columns))[1]
         table = (self.gps_time, self.clocks, self.layout, nodes, *self._node_covariances)
-        return predictor_by(
-            lambda epochs: interpolate(*table, epochs), self.layout, trend, trend_root
-        )
+        return predictor_by(partial(interpolate, *table), self.layout, trend, trend_root)
 
     @cached_property
     def _position(self):

@@ -3,6 +3,8 @@
 import numpy as np
 from numba import njit
 
+from mlscorr.compiled_loops import LOOP
+
 
 def require_times(points: int, times: int) -> None:
     """Refuse points without a time each: the kernel, which checks no index, would read on.
@@ -22,7 +24,7 @@ def require_times(points: int, times: int) -> None:
         )
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def locate(
     gps_time: np.ndarray, constant: float, epochs: np.ndarray, step: float, is_gap: np.ndarray
 ) -> np.ndarray:
@@ -63,7 +65,7 @@ def locate(
     return index
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(inline="always", **LOOP)
 def _increment(x, y, z, weight, a, b):
     """Shift + turn (x - T), interpolated between the table rows a and b."""
     v = 1.0 - weight
@@ -79,7 +81,7 @@ def _increment(x, y, z, weight, a, b):
     return ex, ey, ez
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def fill_increments(
     gps_time: np.ndarray,
     xyz: np.ndarray,
@@ -115,7 +117,7 @@ def fill_increments(
         )
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def move_integers(
     xs: np.ndarray,
     ys: np.ndarray,

@@ -69,8 +69,9 @@ def marginals(chain: Chain) -> Marginals:
             now = _pass(now, chain, row, row + 1)
         begins.append(now)
     future = start(chain)
-    for first, now in zip(reversed(starts), reversed(begins), strict=True):
+    for first in reversed(starts):
         last = min(first + length, n) - 1
+        now = begins.pop()
         past = [heaviest(now)]
         for row in range(first, last):
             now = _pass(now, chain, row, row + 1)

@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 from scipy.sparse import coo_array
 
+from mlscorr.compiled_loops import LOOP
 from mlscorr.targets.settings import SETTINGS
 
 EMPTY = -1
@@ -69,7 +70,7 @@ def _component_tree(xyz, level, link):
         yield number, np.sort(rows[level[rows] >= number])
 
 
-@njit(cache=True)
+@njit(**LOOP)
 def _grow(xyz, level, brightest_first, voxel, keys_of, keys, number, limits):
     """Components as voxels join them from the brightest level down.
 
@@ -126,7 +127,7 @@ def _grow(xyz, level, brightest_first, voxel, keys_of, keys, number, limits):
     return entries[:length].copy(), place
 
 
-@njit(cache=True)
+@njit(**LOOP)
 def _join(parent, chain, sums, box, voxel, beside):
     """Join the components of two voxels, the smaller's voxels behind the larger's."""
     a = root_of(parent, voxel)
@@ -145,7 +146,7 @@ def _join(parent, chain, sums, box, voxel, beside):
         box[1][axis, a] = max(box[1][axis, a], box[1][axis, b])
 
 
-@njit(cache=True)
+@njit(**LOOP)
 def _places(parent, behind):
     """Place (v,) of each voxel when all components follow each other."""
     place_of = np.empty(len(parent), np.int64)
@@ -230,7 +231,7 @@ def _offsets(dimensions):
     return offsets[np.sum(offsets**2, axis=1) < 9]
 
 
-@njit(cache=True)
+@njit(**LOOP)
 def _labels(keys, steps):
     """Component number (n,) of keys in increasing order, which these steps connect."""
     voxel = np.empty(len(keys), np.int32)
@@ -263,7 +264,7 @@ def _labels(keys, steps):
     return number[voxel]
 
 
-@njit(cache=True)
+@njit(**LOOP)
 def root_of(parent: np.ndarray, i: int) -> int:
     """What stands for the component of i, with the way to it shortened.
 
@@ -279,7 +280,7 @@ def root_of(parent: np.ndarray, i: int) -> int:
     return i
 
 
-@njit(cache=True)
+@njit(**LOOP)
 def number_voxels(xyz: np.ndarray, low: np.ndarray, edge: float) -> tuple[np.ndarray, ...]:
     """Number the occupied cubes.
 
@@ -368,7 +369,7 @@ def neighbours(key: int, keys: np.ndarray, number: np.ndarray) -> Iterator[int]:
                         yield number[slot]
 
 
-@njit(cache=True)
+@njit(**LOOP)
 def key_of(x: float, y: float, z: float, edge: float) -> np.int64:
     """Key of the cube that holds a place.
 
@@ -380,7 +381,7 @@ def key_of(x: float, y: float, z: float, edge: float) -> np.int64:
     return (np.int64(x / edge) << 42) | (np.int64(y / edge) << 21) | np.int64(z / edge)
 
 
-@njit(cache=True)
+@njit(**LOOP)
 def _slot(keys, key):
     """Where a key stands, or would stand, in an open hash table of a power of two."""
     mask = len(keys) - 1

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numba import njit
 
+from mlscorr.compiled_loops import LOOP
 from mlscorr.targets._sequence import quasi_random
 from mlscorr.targets.settings import SETTINGS
 
@@ -66,7 +67,7 @@ class Plane:
         return replace(self, axes=np.array([u, np.cross(normal, u), normal]))
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def most_common(xyz: np.ndarray, triples: np.ndarray, tolerance: float) -> np.ndarray:
     """Which points lie on the plane that most of them support, nearer ones more.
 
@@ -134,7 +135,7 @@ def fit_plane(xyz: np.ndarray, tolerance: float) -> Plane:
     return Plane(*_fit_plane(xyz, triples, tolerance))
 
 
-@njit(cache=True, nogil=True)
+@njit(**LOOP)
 def _fit_plane(xyz, triples, tolerance):
     """Origin (3,), axes (3, 3), sigma and inliers (n,): a piece of cloud asks for hundreds."""
     middle = xyz.sum(axis=0) / len(xyz)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from mlscorr.compiled_loops import LOOP
 from mlscorr.targets._clusters import (
     OCTAVE,
     key_of,
@@ -82,7 +83,7 @@ def _levels(intensity):
     return np.floor(steps).astype(np.int8)[np.asarray(intensity).astype(np.uint16)]
 
 
-@njit(cache=True)
+@njit(**LOOP)
 def _background(cell, keys_of, keys, number, level):
     """Level (c,) that a point must exceed to be bright, for each cell."""
     histogram = np.zeros((len(keys_of), LEVELS), np.int32)
@@ -107,7 +108,7 @@ def _background(cell, keys_of, keys, number, level):
     return dark
 
 
-@njit(cache=True)
+@njit(**LOOP)
 def _component_tree(local, level, edge, limits):
     """Components (k, 17) of bright points (n, 3) at each level, those that may be a target.
 
@@ -161,7 +162,7 @@ def _component_tree(local, level, edge, limits):
     return result[:count].copy()
 
 
-@njit(cache=True)
+@njit(**LOOP)
 def _join(parent, table, voxel, beside):
     """Join the components of two voxels."""
     a = root_of(parent, voxel)
@@ -177,7 +178,7 @@ def _join(parent, table, voxel, beside):
         table[a, column] += table[b, column]
 
 
-@njit(cache=True)
+@njit(**LOOP)
 def _moments(row):
     """Mean (3,), standard deviations (3,) along axes, and axes (3, 3) as columns."""
     n = row[1]
@@ -192,7 +193,7 @@ def _moments(row):
     return mean, np.sqrt(np.maximum(values, 0.0)), axes
 
 
-@njit(cache=True)
+@njit(**LOOP)
 def _may_be_target(row, limits):
     """Whether a component is compact, flat, and not a strip."""
     count, extent, thick, ratio = limits
@@ -204,7 +205,7 @@ def _may_be_target(row, limits):
     return sigma[0] < thick and sigma[1] > thick and sigma[2] < ratio * sigma[1]
 
 
-@njit(cache=True)
+@njit(**LOOP)
 def _likeness(table, xyz, low, level, grid, shape, largest):
     """How far each component agrees with a disc, a square or a checkerboard, and the level from
     which it does best: (k, 2).
@@ -265,7 +266,7 @@ def _as_regions(table, likeness, level, low):
     return [BrightRegion(low + middle[k], radius[k], threshold[k], likeness[k]) for k in kept]
 
 
-@njit(cache=True)
+@njit(**LOOP)
 def jaccard_index(
     uv: np.ndarray, bright: np.ndarray, longest: float, largest_ratio: float, directions: int
 ) -> float:
@@ -326,7 +327,7 @@ def jaccard_index(
     return (both / np.maximum(either, 1.0)).max()
 
 
-@njit(cache=True)
+@njit(**LOOP)
 def _extent(uv, bright, angle):
     """Bounds of the bright points along a direction and across it."""
     low_x = np.inf

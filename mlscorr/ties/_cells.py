@@ -6,6 +6,7 @@ The sums are about the middle of each cell, so that no digit is lost at coordina
 import numpy as np
 from numba import njit
 
+from mlscorr.compiled_loops import LOOP
 from mlscorr.survey import PointCloud
 
 EMPTY = -1
@@ -18,7 +19,7 @@ GROUP_BITS = 24  # of a key for the group, below the number of the moment
 COLUMNS = 21
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always", **LOOP)
 def _slot_of(cell, moment, table, keys):
     """Where the row of a key stands, or would stand, in an open hash table of a power of two."""
     mask = len(table) - 1
@@ -32,7 +33,7 @@ def _slot_of(cell, moment, table, keys):
     return slot
 
 
-@njit(cache=True)
+@njit(**LOOP)
 def hash_rows(keys: np.ndarray, count: int, size: int) -> np.ndarray:
     """An open hash table of the first rows of keys.
 
@@ -50,7 +51,7 @@ def hash_rows(keys: np.ndarray, count: int, size: int) -> np.ndarray:
     return table
 
 
-@njit(cache=True)
+@njit(**LOOP)
 def add_points(
     xyz: np.ndarray,
     gps_time: np.ndarray,
@@ -140,7 +141,7 @@ def add_points(
     return len(xyz), count
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always", **LOOP)
 def _split(place, grid):
     """Key of the cell that holds a place, and the way (m) to that from its middle."""
     x = place[0] - grid[0]
@@ -156,7 +157,7 @@ def _split(place, grid):
     return cell, x, y, z
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always", **LOOP)
 def _add_place(sums, column, factor, x, y, z):
     """Add x, y, z times a factor to the columns from one on."""
     sums[column] += factor * x
@@ -164,7 +165,7 @@ def _add_place(sums, column, factor, x, y, z):
     sums[column + 2] += factor * z
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always", **LOOP)
 def _add_products(sums, column, x, y, z):
     """Add xx, xy, xz, yy, yz, zz to the columns from one on."""
     sums[column] += x * x

@@ -8,6 +8,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from mlscorr.compiled_loops import LOOP
 from mlscorr.survey import Columns, PointCloud, TieFeatures
 from mlscorr.ties.settings import SETTINGS
 
@@ -61,7 +62,7 @@ def find_crossings(cloud: PointCloud, passes: np.ndarray, group: int) -> Crossin
     return crossings[(segment >= 0) & (time <= passes[segment, 1])]
 
 
-@njit(cache=True)
+@njit(**LOOP)
 def bright_runs(xyz: np.ndarray, intensity: np.ndarray, limits: np.ndarray) -> np.ndarray:
     """Runs of points that are brighter than the level ground before and after them.
 

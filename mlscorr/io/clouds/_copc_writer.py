@@ -22,6 +22,7 @@ import lazrs
 import numpy as np
 from numba import njit
 
+from mlscorr.compiled_loops import LOOP
 from mlscorr.io.clouds.las_checks import ENTRY, EVLR_HEADER, INFO, evlrs
 from mlscorr.io.clouds.las_crs import cloud_box
 from mlscorr.io.clouds.las_layout import (
@@ -173,7 +174,7 @@ class _Node:
             yield self.key, records
 
 
-@njit(cache=True)
+@njit(**LOOP)
 def _sample(places, shift, is_taken):
     """Which points (n,) are the first of their cell, which is then taken."""
     chosen = np.zeros(len(places), np.bool_)
