@@ -143,19 +143,19 @@ def prior_roots(layout: Layout, knots: Knots) -> tuple[np.ndarray, np.ndarray]:
     """
     roots, carried = np.zeros((2, knots.clock.size, 3, 3))
     number = layout.states.size
-    f, q = np.zeros((2, number, 3, 3))
+    f, q = np.zeros((2, 1, number, 3, 3))
     for s in range(number):
         d = layout.states[s]
         for j in range(knots.first[s], knots.first[s + 1]):
             span = np.inf
             if j > knots.first[s]:
                 span = knots.clock[j] - knots.clock[j - 1]
-                fill_transition(layout, np.full(number, span), f)
-            fill_noise(layout, np.full(number, span), q)
-            block = q[s, :d, :d].copy()
+                fill_transition(layout, np.full((1, number), span), f)
+            fill_noise(layout, np.full((1, number), span), q)
+            block = q[0, s, :d, :d].copy()
             roots[j, :d, :d] = whitening_root(block, np.diag(block))
             if j > knots.first[s]:
-                carried[j] = multiply(roots[j], f[s])
+                carried[j] = multiply(roots[j], f[0, s])
     return roots, carried
 
 

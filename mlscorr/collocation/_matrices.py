@@ -49,33 +49,6 @@ def multiply_transposed(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 @njit(**LOOP)
-def subtract_product(x: np.ndarray, a: np.ndarray, b: np.ndarray) -> None:
-    """X <- x - a b, in place.
-
-    Parameters
-    ----------
-    x, a, b : (i, j), (i, k), (k, j) array
-    """
-    for i in range(x.shape[0]):
-        for k in range(a.shape[1]):
-            for j in range(x.shape[1]):
-                x[i, j] -= a[i, k] * b[k, j]
-
-
-@njit(**LOOP)
-def make_symmetric(x: np.ndarray) -> None:
-    """Make x symmetric, in place.
-
-    Parameters
-    ----------
-    x : (d, d) array
-    """
-    for i in range(x.shape[0]):
-        for j in range(i):
-            x[i, j] = x[j, i] = 0.5 * (x[i, j] + x[j, i])
-
-
-@njit(**LOOP)
 def whitening_root(s: np.ndarray, prior: np.ndarray) -> np.ndarray:
     """L^-1 with L L^T = s (r, r); a first element that is no number where s is singular.
 

@@ -140,7 +140,8 @@ def _join(parent, chain, sums, box, voxel, beside):
     parent[b] = a
     behind[last[a]] = b
     last[a] = last[b]
-    sums[:, a] += sums[:, b]
+    for row in range(2):
+        sums[row, a] += sums[row, b]
     for axis in range(3):
         box[0][axis, a] = min(box[0][axis, a], box[0][axis, b])
         box[1][axis, a] = max(box[1][axis, a], box[1][axis, b])
@@ -216,10 +217,11 @@ def connected(points: np.ndarray, link: float) -> np.ndarray:
         keys += cells
     del cells
     order = np.argsort(keys, kind="stable")
-    label = np.empty(len(keys), np.int32)
     steps = _offsets(len(shape)) @ np.cumprod([1, *shape[:0:-1]])[::-1]
     keys = keys[order]
-    label[order] = _labels(keys, steps[steps > 0])
+    number, voxel = _labels(keys, steps[steps > 0])
+    label = np.empty(len(keys), np.int32)
+    label[order] = number[voxel]
     return label
 
 
@@ -233,7 +235,10 @@ def _offsets(dimensions):
 
 @njit(**LOOP)
 def _labels(keys, steps):
-    """Component number (n,) of keys in increasing order, which these steps connect."""
+    """Component number (v,) of voxels that these steps connect, and the voxel (n,) of each key.
+
+    Keys come in increasing order.
+    """
     voxel = np.empty(len(keys), np.int32)
     occupied = np.empty_like(keys)
     count = 0
@@ -261,7 +266,7 @@ def _labels(keys, steps):
         is_root = parent[i] == i
         number[i] = components if is_root else number[root_of(parent, i)]
         components += is_root
-    return number[voxel]
+    return number, voxel
 
 
 @njit(**LOOP)

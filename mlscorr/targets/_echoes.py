@@ -89,7 +89,8 @@ def _beams_near(xyz, gps_time, path, tolerance, place):
     above = np.zeros(len(epochs))
     epoch = 0
     for i in range(3):
-        above += (scanner[:, i] - origin[i]) * axes[2, i]
+        for k in range(len(epochs)):
+            above[k] += (scanner[k, i] - origin[i]) * axes[2, i]
     for row in range(len(xyz)):
         while epoch < len(epochs) - 2 and epochs[epoch + 1] <= gps_time[row]:
             epoch += 1
