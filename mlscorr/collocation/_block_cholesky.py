@@ -13,17 +13,16 @@ SIAM J. Matrix Anal. Appl. 14, 242-252 (fronts); Takahashi, Fagan and Chin 1973 
 """
 
 import numpy as np
-from numba import njit
 
 from mlscorr.collocation._pattern import Pattern
-from mlscorr.compiled_loops import LOOP
+from mlscorr.compiled_loops import loop
 
 STRIP = 16  # columns of a panel factored by loops, a power of two; BLAS takes them to others
 # Products of smaller values are subnormal numbers, for which a processor takes 100 times as long
 NOTHING = float(np.sqrt(np.finfo(float).tiny))
 
 
-@njit(**LOOP)
+@loop
 def _panel(pattern, values, front):
     """Values (h, b) of a front's columns, the block on the diagonal first."""
     begin = pattern.node[front]
@@ -32,7 +31,7 @@ def _panel(pattern, values, front):
     return values[pattern.start[front] : pattern.start[front + 1]].reshape((-1, width))
 
 
-@njit(**LOOP)
+@loop
 def _most_below(pattern):
     """Largest number of states below a front."""
     largest = 0
@@ -43,7 +42,7 @@ def _most_below(pattern):
     return largest
 
 
-@njit(**LOOP)
+@loop
 def factorise(pattern: Pattern, values: np.ndarray) -> int:
     """Cholesky factor of a matrix, in its place.
 
@@ -76,7 +75,7 @@ def factorise(pattern: Pattern, values: np.ndarray) -> int:
     return -1
 
 
-@njit(**LOOP)
+@loop
 def _run_end(pattern, front, k):
     """End of the run of nodes below a front, from the k-th on, whose columns stand side by side."""
     row = pattern.row
@@ -88,7 +87,7 @@ def _run_end(pattern, front, k):
     return k
 
 
-@njit(**LOOP)
+@loop
 def _find_row(pattern, front, node, at):
     """Row of a front's panel where a node begins, and where in ``row`` the next is looked for."""
     begin = pattern.node[front]
@@ -100,7 +99,7 @@ def _find_row(pattern, front, node, at):
     return pattern.height[at], at
 
 
-@njit(**LOOP)
+@loop
 def _factorise_panel(panel):
     """L_jj and B in the place of A_jj and A_j; the column without a positive pivot, or -1."""
     height, width = panel.shape
@@ -128,7 +127,7 @@ def _factorise_panel(panel):
     return -1
 
 
-@njit(**LOOP)
+@loop
 def _drop_nothing(panel):
     """Zero in the place of values that are far below any rounding error."""
     for i in range(panel.shape[0]):
@@ -137,7 +136,7 @@ def _drop_nothing(panel):
                 panel[i, a] = 0.0
 
 
-@njit(**LOOP)
+@loop
 def _subtract(pattern, values, product, front, k, run_end):
     """Subtract columns k to run_end of a product of the blocks below a front from the matrix."""
     first = pattern.first
@@ -160,7 +159,7 @@ def _subtract(pattern, values, product, front, k, run_end):
                 to[q] -= change[q]
 
 
-@njit(**LOOP)
+@loop
 def solve_in_place(pattern: Pattern, values: np.ndarray, x: np.ndarray) -> None:
     """X <- A^-1 x by the factor.
 
@@ -190,7 +189,7 @@ def solve_in_place(pattern: Pattern, values: np.ndarray, x: np.ndarray) -> None:
             _substitute_back(panel, here)
 
 
-@njit(**LOOP)
+@loop
 def _states_below(pattern, front, count, x):
     """Rows (m, c) of x at the nodes below a front."""
     gathered = np.empty((count, x.shape[1]))
@@ -203,7 +202,7 @@ def _states_below(pattern, front, count, x):
     return gathered
 
 
-@njit(**LOOP)
+@loop
 def _subtract_below(pattern, front, change, x):
     """Subtract rows (m, c) from those of x at the nodes below a front."""
     at = 0
@@ -214,7 +213,7 @@ def _subtract_below(pattern, front, change, x):
             at += 1
 
 
-@njit(**LOOP)
+@loop
 def _substitute(lower, x):
     """X <- L^-1 x, L the first rows of lower."""
     for a in range(x.shape[0]):
@@ -225,7 +224,7 @@ def _substitute(lower, x):
             x[a, m] /= lower[a, a]
 
 
-@njit(**LOOP)
+@loop
 def _substitute_back(lower, x):
     """X <- L^-T x, L the first rows of lower."""
     for a in range(x.shape[0] - 1, -1, -1):
@@ -236,7 +235,7 @@ def _substitute_back(lower, x):
                 x[k, m] -= lower[a, k] * x[a, m]
 
 
-@njit(**LOOP)
+@loop
 def _inverted(lower):
     """L^-1, L the first rows of lower: strips on the diagonal, then twice as many together."""
     width = lower.shape[1]
@@ -255,7 +254,7 @@ def _inverted(lower):
     return inverse
 
 
-@njit(**LOOP)
+@loop
 def invert_in_place(pattern: Pattern, values: np.ndarray) -> None:
     """Blocks of the inverse where the factor has some, in its place.
 
@@ -285,7 +284,7 @@ def invert_in_place(pattern: Pattern, values: np.ndarray) -> None:
         _drop_nothing(panel)
 
 
-@njit(**LOOP)
+@loop
 def _collect(pattern, inverse, known, front, k, run_end):
     """Columns of the inverse at nodes k to run_end below a front, and their mirror image."""
     first = pattern.first

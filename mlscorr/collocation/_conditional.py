@@ -11,14 +11,13 @@ and past the last node the missing neighbour stands at infinity.
 """
 
 import numpy as np
-from numba import njit
 
 from mlscorr.collocation._states import Layout
 from mlscorr.collocation.covariance import process_noise, transition
-from mlscorr.compiled_loops import LOOP
+from mlscorr.compiled_loops import loop
 
 
-@njit(**LOOP)
+@loop
 def conditional_gains(
     layout: Layout, before: np.ndarray, after: np.ndarray, cell: np.ndarray, clocks: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -89,7 +88,7 @@ def conditional_gains(
     return gains, remaining
 
 
-@njit(**LOOP)
+@loop
 def process_moments(
     layout: Layout,
     cell: np.ndarray,

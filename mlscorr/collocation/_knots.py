@@ -21,14 +21,13 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mlscorr.collocation._conditional import conditional_gains
 from mlscorr.collocation._matrices import multiply, multiply_transposed, whitening_root
 from mlscorr.collocation._pattern import Pattern, locate, panel_width
 from mlscorr.collocation._states import Layout, fill_noise, fill_transition
 from mlscorr.collocation.covariance import Covariance, process_noise
-from mlscorr.compiled_loops import LOOP
+from mlscorr.compiled_loops import loop
 
 SHARE = 5e-5  # of a signal's sigma that knots may leave: 0.05 mm of a drift of 1 m
 
@@ -94,7 +93,7 @@ def knot_step(covariance: Covariance, share: float = SHARE) -> float:
     return float(4 * small * (share**2 / variance) ** power / covariance.rate)
 
 
-@njit(**LOOP)
+@loop
 def thinned(clock: np.ndarray, step: float) -> np.ndarray:
     """Numbers of the epochs that are knots.
 
@@ -128,7 +127,7 @@ def thinned(clock: np.ndarray, step: float) -> np.ndarray:
     return knots[:count].copy()
 
 
-@njit(**LOOP)
+@loop
 def prior_roots(layout: Layout, knots: Knots) -> tuple[np.ndarray, np.ndarray]:
     """W and W F of the step to each knot; the stationary prior's W and zero for a first one.
 
@@ -159,7 +158,7 @@ def prior_roots(layout: Layout, knots: Knots) -> tuple[np.ndarray, np.ndarray]:
     return roots, carried
 
 
-@njit(**LOOP)
+@loop
 def add_prior(
     layout: Layout,
     knots: Knots,
@@ -201,7 +200,7 @@ def add_prior(
         _add_to_processes(pattern, values, place[j], place[j], np.eye(size))
 
 
-@njit(**LOOP)
+@loop
 def _add_to_processes(pattern, values, i, j, block):
     """Add a block to that of each process in block (i, j), if that stands in the lower triangle."""
     position = locate(pattern, i, j)

@@ -1,14 +1,13 @@
 """Products and roots of matrices so small that plain loops are as fast as BLAS."""
 
 import numpy as np
-from numba import njit
 
-from mlscorr.compiled_loops import LOOP
+from mlscorr.compiled_loops import loop
 
 SINGULAR = 1e-15  # share of an observation's prior variance below which nothing is left of it
 
 
-@njit(**LOOP)
+@loop
 def assign(out: np.ndarray, values: np.ndarray) -> None:
     """Put values in the place of a matrix; by slices the words of an error take long to compile.
 
@@ -21,7 +20,7 @@ def assign(out: np.ndarray, values: np.ndarray) -> None:
             out[i, j] = values[i, j]
 
 
-@njit(**LOOP)
+@loop
 def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """A b. Plain loops: on matrices this small they are as fast as BLAS, and quick to compile.
 
@@ -37,7 +36,7 @@ def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return out
 
 
-@njit(**LOOP)
+@loop
 def multiply_transposed(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """a^T b.
 
@@ -48,7 +47,7 @@ def multiply_transposed(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return multiply(a.T, b)
 
 
-@njit(**LOOP)
+@loop
 def whitening_root(s: np.ndarray, prior: np.ndarray) -> np.ndarray:
     """L^-1 with L L^T = s (r, r); a first element that is no number where s is singular.
 

@@ -18,7 +18,6 @@ section 10 (filter, smoother) and 12 (processes); Durbin and Koopman 2012, secti
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mlscorr.collocation._matrices import whitening_root
 from mlscorr.collocation._states import (
@@ -28,7 +27,7 @@ from mlscorr.collocation._states import (
     fill_noise,
     fill_transition,
 )
-from mlscorr.compiled_loops import LOOP
+from mlscorr.compiled_loops import loop
 
 
 class Recursion(NamedTuple):
@@ -89,7 +88,7 @@ def filter_covariance(
     return transitions, *filtered
 
 
-@njit(**LOOP)
+@loop
 def _filter_covariance(layout, transitions, spread, mixing, noise, gains, whiteners, covariances):
     """Fill K^T, whiteners and P; from the first epoch where V is not positive definite NaN."""
     n, r, k = mixing.shape
@@ -171,7 +170,7 @@ def _filter_covariance(layout, transitions, spread, mixing, noise, gains, whiten
                 covariances[i, b, a] = mean
 
 
-@njit(**LOOP)
+@loop
 def filter_columns(recursion: Recursion, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Filter columns of observations.
 
@@ -213,7 +212,7 @@ def filter_columns(recursion: Recursion, columns: np.ndarray) -> tuple[np.ndarra
     return whitened, states
 
 
-@njit(**LOOP)
+@loop
 def smooth_columns(recursion: Recursion, whitened: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """From whitened columns back.
 
@@ -292,7 +291,7 @@ def smooth_covariance(
     return blocks, same, following
 
 
-@njit(**LOOP)
+@loop
 def _carried_back(steps, gained):
     """N of all epochs (n, d, d) by N <- C^T N C + G, from C and G of the step to each epoch."""
     n, d, _ = steps.shape

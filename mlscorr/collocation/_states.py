@@ -10,10 +10,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mlscorr.collocation.covariance import process_noise, transition
-from mlscorr.compiled_loops import LOOP
+from mlscorr.compiled_loops import loop
 
 if TYPE_CHECKING:
     from mlscorr.collocation.model import Signal
@@ -55,7 +54,7 @@ class Layout(NamedTuple):
         return int(self.states[self.signal].sum())
 
 
-@njit(**LOOP)
+@loop
 def fill_transition(layout: Layout, spans: np.ndarray, out: np.ndarray) -> None:
     """F of each signal over n spans of its clock.
 
@@ -73,7 +72,7 @@ def fill_transition(layout: Layout, spans: np.ndarray, out: np.ndarray) -> None:
                 out[i, s, k // 3, k % 3] = f[k]
 
 
-@njit(**LOOP)
+@loop
 def fill_noise(layout: Layout, spans: np.ndarray, out: np.ndarray) -> None:
     """Q of each signal over n spans of its clock.
 
@@ -94,7 +93,7 @@ def fill_noise(layout: Layout, spans: np.ndarray, out: np.ndarray) -> None:
                     k += 1
 
 
-@njit(**LOOP)
+@loop
 def carry(layout: Layout, blocks: np.ndarray, x: np.ndarray, transposed: bool) -> None:
     """X <- F x, or F^T x, in place.
 

@@ -6,13 +6,12 @@ Nodes are the epochs of the observations in the recursion, and knots in the info
 from collections.abc import Callable
 
 import numpy as np
-from numba import njit
 
 from mlscorr.collocation._conditional import conditional_gains, process_moments
 from mlscorr.collocation._knots import Knots, cell_clocks
 from mlscorr.collocation._pattern import Pattern, locate, panel_width
 from mlscorr.collocation._states import Layout
-from mlscorr.compiled_loops import LOOP
+from mlscorr.compiled_loops import loop
 
 CHUNK = 1 << 13  # epochs predicted at once: covariances of the states about them stay small
 
@@ -91,7 +90,7 @@ def _slots(layout):
     return slots
 
 
-@njit(**LOOP)
+@loop
 def _selected(pattern, nodes, place, inverse, joint):
     """Fill joint (u, v, v) with the selected inverse at states of nodes (u, v), -1 for none."""
     for u in range(nodes.shape[0]):

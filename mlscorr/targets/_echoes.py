@@ -9,9 +9,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numba import njit
 
-from mlscorr.compiled_loops import LOOP
+from mlscorr.compiled_loops import loop
 from mlscorr.targets._plane import Plane
 from mlscorr.targets.scanner_path import ScannerPath
 from mlscorr.targets.shapes import BRIGHT, DARK, MISS
@@ -77,7 +76,7 @@ def beams_at_plane(
     return points, np.where(on_plane, state, MISS), rows
 
 
-@njit(**LOOP)
+@loop
 def _beams_near(xyz, gps_time, path, tolerance, place):
     """Rows (k,) of these beams, and which of them ended on the plane: thousands of calls look."""
     origin, axes, middle, radius = place

@@ -8,9 +8,8 @@ octave above it are looked at (a component tree; Najman and Couprie 2006).
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
-from mlscorr.compiled_loops import LOOP
+from mlscorr.compiled_loops import loop
 from mlscorr.targets._clusters import (
     OCTAVE,
     key_of,
@@ -84,7 +83,7 @@ def _levels(intensity):
     return np.floor(steps).astype(np.int8)[np.asarray(intensity).astype(np.uint16)]
 
 
-@njit(**LOOP)
+@loop
 def _background(cell, keys_of, keys, number, level):
     """Level (c,) that a point must exceed to be bright, for each cell."""
     histogram = np.zeros((len(keys_of), LEVELS), np.int32)
@@ -152,7 +151,7 @@ def _moments(table):
     return mean, np.sqrt(np.maximum(values, 0.0)), axes
 
 
-@njit(**LOOP)
+@loop
 def _joined(table, brightest, order, keys_of, keys, number, smallest, largest):
     """Rows (k, 17) of the components of voxels, of enough points and not too large, at each level.
 
@@ -191,7 +190,7 @@ def _joined(table, brightest, order, keys_of, keys, number, smallest, largest):
     return result[:count].copy()
 
 
-@njit(**LOOP)
+@loop
 def _join(parent, table, voxel, beside):
     """Join the components of two voxels."""
     a = root_of(parent, voxel)
@@ -207,7 +206,7 @@ def _join(parent, table, voxel, beside):
         table[a, column] += table[b, column]
 
 
-@njit(**LOOP)
+@loop
 def _likeness(levels, moments, xyz, low, level, grid, shape, largest):
     """How far each component agrees with a disc, a square or a checkerboard, and the level from
     which it does best: (k, 2).
@@ -272,7 +271,7 @@ def _as_regions(table, likeness, level, low):
     return [BrightRegion(low + middle[k], radius[k], threshold[k], likeness[k]) for k in kept]
 
 
-@njit(**LOOP)
+@loop
 def jaccard_index(
     uv: np.ndarray, bright: np.ndarray, longest: float, largest_ratio: float, directions: int
 ) -> float:
@@ -338,7 +337,7 @@ def jaccard_index(
     return share
 
 
-@njit(**LOOP)
+@loop
 def _extent(uv, bright, angle):
     """Bounds of the bright points along a direction and across it."""
     low_x = np.inf

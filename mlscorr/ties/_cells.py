@@ -4,9 +4,8 @@ The sums are about the middle of each cell, so that no digit is lost at coordina
 """
 
 import numpy as np
-from numba import njit
 
-from mlscorr.compiled_loops import LOOP
+from mlscorr.compiled_loops import loop
 from mlscorr.survey import PointCloud
 
 EMPTY = -1
@@ -19,7 +18,7 @@ GROUP_BITS = 24  # of a key for the group, below the number of the moment
 COLUMNS = 21
 
 
-@njit(inline="always", **LOOP)
+@loop(inline="always")
 def _slot_of(cell, moment, table, keys):
     """Where the row of a key stands, or would stand, in an open hash table of a power of two."""
     mask = len(table) - 1
@@ -33,7 +32,7 @@ def _slot_of(cell, moment, table, keys):
     return slot
 
 
-@njit(**LOOP)
+@loop
 def hash_rows(keys: np.ndarray, count: int, size: int) -> np.ndarray:
     """An open hash table of the first rows of keys.
 
@@ -51,7 +50,7 @@ def hash_rows(keys: np.ndarray, count: int, size: int) -> np.ndarray:
     return table
 
 
-@njit(**LOOP)
+@loop
 def add_points(
     xyz: np.ndarray,
     gps_time: np.ndarray,
@@ -141,7 +140,7 @@ def add_points(
     return len(xyz), count
 
 
-@njit(inline="always", **LOOP)
+@loop(inline="always")
 def _split(place, grid):
     """Key of the cell that holds a place, and the way (m) to that from its middle."""
     x = place[0] - grid[0]
@@ -157,7 +156,7 @@ def _split(place, grid):
     return cell, x, y, z
 
 
-@njit(inline="always", **LOOP)
+@loop(inline="always")
 def _add_place(sums, column, factor, x, y, z):
     """Add x, y, z times a factor to the columns from one on."""
     sums[column] += factor * x
@@ -165,7 +164,7 @@ def _add_place(sums, column, factor, x, y, z):
     sums[column + 2] += factor * z
 
 
-@njit(inline="always", **LOOP)
+@loop(inline="always")
 def _add_products(sums, column, x, y, z):
     """Add xx, xy, xz, yy, yz, zz to the columns from one on."""
     sums[column] += x * x

@@ -3,10 +3,9 @@
 from dataclasses import replace
 
 import numpy as np
-from numba import njit
 from scipy.spatial import cKDTree
 
-from mlscorr.compiled_loops import LOOP
+from mlscorr.compiled_loops import loop
 from mlscorr.survey import PAINTED, TIE_KINDS, TieFeatures, Ties
 from mlscorr.ties._cells import CELL_BITS
 from mlscorr.ties.settings import SETTINGS
@@ -311,7 +310,7 @@ def _attitude(features):
     return attitude + 4.0 * kind_number(features)[:, None]
 
 
-@njit(**LOOP)
+@loop
 def _pairs_near(cells, edge, visit, number, side, views, limits):
     """Pairs within the limits, each as first * n + second, and their distances.
 
@@ -362,7 +361,7 @@ def _pairs_near(cells, edge, visit, number, side, views, limits):
     return np.array(pairs), np.array(distances)
 
 
-@njit(**LOOP)
+@loop
 def _distance(views, first, second, limits):
     """Distance of a pair of features in units of gate and cell; infinite if it is none."""
     points, shift, direction, kinds, gps_time, scanner, extent, noise, variances = views
