@@ -10,7 +10,7 @@ from shutil import rmtree
 from typing import Any
 
 PACKAGE = Path(__file__).parent
-KEPT = 4  # versions of the loops of which the compiled ones stay, of some 10 MB each
+VERSIONS = 4  # of compiled loops that stay, of some 10 MB each: branches, environments
 
 # numba compiles its own functions (np.empty, max ...) anew for each set of options, so all loops
 # share one. Division by zero gives infinity, as in NumPy: each check of it is code, and so is its
@@ -98,7 +98,7 @@ def _folder() -> Path:
     folder = home / _key()
     if not folder.exists():
         others = sorted(home.iterdir(), key=os.path.getmtime)
-        for other in others[: max(len(others) - KEPT + 1, 0)]:
+        for other in others[: max(len(others) - VERSIONS + 1, 0)]:
             rmtree(other, ignore_errors=True)
         folder.mkdir(exist_ok=True)
     return folder

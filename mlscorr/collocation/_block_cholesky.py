@@ -10,6 +10,10 @@ and backward, with U = B L_jj^-1, those blocks of Z = A^-1 that stand where the 
 
 Sources: Davis 2006, Direct Methods for Sparse Linear Systems, chapter 4; Liu, Ng and Peyton 1993,
 SIAM J. Matrix Anal. Appl. 14, 242-252 (fronts); Takahashi, Fagan and Chin 1973 (selected inverse).
+
+CHOLMOD (scikit-sparse 0.5.0, supernodal part under the GPL) and SelInv (selinv 1.0.2) do the same,
+but neither has wheels: pip compiles both, and the first needs SuiteSparse installed. SuperLU, which
+scipy has, knows no inverse; ``benchmarks/bench_tie_solver.py`` measures it beside these loops.
 """
 
 import numpy as np

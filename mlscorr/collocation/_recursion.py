@@ -273,20 +273,20 @@ def smooth_covariance(
     layout, transitions, mixing, gains, whiteners = recursion
     n, _, size = gains.shape
     f = dense_blocks(layout, transitions)
-    seen = np.zeros((n, mixing.shape[1], size))  # H
-    seen[:, :, layout.first] = mixing
+    observer = np.zeros((n, mixing.shape[1], size))  # H
+    observer[:, :, layout.first] = mixing
     precision = whiteners.swapaxes(1, 2) @ whiteners  # S^-1
-    kept = np.eye(size) - gains.swapaxes(1, 2) @ seen  # I - K H
-    told = seen.swapaxes(1, 2) @ precision @ seen  # H^T S^-1 H
+    reduction = np.eye(size) - gains.swapaxes(1, 2) @ observer  # I - K H
+    added = observer.swapaxes(1, 2) @ precision @ observer  # H^T S^-1 H
     backward = f.swapaxes(1, 2)
-    information = _carried_back(kept @ f, backward @ told @ f)  # N
+    information = _carried_back(reduction @ f, backward @ added @ f)  # N
     blocks = precision + gains @ information @ gains.swapaxes(1, 2)
     same = covariances - covariances @ information @ covariances
     spread = np.zeros_like(transitions[1:])
     fill_noise(layout, steps[1:], spread)
     forward = covariances[:-1] @ backward[1:]  # P F^T
     predicted = f[1:] @ forward + dense_blocks(layout, spread)
-    updated = kept[1:].swapaxes(1, 2) @ information[1:] @ kept[1:] + told[1:]  # N-
+    updated = reduction[1:].swapaxes(1, 2) @ information[1:] @ reduction[1:] + added[1:]  # N-
     following = forward - forward @ updated @ predicted
     return blocks, same, following
 
