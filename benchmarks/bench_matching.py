@@ -5,7 +5,7 @@
 The peers know neither drift nor time, and refuse nothing: the nearest surveyed point, and the
 assignment with the smallest sum of squared distances among all pairs within the radius
 (scipy.sparse.csgraph). All run in turn; processor time counts, and each runs once on a small drive
-before, to be compiled.
+before.
 """
 
 import argparse

@@ -4,11 +4,8 @@ Commands take a Survey and return a result with ``write``; the stages of ``corre
 it: read_cloud, find_targets, match_targets, find_ties, estimate_pos_error, score.
 """
 
-import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
-
-from mlscorr.compiled_loops import choose_folder
 
 if TYPE_CHECKING:  # what editors and type checkers see of the names that are loaded when used
     # as they are called, by which a type checker knows them for public
@@ -80,9 +77,6 @@ _HOMES = {
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 __all__ = [*_HOME_OF, "simulate"]
-
-_HOME = os.path.expanduser("~")
-choose_folder(__path__[0], _HOME, os.environ.get("XDG_CACHE_HOME", os.path.join(_HOME, ".cache")))
 
 
 def __getattr__(name: str) -> Any:

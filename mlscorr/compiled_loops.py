@@ -1,31 +1,136 @@
-"""Where loops that were compiled are kept, so that each is compiled once on a machine."""
+"""How loops are compiled, and where they are kept, so that each is compiled once on a machine."""
 
 import os
 import tempfile
+from collections.abc import Callable
+from functools import cache, partial
+from hashlib import sha256
 from pathlib import Path
+from shutil import rmtree
+from typing import Any
+
+PACKAGE = Path(__file__).parent
+VERSIONS = 4  # of compiled loops that stay, of some 10 MB each: branches, environments
+
+# numba compiles its own functions (np.empty, max ...) anew for each set of options, so all loops
+# share one. Division by zero gives infinity, as in NumPy: each check of it is code, and so is its
+# message. Nobody calls a loop from C.
+OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 
-def choose_folder(*usual: str | Path) -> None:
-    """Keep compiled loops in the system's temporary folder where no usual place can be written.
-
-    numba keeps them beside the package or in the user's home, and refuses to load any where it can
-    do neither: in most containers, and for users without a home. A folder that somebody else made
-    is not trusted, for what lies in it is run. NUMBA_CACHE_DIR, where it is set, stands. It is too
-    late where numba was imported before.
+def loop(function: Callable | None = None, **options: Any) -> Any:
+    """Compile a function of loops over arrays when it is first called: a decorator.
 
     Parameters
     ----------
-    *usual : path
-        Folders, of which numba needs a single one that can be written.
+    function : function
+    **options
+        Of numba.njit, over those that all loops share.
+    """
+    if function is None:
+        return partial(loop, **options)
+    return _njit()(**{**OPTIONS, **options})(function)
+
+
+@cache
+def _njit():
+    """The decorator of numba, which is imported only now and keeps this package's loops by _key.
+
+    By itself it keeps them by the place of their module, so that a second environment compiles
+    all again, and loads by the names of modules that may have moved.
+    """
+    from numba import njit
+    from numba.core import caching
+
+    class Locator:
+        def __init__(self, folder, line):
+            self._folder = folder
+            self._line = line
+
+        @classmethod
+        def from_function(cls, function, file):
+            if not Path(file).is_relative_to(PACKAGE):
+                return None  # numba goes on to its own places
+            part = Path(file).relative_to(PACKAGE).parent
+            return cls(_folder() / part, function.__code__.co_firstlineno)
+
+        def ensure_cache_path(self):
+            self._folder.mkdir(parents=True, exist_ok=True)
+
+        def get_cache_path(self):
+            return str(self._folder)
+
+        def get_source_stamp(self):
+            return _key()
+
+        def get_disambiguator(self):
+            return str(self._line)
+
+    # the list that all kinds share; numba offers no other way for the loops of one package
+    caching.CompileResultCacheImpl._locator_classes.insert(0, Locator)  # noqa: SLF001
+    return njit
+
+
+@cache
+def _key() -> str:
+    """Short hash of numba's version and of all modules with loops, which call each other."""
+    from numba import __version__
+
+    digest = sha256(__version__.encode())
+    for path in sorted(PACKAGE.rglob("*.py")):
+        text = path.read_bytes()
+        if b"compiled_loops" in text:
+            digest.update(str(path.relative_to(PACKAGE)).encode() + text)
+    return digest.hexdigest()[:16]
+
+
+@cache
+def _folder() -> Path:
+    """Folder of the compiled loops of this version, of which the oldest others are removed."""
+    from numba.misc.appdirs import AppDirs
+
+    named = os.environ.get("NUMBA_CACHE_DIR")
+    if named:
+        place = Path(named) / "mlscorr"
+    else:
+        place = Path(AppDirs("mlscorr", appauthor=False).user_cache_dir) / "loops"
+    home = writable_folder(place)
+    folder = home / _key()
+    if not folder.exists():
+        others = sorted(home.iterdir(), key=os.path.getmtime)
+        for other in others[: max(len(others) - VERSIONS + 1, 0)]:
+            rmtree(other, ignore_errors=True)
+        folder.mkdir(exist_ok=True)
+    return folder
+
+
+def writable_folder(*places: Path) -> Path:
+    """First of some folders that can be written, made where it is missing.
+
+    Where none can, as in many containers and for users without a home, it is one in the system's
+    temporary folder. A folder there that somebody else made is not trusted, for what lies in it is
+    run.
+
+    Parameters
+    ----------
+    *places : Path
 
     Raises
     ------
     OSError
         Where no folder can be written at all.
     """
-    if "NUMBA_CACHE_DIR" in os.environ or any(os.access(place, os.W_OK) for place in usual):
-        return
-    folder = os.path.join(tempfile.gettempdir(), f"mlscorr-{os.getuid()}")
-    os.makedirs(folder, 0o700, exist_ok=True)
-    is_own = os.lstat(folder).st_uid == os.getuid() and not os.path.islink(folder)
-    os.environ["NUMBA_CACHE_DIR"] = folder if is_own else tempfile.mkdtemp()
+    for place in places:
+        try:
+            place.mkdir(parents=True, exist_ok=True)
+        except OSError:
+            continue
+        if os.access(place, os.W_OK):
+            return place
+    if os.name == "nt":  # where each user has a temporary folder
+        return Path(tempfile.mkdtemp(prefix="mlscorr-"))
+    folder = Path(tempfile.gettempdir(), f"mlscorr-{os.getuid()}")
+    folder.mkdir(0o700, exist_ok=True)
+    if folder.lstat().st_uid == os.getuid() and not folder.is_symlink():
+        return folder
+    return Path(tempfile.mkdtemp())

@@ -10,19 +10,23 @@ and backward, with U = B L_jj^-1, those blocks of Z = A^-1 that stand where the 
 
 Sources: Davis 2006, Direct Methods for Sparse Linear Systems, chapter 4; Liu, Ng and Peyton 1993,
 SIAM J. Matrix Anal. Appl. 14, 242-252 (fronts); Takahashi, Fagan and Chin 1973 (selected inverse).
+
+CHOLMOD (scikit-sparse 0.5.0, supernodal part under the GPL) and SelInv (selinv 1.0.2) do the same,
+but neither has wheels: pip compiles both, and the first needs SuiteSparse installed. SuperLU, which
+scipy has, knows no inverse; ``benchmarks/bench_tie_solver.py`` measures it beside these loops.
 """
 
 import numpy as np
-from numba import njit
 
 from mlscorr.collocation._pattern import Pattern
+from mlscorr.compiled_loops import loop
 
 STRIP = 16  # columns of a panel factored by loops, a power of two; BLAS takes them to others
 # Products of smaller values are subnormal numbers, for which a processor takes 100 times as long
 NOTHING = float(np.sqrt(np.finfo(float).tiny))
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _panel(pattern, values, front):
     """Values (h, b) of a front's columns, the block on the diagonal first."""
     begin = pattern.node[front]
@@ -31,7 +35,7 @@ def _panel(pattern, values, front):
     return values[pattern.start[front] : pattern.start[front + 1]].reshape((-1, width))
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _most_below(pattern):
     """Largest number of states below a front."""
     largest = 0
@@ -42,7 +46,7 @@ def _most_below(pattern):
     return largest
 
 
-@njit(cache=True, nogil=True)
+@loop
 def factorise(pattern: Pattern, values: np.ndarray) -> int:
     """Cholesky factor of a matrix, in its place.
 
@@ -75,7 +79,7 @@ def factorise(pattern: Pattern, values: np.ndarray) -> int:
     return -1
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _run_end(pattern, front, k):
     """End of the run of nodes below a front, from the k-th on, whose columns stand side by side."""
     row = pattern.row
@@ -87,7 +91,7 @@ def _run_end(pattern, front, k):
     return k
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _find_row(pattern, front, node, at):
     """Row of a front's panel where a node begins, and where in ``row`` the next is looked for."""
     begin = pattern.node[front]
@@ -99,7 +103,7 @@ def _find_row(pattern, front, node, at):
     return pattern.height[at], at
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _factorise_panel(panel):
     """L_jj and B in the place of A_jj and A_j; the column without a positive pivot, or -1."""
     height, width = panel.shape
@@ -127,7 +131,7 @@ def _factorise_panel(panel):
     return -1
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _drop_nothing(panel):
     """Zero in the place of values that are far below any rounding error."""
     for i in range(panel.shape[0]):
@@ -136,7 +140,7 @@ def _drop_nothing(panel):
                 panel[i, a] = 0.0
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _subtract(pattern, values, product, front, k, run_end):
     """Subtract columns k to run_end of a product of the blocks below a front from the matrix."""
     first = pattern.first
@@ -159,7 +163,7 @@ def _subtract(pattern, values, product, front, k, run_end):
                 to[q] -= change[q]
 
 
-@njit(cache=True, nogil=True)
+@loop
 def solve_in_place(pattern: Pattern, values: np.ndarray, x: np.ndarray) -> None:
     """X <- A^-1 x by the factor.
 
@@ -189,7 +193,7 @@ def solve_in_place(pattern: Pattern, values: np.ndarray, x: np.ndarray) -> None:
             _substitute_back(panel, here)
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _states_below(pattern, front, count, x):
     """Rows (m, c) of x at the nodes below a front."""
     gathered = np.empty((count, x.shape[1]))
@@ -202,7 +206,7 @@ def _states_below(pattern, front, count, x):
     return gathered
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _subtract_below(pattern, front, change, x):
     """Subtract rows (m, c) from those of x at the nodes below a front."""
     at = 0
@@ -213,7 +217,7 @@ def _subtract_below(pattern, front, change, x):
             at += 1
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _substitute(lower, x):
     """X <- L^-1 x, L the first rows of lower."""
     for a in range(x.shape[0]):
@@ -224,7 +228,7 @@ def _substitute(lower, x):
             x[a, m] /= lower[a, a]
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _substitute_back(lower, x):
     """X <- L^-T x, L the first rows of lower."""
     for a in range(x.shape[0] - 1, -1, -1):
@@ -235,7 +239,7 @@ def _substitute_back(lower, x):
                 x[k, m] -= lower[a, k] * x[a, m]
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _inverted(lower):
     """L^-1, L the first rows of lower: strips on the diagonal, then twice as many together."""
     width = lower.shape[1]
@@ -254,7 +258,7 @@ def _inverted(lower):
     return inverse
 
 
-@njit(cache=True, nogil=True)
+@loop
 def invert_in_place(pattern: Pattern, values: np.ndarray) -> None:
     """Blocks of the inverse where the factor has some, in its place.
 
@@ -284,7 +288,7 @@ def invert_in_place(pattern: Pattern, values: np.ndarray) -> None:
         _drop_nothing(panel)
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _collect(pattern, inverse, known, front, k, run_end):
     """Columns of the inverse at nodes k to run_end below a front, and their mirror image."""
     first = pattern.first

@@ -21,13 +21,13 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
-from mlscorr.collocation._conditional import Neighbours, fill_gains, fill_spans, neighbours
+from mlscorr.collocation._conditional import conditional_gains
 from mlscorr.collocation._matrices import multiply, multiply_transposed, whitening_root
 from mlscorr.collocation._pattern import Pattern, locate, panel_width
 from mlscorr.collocation._states import Layout, fill_noise, fill_transition
 from mlscorr.collocation.covariance import Covariance, process_noise
+from mlscorr.compiled_loops import loop
 
 SHARE = 5e-5  # of a signal's sigma that knots may leave: 0.05 mm of a drift of 1 m
 
@@ -93,7 +93,7 @@ def knot_step(covariance: Covariance, share: float = SHARE) -> float:
     return float(4 * small * (share**2 / variance) ** power / covariance.rate)
 
 
-@njit(cache=True, nogil=True)
+@loop
 def thinned(clock: np.ndarray, step: float) -> np.ndarray:
     """Numbers of the epochs that are knots.
 
@@ -127,7 +127,7 @@ def thinned(clock: np.ndarray, step: float) -> np.ndarray:
     return knots[:count].copy()
 
 
-@njit(cache=True, nogil=True)
+@loop
 def prior_roots(layout: Layout, knots: Knots) -> tuple[np.ndarray, np.ndarray]:
     """W and W F of the step to each knot; the stationary prior's W and zero for a first one.
 
@@ -142,23 +142,23 @@ def prior_roots(layout: Layout, knots: Knots) -> tuple[np.ndarray, np.ndarray]:
     """
     roots, carried = np.zeros((2, knots.clock.size, 3, 3))
     number = layout.states.size
-    f, q = np.zeros((2, number, 3, 3))
+    f, q = np.zeros((2, 1, number, 3, 3))
     for s in range(number):
         d = layout.states[s]
         for j in range(knots.first[s], knots.first[s + 1]):
             span = np.inf
             if j > knots.first[s]:
                 span = knots.clock[j] - knots.clock[j - 1]
-                fill_transition(layout, np.full(number, span), f)
-            fill_noise(layout, np.full(number, span), q)
-            block = q[s, :d, :d].copy()
+                fill_transition(layout, np.full((1, number), span), f)
+            fill_noise(layout, np.full((1, number), span), q)
+            block = q[0, s, :d, :d].copy()
             roots[j, :d, :d] = whitening_root(block, np.diag(block))
             if j > knots.first[s]:
-                carried[j] = multiply(roots[j], f[s])
+                carried[j] = multiply(roots[j], f[0, s])
     return roots, carried
 
 
-@njit(cache=True, nogil=True)
+@loop
 def add_prior(
     layout: Layout,
     knots: Knots,
@@ -200,7 +200,7 @@ def add_prior(
         _add_to_processes(pattern, values, place[j], place[j], np.eye(size))
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _add_to_processes(pattern, values, i, j, block):
     """Add a block to that of each process in block (i, j), if that stands in the lower triangle."""
     position = locate(pattern, i, j)
@@ -216,11 +216,23 @@ def _add_to_processes(pattern, values, i, j, block):
                 target[b] += block[a, b]
 
 
-@njit(cache=True, nogil=True)
+def cell_clocks(knots: Knots) -> tuple[np.ndarray, np.ndarray]:
+    """Clocks (u + 1, s) of each signal's knots before and after each cell, infinite for none.
+
+    Parameters
+    ----------
+    knots : Knots
+    """
+    clock = np.append(knots.clock, np.nan)  # for -1
+    before = np.where(knots.cells[..., 0] >= 0, clock[knots.cells[..., 0]], -np.inf)
+    after = np.where(knots.cells[..., 1] >= 0, clock[knots.cells[..., 1]], np.inf)
+    return before, after
+
+
 def knot_gains(
-    layout: Layout, knots: Knots, cell: np.ndarray, clocks: np.ndarray, order: np.ndarray
+    layout: Layout, knots: Knots, cell: np.ndarray, clocks: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Gains a, b of each signal's states at the knots about q epochs, and the variance of r.
+    """Gains of each signal's states at the knots about q epochs; see ``conditional_gains``.
 
     Parameters
     ----------
@@ -229,43 +241,14 @@ def knot_gains(
     cell : (q,) int array
         Of each epoch.
     clocks : (q, s) array
-    order : (q,) int array
-        Of the epochs by their cells.
 
     Returns
     -------
     gains, remaining : (q, s, 2 d), (q, s) array
-        Of d states at most, those of each signal without a space between a and b.
     """
-    number = layout.states.size
-    width = 2 * max(layout.states) if layout.states.size else 0
-    gains = np.zeros((cell.size, number, width))
-    remaining = np.zeros((cell.size, number))
-    about = neighbours(number, 0, 0)
-    entered = -1
-    for e in order:
-        if cell[e] != entered:
-            entered = cell[e]
-            enter_cell(layout, knots, entered, about)
-        fill_gains(layout, about, clocks[e])
-        gains[e] = about.gains[:, :width]
-        remaining[e] = about.remaining
+    order = np.argsort(cell, kind="stable")
+    ordered = conditional_gains(layout, *cell_clocks(knots), cell[order], clocks[order])
+    gains, remaining = (np.empty_like(part) for part in ordered)
+    gains[order] = ordered[0]
+    remaining[order] = ordered[1]
     return gains, remaining
-
-
-@njit(cache=True, nogil=True)
-def enter_cell(layout: Layout, knots: Knots, cell: int, about: Neighbours) -> None:
-    """Fill in the clocks of the knots about a cell, and what lies between them.
-
-    Parameters
-    ----------
-    layout : Layout
-    knots : Knots
-    cell : int
-    about : Neighbours
-    """
-    for s in range(layout.states.size):
-        before, after = knots.cells[cell, s]
-        about.before[s] = knots.clock[before] if before >= 0 else -np.inf
-        about.after[s] = knots.clock[after] if after >= 0 else np.inf
-    fill_spans(layout, about)

@@ -1,12 +1,13 @@
 """Products and roots of matrices so small that plain loops are as fast as BLAS."""
 
 import numpy as np
-from numba import njit
+
+from mlscorr.compiled_loops import loop
 
 SINGULAR = 1e-15  # share of an observation's prior variance below which nothing is left of it
 
 
-@njit(cache=True, nogil=True)
+@loop
 def assign(out: np.ndarray, values: np.ndarray) -> None:
     """Put values in the place of a matrix; by slices the words of an error take long to compile.
 
@@ -19,7 +20,7 @@ def assign(out: np.ndarray, values: np.ndarray) -> None:
             out[i, j] = values[i, j]
 
 
-@njit(cache=True, nogil=True)
+@loop
 def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """A b. Plain loops: on matrices this small they are as fast as BLAS, and quick to compile.
 
@@ -35,7 +36,7 @@ def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return out
 
 
-@njit(cache=True, nogil=True)
+@loop
 def multiply_transposed(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """a^T b.
 
@@ -46,34 +47,7 @@ def multiply_transposed(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return multiply(a.T, b)
 
 
-@njit(cache=True, nogil=True)
-def subtract_product(x: np.ndarray, a: np.ndarray, b: np.ndarray) -> None:
-    """X <- x - a b, in place.
-
-    Parameters
-    ----------
-    x, a, b : (i, j), (i, k), (k, j) array
-    """
-    for i in range(x.shape[0]):
-        for k in range(a.shape[1]):
-            for j in range(x.shape[1]):
-                x[i, j] -= a[i, k] * b[k, j]
-
-
-@njit(cache=True, nogil=True)
-def make_symmetric(x: np.ndarray) -> None:
-    """Make x symmetric, in place.
-
-    Parameters
-    ----------
-    x : (d, d) array
-    """
-    for i in range(x.shape[0]):
-        for j in range(i):
-            x[i, j] = x[j, i] = 0.5 * (x[i, j] + x[j, i])
-
-
-@njit(cache=True, nogil=True)
+@loop
 def whitening_root(s: np.ndarray, prior: np.ndarray) -> np.ndarray:
     """L^-1 with L L^T = s (r, r); a first element that is no number where s is singular.
 

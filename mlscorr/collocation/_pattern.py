@@ -14,10 +14,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import depth_first_order
 from scipy.sparse.linalg import spilu
+
+from mlscorr.compiled_loops import loop
 
 
 class Pattern(NamedTuple):
@@ -134,7 +135,7 @@ def _postorder(row, column):
     return np.argsort(visited[:0:-1])
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _ends_front(row, column, first):
     """Which nodes (k,) end a front: the next isn't their parent, or they cost less apart.
 
@@ -159,12 +160,12 @@ def _ends_front(row, column, first):
     return ends
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _work(width, below):
     return width**3 / 3 + width * below * (width + below) + 4 * below**2
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _fill_in(pointer, index):
     """Nodes below the diagonal of each column of the factor, and where each column begins.
 
@@ -197,7 +198,7 @@ def _fill_in(pointer, index):
     return row[:end].copy(), column
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _enter(nodes, j, mark, row, end):
     """Write those of some nodes behind the end that column j lacks; its new end."""
     for i in nodes:
@@ -208,7 +209,7 @@ def _enter(nodes, j, mark, row, end):
     return end
 
 
-@njit(cache=True, nogil=True)
+@loop
 def locate(pattern: Pattern, i: int, j: int) -> int:
     """Where block (i, j) of the lower triangle begins in values.
 
@@ -244,7 +245,7 @@ def locate(pattern: Pattern, i: int, j: int) -> int:
     return pattern.start[front] + pattern.height[low] * width + left
 
 
-@njit(cache=True, nogil=True)
+@loop
 def panel_width(pattern: Pattern, j: int) -> int:
     """Number of values from one row of a block below node j to the next.
 
@@ -257,7 +258,7 @@ def panel_width(pattern: Pattern, j: int) -> int:
     return pattern.first[pattern.node[front + 1]] - pattern.first[pattern.node[front]]
 
 
-@njit(cache=True, nogil=True)
+@loop
 def diagonal(pattern: Pattern, values: np.ndarray) -> np.ndarray:
     """Diagonal of a matrix, or of a factor.
 

@@ -18,26 +18,16 @@ section 10 (filter, smoother) and 12 (processes); Durbin and Koopman 2012, secti
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
-from mlscorr.collocation._matrices import (
-    assign,
-    make_symmetric,
-    multiply,
-    multiply_transposed,
-    subtract_product,
-    whitening_root,
-)
+from mlscorr.collocation._matrices import whitening_root
 from mlscorr.collocation._states import (
     Layout,
-    add_blocks,
     carry,
-    carry_square,
+    dense_blocks,
     fill_noise,
     fill_transition,
-    observe,
-    send_back,
 )
+from mlscorr.compiled_loops import loop
 
 
 class Recursion(NamedTuple):
@@ -61,7 +51,6 @@ class Recursion(NamedTuple):
     whiteners: np.ndarray
 
 
-@njit(cache=True, nogil=True)
 def filter_covariance(
     layout: Layout, size: int, steps: np.ndarray, mixing: np.ndarray, noise: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -86,53 +75,102 @@ def filter_covariance(
     covariances : (n, d, d) array
         P.
     """
+    n, r, _ = mixing.shape
+    spans = steps.copy()
+    spans[:1] = np.inf  # the stationary covariance
+    transitions = np.zeros((*steps.shape, 3, 3))
+    spread = np.zeros_like(transitions)
+    fill_transition(layout, spans, transitions)
+    fill_noise(layout, spans, spread)
+    transitions[:1] = 0.0
+    filtered = np.zeros((n, r, size)), np.zeros((n, r, r)), np.zeros((n, size, size))
+    _filter_covariance(layout, transitions, spread, mixing, noise, *filtered)
+    return transitions, *filtered
+
+
+@loop
+def _filter_covariance(layout, transitions, spread, mixing, noise, gains, whiteners, covariances):
+    """Fill K^T, whiteners and P; from the first epoch where V is not positive definite NaN."""
     n, r, k = mixing.shape
-    number = layout.states.size
-    transitions = np.zeros((n, number, 3, 3))
-    gains = np.zeros((n, r, size))
-    whiteners = np.zeros((n, r, r))
-    covariances = np.zeros((n, size, size))
-    spread = np.zeros((number, 3, 3))
-    fill_noise(layout, np.full(number, np.inf), spread)  # the stationary covariance
+    size = gains.shape[2]
+    first = layout.first
     p = np.zeros((size, size))
+    half = np.zeros((size, size))
+    observed = np.zeros((r, size))  # H P-
+    left = np.zeros((r, size))
+    innovation = np.zeros((r, r))
+    prior = np.zeros(r)
     for i in range(n):
-        if i > 0:
-            fill_transition(layout, steps[i], transitions[i])
-            fill_noise(layout, steps[i], spread)
-            p = carry_square(layout, transitions[i], p, False)
-        add_blocks(layout, spread, p)
-        observed = observe(layout.first, mixing[i], p)  # H P-
-        innovation = observe(layout.first, mixing[i], observed.T)
-        prior = np.zeros(r)
+        carry(layout, transitions[i], p, False)
+        for a in range(size):
+            for b in range(size):
+                half[a, b] = p[b, a]
+        carry(layout, transitions[i], half, False)
+        for a in range(size):
+            for b in range(size):
+                p[a, b] = half[a, b]
+        for j in range(k):
+            s = layout.signal[j]
+            for a in range(layout.states[s]):
+                for b in range(layout.states[s]):
+                    p[first[j] + a, first[j] + b] += spread[i, s, a, b]
         for m in range(r):
+            for b in range(size):
+                observed[m, b] = 0.0
             prior[m] = noise[i, m, m]
             for j in range(k):
-                prior[m] += mixing[i, m, j] ** 2
+                weight = mixing[i, m, j]
+                prior[m] += weight**2
+                for b in range(size):
+                    observed[m, b] += weight * p[first[j], b]
+        for m in range(r):
             for other in range(r):
-                innovation[m, other] += noise[i, m, other]
+                total = noise[i, m, other]
+                for j in range(k):
+                    total += mixing[i, m, j] * observed[other, first[j]]
+                innovation[m, other] = total
         white = whitening_root(innovation, prior)
-        assign(whiteners[i], white)
+        for m in range(r):
+            for other in range(r):
+                whiteners[i, m, other] = white[m, other]
         if np.isnan(white[0, 0]):
             break
-        gain = multiply_transposed(white, multiply(white, observed))  # K^T
-        p = _joseph(layout.first, mixing[i], noise[i], p, gain, observed)
-        assign(gains[i], gain)
-        assign(covariances[i], p)
-    return transitions, gains, whiteners, covariances
+        for m in range(r):  # K^T = S^-1 H P-
+            for b in range(size):
+                left[m, b] = 0.0
+            for other in range(m + 1):
+                for b in range(size):
+                    left[m, b] += white[m, other] * observed[other, b]
+            for other in range(m + 1):
+                for b in range(size):
+                    gains[i, other, b] += white[m, other] * left[m, b]
+        # (I - K H) P- (I - K H)^T + K R K^T
+        for m in range(r):
+            for a in range(size):
+                for b in range(size):
+                    p[a, b] -= gains[i, m, a] * observed[m, b]
+        for m in range(r):  # H [(I - K H) P-]^T, which R K^T balances
+            for b in range(size):
+                left[m, b] = 0.0
+                for j in range(k):
+                    left[m, b] += mixing[i, m, j] * p[b, first[j]]
+            for other in range(r):
+                for b in range(size):
+                    left[m, b] -= noise[i, m, other] * gains[i, other, b]
+        for m in range(r):
+            for a in range(size):
+                for b in range(size):
+                    p[a, b] -= left[m, a] * gains[i, m, b]
+        for a in range(size):
+            for b in range(a + 1):
+                mean = 0.5 * (p[a, b] + p[b, a])
+                p[a, b] = mean
+                p[b, a] = mean
+                covariances[i, a, b] = mean
+                covariances[i, b, a] = mean
 
 
-@njit(cache=True, nogil=True)
-def _joseph(first, mixing, noise, p, gain, observed):
-    """(I - K H) P- (I - K H)^T + K R K^T from K^T and H P-."""
-    subtract_product(p, gain.T, observed)
-    left = observe(first, mixing, p.T)  # H [(I - K H) P-]^T, which R K^T balances
-    subtract_product(left, noise, gain)
-    subtract_product(p, left.T, gain)
-    make_symmetric(p)
-    return p
-
-
-@njit(cache=True, nogil=True)
+@loop
 def filter_columns(recursion: Recursion, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Filter columns of observations.
 
@@ -147,27 +185,34 @@ def filter_columns(recursion: Recursion, columns: np.ndarray) -> tuple[np.ndarra
     states : (n, d, c) array
     """
     layout, transitions, mixing, gains, whiteners = recursion
-    n, r, c = columns.shape
-    x = np.zeros((gains.shape[2], c))
-    states = np.zeros((n, gains.shape[2], c))
-    whitened = np.zeros((n, r, c))
+    n, r, width = columns.shape
+    size = gains.shape[2]
+    x = np.zeros((size, width))
+    states = np.zeros((n, size, width))
+    whitened = np.zeros((n, r, width))
+    innovation = np.zeros((r, width))
     for i in range(n):
-        if i > 0:
-            carry(layout, transitions[i], x, False)
-        innovation = observe(layout.first, mixing[i], x)
+        carry(layout, transitions[i], x, False)
         for m in range(r):
-            for b in range(c):
-                innovation[m, b] = columns[i, m, b] - innovation[m, b]
-        assign(whitened[i], multiply(whiteners[i], innovation))
-        step = multiply_transposed(gains[i], innovation)
-        for a in range(x.shape[0]):
-            for b in range(c):
-                x[a, b] += step[a, b]
-        assign(states[i], x)
+            for c in range(width):
+                innovation[m, c] = columns[i, m, c]
+            for j in range(layout.first.size):
+                for c in range(width):
+                    innovation[m, c] -= mixing[i, m, j] * x[layout.first[j], c]
+            for other in range(m + 1):
+                for c in range(width):
+                    whitened[i, m, c] += whiteners[i, m, other] * innovation[other, c]
+        for m in range(r):
+            for a in range(size):
+                for c in range(width):
+                    x[a, c] += gains[i, m, a] * innovation[m, c]
+        for a in range(size):
+            for c in range(width):
+                states[i, a, c] = x[a, c]
     return whitened, states
 
 
-@njit(cache=True, nogil=True)
+@loop
 def smooth_columns(recursion: Recursion, whitened: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """From whitened columns back.
 
@@ -184,25 +229,32 @@ def smooth_columns(recursion: Recursion, whitened: np.ndarray) -> tuple[np.ndarr
         a.
     """
     layout, transitions, mixing, gains, whiteners = recursion
-    n, r, c = whitened.shape
-    a = np.zeros((gains.shape[2], c))
-    adjoints = np.zeros((n, gains.shape[2], c))
-    weights = np.zeros((n, r, c))
+    n, r, width = whitened.shape
+    size = gains.shape[2]
+    x = np.zeros((size, width))
+    adjoints = np.zeros((n, size, width))
+    weights = np.zeros((n, r, width))
     for i in range(n - 1, -1, -1):
-        assign(adjoints[i], a)
-        u = multiply_transposed(whiteners[i], whitened[i])
-        subtract_product(u, gains[i], a)
-        assign(weights[i], u)
-        send_back(layout.first, mixing[i], u, a)
-        if i > 0:
-            carry(layout, transitions[i], a, True)
+        for a in range(size):
+            for c in range(width):
+                adjoints[i, a, c] = x[a, c]
+        for m in range(r):
+            for other in range(m, r):
+                for c in range(width):
+                    weights[i, m, c] += whiteners[i, other, m] * whitened[i, other, c]
+            for a in range(size):
+                for c in range(width):
+                    weights[i, m, c] -= gains[i, m, a] * adjoints[i, a, c]
+            for j in range(layout.first.size):
+                for c in range(width):
+                    x[layout.first[j], c] += mixing[i, m, j] * weights[i, m, c]
+        carry(layout, transitions[i], x, True)
     return weights, adjoints
 
 
-@njit(cache=True, nogil=True)
 def smooth_covariance(
     recursion: Recursion, steps: np.ndarray, covariances: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The backward pass of N.
 
     Parameters
@@ -215,72 +267,51 @@ def smooth_covariance(
     -------
     blocks : (n, r, r) array
         On the diagonal of V^-1.
-    future : (n, r, d) array
-        K^T N.
     same, following : (n, d, d), (n - 1, d, d) array
         Covariances of the smoothed states with themselves, and with those of the next epoch.
     """
     layout, transitions, mixing, gains, whiteners = recursion
-    n, r, _ = mixing.shape
-    size = gains.shape[2]
-    blocks = np.zeros((n, r, r))
-    future = np.zeros((n, r, size))
-    same = np.zeros((n, size, size))
-    following = np.zeros((max(n - 1, 0), size, size))
-    spread = np.zeros((layout.states.size, 3, 3))
-    information = np.zeros((size, size))
-    for i in range(n - 1, -1, -1):
-        assign(future[i], multiply(gains[i], information))
-        weight = multiply_transposed(whiteners[i], whiteners[i])  # S^-1
-        assign(blocks[i], weight)
-        subtract_product(blocks[i], -future[i], gains[i].T)
-        assign(same[i], covariances[i])
-        subtract_product(same[i], multiply(covariances[i], information), covariances[i])
-        if i == 0:
-            break
-        send_back(layout.first, mixing[i], -future[i], information)  # (I - K H)^T N
-        information = information.T.copy()
-        back = observe(layout.first, mixing[i], np.eye(size))
-        back = multiply(weight, back)
-        subtract_product(back, gains[i], information)
-        send_back(layout.first, mixing[i], back, information)  # N-
-        make_symmetric(information)
-        fill_noise(layout, steps[i], spread)
-        predicted = carry_square(layout, transitions[i], covariances[i - 1], False)
-        add_blocks(layout, spread, predicted)
-        forward = covariances[i - 1].copy()
-        carry(layout, transitions[i], forward, False)
-        forward = forward.T.copy()  # P F^T
-        assign(following[i - 1], forward)
-        subtract_product(following[i - 1], multiply(forward, information), predicted)
-        information = carry_square(layout, transitions[i], information, True)
-    return blocks, future, same, following
+    n, _, size = gains.shape
+    f = dense_blocks(layout, transitions)
+    observer = np.zeros((n, mixing.shape[1], size))  # H
+    observer[:, :, layout.first] = mixing
+    precision = whiteners.swapaxes(1, 2) @ whiteners  # S^-1
+    reduction = np.eye(size) - gains.swapaxes(1, 2) @ observer  # I - K H
+    added = observer.swapaxes(1, 2) @ precision @ observer  # H^T S^-1 H
+    backward = f.swapaxes(1, 2)
+    information = _carried_back(reduction @ f, backward @ added @ f)  # N
+    blocks = precision + gains @ information @ gains.swapaxes(1, 2)
+    same = covariances - covariances @ information @ covariances
+    spread = np.zeros_like(transitions[1:])
+    fill_noise(layout, steps[1:], spread)
+    forward = covariances[:-1] @ backward[1:]  # P F^T
+    predicted = f[1:] @ forward + dense_blocks(layout, spread)
+    updated = reduction[1:].swapaxes(1, 2) @ information[1:] @ reduction[1:] + added[1:]  # N-
+    following = forward - forward @ updated @ predicted
+    return blocks, same, following
 
 
-@njit(cache=True, nogil=True)
-def precision_between(
-    recursion: Recursion, future: np.ndarray, early: int, late: int
-) -> np.ndarray:
-    """Block (r, r) of V^-1 at an early and a late epoch, walking from late to early.
-
-    Parameters
-    ----------
-    recursion : Recursion
-    future : (n, r, d) array
-        As of smooth_covariance.
-    early, late : int
-        Numbers of the epochs.
-    """
-    layout, transitions, mixing, gains, whiteners = recursion
-    y = np.zeros((gains.shape[2], gains.shape[1]))
-    weight = multiply_transposed(whiteners[late], whiteners[late])  # S^-1 + K^T N K
-    subtract_product(weight, -future[late], gains[late].T)
-    send_back(layout.first, mixing[late], weight, y)
-    for a in range(y.shape[0]):
-        for m in range(y.shape[1]):
-            y[a, m] -= future[late, m, a]
-    for i in range(late, early, -1):
-        if i < late:  # (I - K H)^T
-            send_back(layout.first, mixing[i], -multiply(gains[i], y), y)
-        carry(layout, transitions[i], y, True)
-    return -multiply(gains[early], y)
+@loop
+def _carried_back(steps, gained):
+    """N of all epochs (n, d, d) by N <- C^T N C + G, from C and G of the step to each epoch."""
+    n, d, _ = steps.shape
+    out = np.zeros((n, d, d))
+    half = np.zeros((d, d))
+    for i in range(n - 1, 0, -1):
+        for a in range(d):
+            for b in range(d):
+                half[a, b] = 0.0
+                out[i - 1, a, b] = gained[i, a, b]
+            for k in range(d):
+                for b in range(d):
+                    half[a, b] += out[i, a, k] * steps[i, k, b]
+        for a in range(d):
+            for k in range(d):
+                for b in range(d):
+                    out[i - 1, a, b] += steps[i, k, a] * half[k, b]
+        for a in range(d):  # symmetric to the last digit
+            for b in range(a):
+                mean = 0.5 * (out[i - 1, a, b] + out[i - 1, b, a])
+                out[i - 1, a, b] = mean
+                out[i - 1, b, a] = mean
+    return out

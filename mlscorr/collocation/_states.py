@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mlscorr.collocation.covariance import process_noise, transition
+from mlscorr.compiled_loops import loop
 
 if TYPE_CHECKING:
     from mlscorr.collocation.model import Signal
@@ -54,48 +54,46 @@ class Layout(NamedTuple):
         return int(self.states[self.signal].sum())
 
 
-@njit(cache=True, nogil=True)
+@loop
 def fill_transition(layout: Layout, spans: np.ndarray, out: np.ndarray) -> None:
-    """F of each signal over a span of its clock.
+    """F of each signal over n spans of its clock.
 
     Parameters
     ----------
     layout : Layout
-    spans : (s,) array
+    spans : (n, s) array
         Units: s.
-    out : (s, 3, 3) array
+    out : (n, s, 3, 3) array
     """
-    for s in range(layout.states.size):
-        f = transition(layout.kinds[s], spans[s] * layout.rates[s])
-        for k in range(9):
-            out[s, k // 3, k % 3] = f[k]
+    for i in range(spans.shape[0]):
+        for s in range(spans.shape[1]):
+            f = transition(layout.kinds[s], spans[i, s] * layout.rates[s])
+            for k in range(9):
+                out[i, s, k // 3, k % 3] = f[k]
 
 
-@njit(cache=True, nogil=True)
+@loop
 def fill_noise(layout: Layout, spans: np.ndarray, out: np.ndarray) -> None:
-    """Q of each signal over a span of its clock.
+    """Q of each signal over n spans of its clock.
 
     Parameters
     ----------
     layout : Layout
-    spans : (s,) array
+    spans : (n, s) array
         Units: s.
-    out : (s, 3, 3) array
+    out : (n, s, 3, 3) array
     """
-    for s in range(layout.states.size):
-        q = process_noise(layout.kinds[s], spans[s] * layout.rates[s])
-        out[s, 0, 0] = q[0]
-        out[s, 0, 1] = q[1]
-        out[s, 0, 2] = q[2]
-        out[s, 1, 0] = q[1]
-        out[s, 1, 1] = q[3]
-        out[s, 1, 2] = q[4]
-        out[s, 2, 0] = q[2]
-        out[s, 2, 1] = q[4]
-        out[s, 2, 2] = q[5]
+    for i in range(spans.shape[0]):
+        for s in range(spans.shape[1]):
+            q = process_noise(layout.kinds[s], spans[i, s] * layout.rates[s])
+            k = 0
+            for a in range(3):
+                for b in range(a, 3):
+                    out[i, s, a, b] = out[i, s, b, a] = q[k]
+                    k += 1
 
 
-@njit(cache=True, nogil=True)
+@loop
 def carry(layout: Layout, blocks: np.ndarray, x: np.ndarray, transposed: bool) -> None:
     """X <- F x, or F^T x, in place.
 
@@ -109,97 +107,30 @@ def carry(layout: Layout, blocks: np.ndarray, x: np.ndarray, transposed: bool) -
     """
     for j in range(layout.first.size):
         a = layout.first[j]
-        f = blocks[layout.signal[j]]
-        states = layout.states[layout.signal[j]]
-        f01, f10 = (f[1, 0], f[0, 1]) if transposed else (f[0, 1], f[1, 0])
-        f02, f20 = (f[2, 0], f[0, 2]) if transposed else (f[0, 2], f[2, 0])
-        f12, f21 = (f[2, 1], f[1, 2]) if transposed else (f[1, 2], f[2, 1])
-        f00 = f[0, 0]
-        f11 = f[1, 1]
-        f22 = f[2, 2]
+        s = layout.signal[j]
+        d = layout.states[s]
         for c in range(x.shape[1]):
             x0 = x[a, c]
-            if states == 1:
-                x[a, c] = f00 * x0
-            elif states == 2:
-                x1 = x[a + 1, c]
-                x[a, c] = f00 * x0 + f01 * x1
-                x[a + 1, c] = f10 * x0 + f11 * x1
-            else:
-                x1 = x[a + 1, c]
-                x2 = x[a + 2, c]
-                x[a, c] = f00 * x0 + f01 * x1 + f02 * x2
-                x[a + 1, c] = f10 * x0 + f11 * x1 + f12 * x2
-                x[a + 2, c] = f20 * x0 + f21 * x1 + f22 * x2
+            x1 = x[a + 1, c] if d > 1 else 0.0
+            x2 = x[a + 2, c] if d > 2 else 0.0
+            for p in range(d):
+                if transposed:
+                    x[a + p, c] = blocks[s, 0, p] * x0 + blocks[s, 1, p] * x1 + blocks[s, 2, p] * x2
+                else:
+                    x[a + p, c] = blocks[s, p, 0] * x0 + blocks[s, p, 1] * x1 + blocks[s, p, 2] * x2
 
 
-@njit(cache=True, nogil=True)
-def carry_square(layout: Layout, blocks: np.ndarray, x: np.ndarray, transposed: bool) -> np.ndarray:
-    """F x F^T, or F^T x F, of a symmetric x; a new array.
+def dense_blocks(layout: Layout, blocks: np.ndarray) -> np.ndarray:
+    """Matrices (n, d, d) with the blocks of each process on their diagonals.
 
     Parameters
     ----------
     layout : Layout
-    blocks : (s, 3, 3) array
-        F of each signal.
-    x : (d, d) array
-    transposed : bool
+    blocks : (n, s, 3, 3) array
+        Of each signal.
     """
-    half = x.copy()
-    carry(layout, blocks, half, transposed)
-    whole = half.T.copy()
-    carry(layout, blocks, whole, transposed)
-    return whole
-
-
-@njit(cache=True, nogil=True)
-def add_blocks(layout: Layout, blocks: np.ndarray, x: np.ndarray) -> None:
-    """Add each process's block of states to the diagonal of x.
-
-    Parameters
-    ----------
-    layout : Layout
-    blocks : (s, 3, 3) array
-    x : (d, d) array
-    """
-    for j in range(layout.first.size):
-        a = layout.first[j]
-        states = layout.states[layout.signal[j]]
-        for p in range(states):
-            for q in range(states):
-                x[a + p, a + q] += blocks[layout.signal[j], p, q]
-
-
-@njit(cache=True, nogil=True)
-def observe(first: np.ndarray, mixing: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """H x of states: (r, c).
-
-    Parameters
-    ----------
-    first : (k,) int array
-    mixing : (r, k) array
-    x : (d, c) array
-    """
-    out = np.zeros((mixing.shape[0], x.shape[1]))
-    for m in range(mixing.shape[0]):
-        for j in range(first.size):
-            for c in range(x.shape[1]):
-                out[m, c] += mixing[m, j] * x[first[j], c]
+    out = np.zeros((len(blocks), layout.size, layout.size))
+    for first, signal in zip(layout.first, layout.signal, strict=True):
+        d = layout.states[signal]
+        out[:, first : first + d, first : first + d] = blocks[:, signal, :d, :d]
     return out
-
-
-@njit(cache=True, nogil=True)
-def send_back(first: np.ndarray, mixing: np.ndarray, y: np.ndarray, x: np.ndarray) -> None:
-    """X <- x + H^T y, in place.
-
-    Parameters
-    ----------
-    first : (k,) int array
-    mixing : (r, k) array
-    y : (r, c) array
-    x : (d, c) array
-    """
-    for m in range(mixing.shape[0]):
-        for j in range(first.size):
-            for c in range(x.shape[1]):
-                x[first[j], c] += mixing[m, j] * y[m, c]

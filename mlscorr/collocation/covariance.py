@@ -24,7 +24,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
+
+from mlscorr.compiled_loops import loop
 
 FAMILIES = ("exponential", "matern32", "matern52")  # of 1, 2, 3 states, which number them
 INTEGRATED = "integrated"
@@ -95,7 +96,7 @@ class Covariance:
         return scale / self.correlation_time
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@loop
 def correlation(kind: int, x: float) -> float:
     """Correlation at a time lag, which may be negative.
 
@@ -118,7 +119,7 @@ def correlation(kind: int, x: float) -> float:
     return (1.0 + x + x * x / 3.0) * e
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@loop
 def _correlations(kind, lags):
     out = np.empty(lags.size)
     for i in range(lags.size):
@@ -126,7 +127,7 @@ def _correlations(kind, lags):
     return out
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@loop
 def transition(kind: int, x: float) -> tuple[float, ...]:
     """F(x), row by row; zeros where there are fewer than three states.
 
@@ -153,7 +154,7 @@ def transition(kind: int, x: float) -> tuple[float, ...]:
     return first + second + third
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@loop
 def process_noise(kind: int, x: float) -> tuple[float, ...]:
     """Q(x), the upper triangle row by row, with zeros as transition; Q(inf) is stationary.
 
@@ -192,7 +193,7 @@ def process_noise(kind: int, x: float) -> tuple[float, ...]:
     return first + second + (i0 - 4.0 * i1 + 5.0 * i2 - 2.0 * i3 + 0.25 * i4,)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@loop
 def _incomplete_gamma(k, y, e):
     """P(k, y) = exp(-y) sum_(j >= k) y^j / j!, with e = exp(-y)."""
     term = e

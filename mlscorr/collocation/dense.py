@@ -11,13 +11,13 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from scipy.linalg import LinAlgError, block_diag, cholesky, solve_triangular
 
 from mlscorr.collocation._states import Layout
 from mlscorr.collocation.covariance import correlation
 from mlscorr.collocation.model import LARGEST_ERROR, NOT_POSITIVE, Collocation, solve_trend
 from mlscorr.collocation.sparse_rows import SparseRows
+from mlscorr.compiled_loops import loop
 
 CHUNK = 10_000_000  # covariances computed at once in a prediction, which bounds the memory
 # Time lag in units of 1 / rate at which rounding leaves no correlation, of exp(-x / 2) neither
@@ -230,7 +230,7 @@ def _design(rows):
     return np.concatenate([part.design.reshape(part.misclosure.size, width) for part in rows])
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _add_signals(layout, clocks, mixing, row, total):
     """Add B D_Lambda B^T of sides, of which each belongs to a row, to the lower triangle of V."""
     processes = np.searchsorted(layout.signal, np.arange(layout.states.size + 1))

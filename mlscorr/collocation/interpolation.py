@@ -6,67 +6,16 @@ Nodes are the epochs of the observations in the recursion, and knots in the info
 from collections.abc import Callable
 
 import numpy as np
-from numba import njit
 
-from mlscorr.collocation._conditional import Epochs, fill_spans, neighbours, predict_between
-from mlscorr.collocation._knots import Knots, enter_cell
+from mlscorr.collocation._conditional import conditional_gains, process_moments
+from mlscorr.collocation._knots import Knots, cell_clocks
 from mlscorr.collocation._pattern import Pattern, locate, panel_width
 from mlscorr.collocation._states import Layout
+from mlscorr.compiled_loops import loop
 
-CHUNK = 1 << 16  # epochs predicted at once: copies of broadcast designs and mixings stay small
-
-
-@njit(cache=True, nogil=True)
-def run_end(times: np.ndarray, cell: int, gps_time: np.ndarray, begin: int) -> int:
-    """End of the run of epochs from begin on that lie in the same cell.
-
-    Parameters
-    ----------
-    times : (u,) array
-        Sorted; cell i lies before times[i], and at or after the time before that.
-    cell, begin : int
-    gps_time : (q,) array
-    """
-    first = times[cell - 1] if cell > 0 else -np.inf
-    last = times[cell] if cell < times.size else np.inf
-    end = begin + 1
-    while end < gps_time.size and first <= gps_time[end] < last:
-        end += 1
-    return end
+CHUNK = 1 << 13  # epochs predicted at once: covariances of the states about them stay small
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _gather(layout, i, states, same, following, columns, joint):
-    """Columns (2 d, c) and joint covariance (2 d, 2 d) of the states at nodes i and i + 1.
-
-    Process by process, its states at i before those at i + 1; zeros where there is no node.
-    """
-    has_left = i >= 0
-    has_right = i + 1 < states.shape[0]
-    for j in range(layout.first.size):
-        a = layout.first[j]
-        d = layout.states[layout.signal[j]]
-        for p in range(d):
-            u = 2 * a + p
-            v = 2 * a + d + p
-            for c in range(columns.shape[1]):
-                columns[u, c] = states[i, a + p, c] if has_left else 0.0
-                columns[v, c] = states[i + 1, a + p, c] if has_right else 0.0
-            for other in range(layout.first.size):
-                b = 2 * layout.first[other]
-                e = layout.states[layout.signal[other]]
-                for q in range(e):
-                    to = layout.first[other] + q
-                    if has_left and has_right:
-                        cross = following[i, a + p, to]
-                    else:
-                        cross = 0.0
-                    joint[u, b + q] = same[i, a + p, to] if has_left else 0.0
-                    joint[v, b + e + q] = same[i + 1, a + p, to] if has_right else 0.0
-                    joint[u, b + e + q] = joint[b + e + q, u] = cross
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
 def interpolate(
     nodes: np.ndarray,
     clocks: np.ndarray,
@@ -74,9 +23,10 @@ def interpolate(
     states: np.ndarray,
     same: np.ndarray,
     following: np.ndarray,
-    epochs: Epochs,
-) -> None:
-    """Fill epochs with trend plus signal.
+    gps_time: np.ndarray,
+    asked: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Estimates (q, k, p + 1) and covariance (q, k, k) of the processes at q epochs.
 
     Parameters
     ----------
@@ -84,71 +34,81 @@ def interpolate(
         Times of the observations, sorted.
     clocks : (n, s) array
         The signals' clocks there.
+    layout : Layout
     states : (n, d, p + 1) array
         Smoothed states of the columns [A, l - A x].
     same, following : (n, d, d), (n - 1, d, d) array
         Covariances of the smoothed states, and with those of the next node.
-    epochs : Epochs
+    gps_time, asked : (q,), (q, s) array
+        The epochs, and the signals' clocks there.
     """
     n, size, columns = states.shape
-    about = neighbours(layout.states.size, size, columns - 1)
-    begin = 0
-    while begin < epochs.gps_time.size:
-        cell = np.searchsorted(nodes, epochs.gps_time[begin], side="right")
-        end = run_end(nodes, cell, epochs.gps_time, begin)
-        for signal in range(clocks.shape[1]):  # assigning arrays would take seconds to compile
-            about.before[signal] = clocks[cell - 1, signal] if cell > 0 else -np.inf
-            about.after[signal] = clocks[cell, signal] if cell < n else np.inf
-        fill_spans(layout, about)
-        _gather(layout, cell - 1, states, same, following, about.columns, about.joint)
-        predict_between(layout, about, epochs, begin, end)
-        begin = end
+    after, cell = np.unique(np.searchsorted(nodes, gps_time, side="right"), return_inverse=True)
+    has_before = after > 0
+    has_after = after < n
+    has_both = has_before & has_after
+    infinite = np.full((1, clocks.shape[1]), np.inf)
+    gains, remaining = conditional_gains(
+        layout,
+        np.concatenate([-infinite, clocks])[after],
+        np.concatenate([clocks, infinite])[after],
+        cell,
+        asked,
+    )
+    earlier, later = _places(layout)
+    about = np.zeros((len(after), 2 * size, columns))
+    about[np.ix_(has_before, earlier)] = states[after[has_before] - 1]
+    about[np.ix_(has_after, later)] = states[after[has_after]]
+    across = following[after[has_both] - 1]
+    joint = np.zeros((len(after), 2 * size, 2 * size))
+    joint[np.ix_(has_before, earlier, earlier)] = same[after[has_before] - 1]
+    joint[np.ix_(has_after, later, later)] = same[after[has_after]]
+    joint[np.ix_(has_both, earlier, later)] = across
+    joint[np.ix_(has_both, later, earlier)] = across.swapaxes(1, 2)
+    return process_moments(layout, cell, gains, remaining, about, joint)
 
 
-@njit(cache=True, nogil=True)
+def _places(layout):
+    """Places (d,) of the states before a cell and of those after it, process by process."""
+    states = layout.states[layout.signal]
+    first = np.repeat(layout.first, states)
+    earlier = np.arange(len(first)) + first
+    return earlier, earlier + np.repeat(states, states)
+
+
 def _slots(layout):
-    """Slot (signal, before or after) of each state in Neighbours.joint, and its place in a knot."""
-    slot, local = np.zeros((2, 2 * layout.states[layout.signal].sum()), dtype=np.int64)
-    u = begin = 0
-    for j in range(layout.signal.size):
-        s = layout.signal[j]
-        d = layout.states[layout.signal[j]]
-        if j > 0 and s != layout.signal[j - 1]:
-            begin = layout.first[j]
-        for end in range(2):
-            for p in range(d):
-                slot[u] = 2 * s + end
-                local[u] = layout.first[j] - begin + p
-                u += 1
-    return slot, local
+    """Signal (2 d,) of each state about a cell, its side (0 before), and its place in a knot."""
+    earlier, later = _places(layout)
+    processes = layout.signal
+    states = layout.states[processes]
+    signal = np.repeat(processes, states)
+    begin = layout.first[np.searchsorted(processes, processes)]  # of the first of each signal
+    local = np.arange(len(signal)) - np.repeat(begin, states)
+    slots = np.empty((3, 2 * len(signal)), dtype=np.int64)
+    slots[:, earlier] = [signal, np.zeros_like(signal), local]
+    slots[:, later] = [signal, np.ones_like(signal), local]
+    return slots
 
 
-@njit(cache=True, nogil=True)
-def _gather_knots(pattern, nodes, slots, states, inverse, about):
-    """States at the knots (2 s,) about a cell, as of _gather, by the selected inverse."""
-    columns = about.columns
-    joint = about.joint
-    slot, local = slots
-    positions = np.zeros((nodes.size, nodes.size), dtype=np.int64)
-    for a in range(nodes.size):
-        for b in range(nodes.size):
-            if nodes[a] >= nodes[b] >= 0:
-                positions[a, b] = locate(pattern, nodes[a], nodes[b])
-    for u in range(slot.size):
-        node = nodes[slot[u]]
-        for c in range(columns.shape[1]):
-            columns[u, c] = 0.0 if node < 0 else states[pattern.first[node] + local[u], c]
-        for v in range(slot.size):
-            other = nodes[slot[v]]
-            if node < 0 or other < 0 or inverse.size == 0:
-                joint[u, v] = 0.0
-            elif node >= other:
-                width = panel_width(pattern, other)
-                joint[u, v] = inverse[positions[slot[u], slot[v]] + local[u] * width + local[v]]
-                joint[v, u] = joint[u, v]
+@loop
+def _selected(pattern, nodes, place, inverse, joint):
+    """Fill joint (u, v, v) with the selected inverse at states of nodes (u, v), -1 for none."""
+    for u in range(nodes.shape[0]):
+        for a in range(nodes.shape[1]):
+            position = -1
+            width = 0
+            for b in range(nodes.shape[1]):
+                node = nodes[u, a]
+                other = nodes[u, b]
+                if other < 0 or node < other:
+                    continue
+                if b == 0 or other != nodes[u, b - 1]:
+                    position = locate(pattern, node, other)
+                    width = panel_width(pattern, other)
+                joint[u, a, b] = inverse[position + place[a] * width + place[b]]
+                joint[u, b, a] = joint[u, a, b]
 
 
-@njit(cache=True, nogil=True)
 def interpolate_knots(
     layout: Layout,
     knots: Knots,
@@ -156,9 +116,10 @@ def interpolate_knots(
     cells: np.ndarray,
     states: np.ndarray,
     inverse: np.ndarray,
-    epochs: Epochs,
-) -> None:
-    """Fill epochs with trend plus signal.
+    gps_time: np.ndarray,
+    asked: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Estimates (q, k, p + 1) and covariance (q, k, k) of the processes at q epochs.
 
     Parameters
     ----------
@@ -171,38 +132,38 @@ def interpolate_knots(
         Estimated from the columns [A, l - A x].
     inverse : (v,) array
         Values of the selected inverse; none where only means are asked for.
-    epochs : Epochs
+    gps_time, asked : (q,), (q, s) array
+        The epochs, and the signals' clocks there.
     """
-    size = layout.states[layout.signal].sum()
-    about = neighbours(layout.states.size, size, states.shape[1] - 1)
-    slots = _slots(layout)
-    begin = 0
-    while begin < epochs.gps_time.size:
-        cell = np.searchsorted(knots.times, epochs.gps_time[begin], side="right")
-        end = run_end(knots.times, cell, epochs.gps_time, begin)
-        enter_cell(layout, knots, cell, about)
-        _gather_knots(pattern, cells[cell].ravel(), slots, states, inverse, about)
-        predict_between(layout, about, epochs, begin, end)
-        begin = end
+    entered, cell = np.unique(
+        np.searchsorted(knots.times, gps_time, side="right"), return_inverse=True
+    )
+    before, after = cell_clocks(knots)
+    gains, remaining = conditional_gains(layout, before[entered], after[entered], cell, asked)
+    signal, side, place = _slots(layout)
+    nodes = cells[entered][:, signal, side]
+    rows = np.append(pattern.first[:-1], -1)[nodes] + place
+    about = np.where((nodes >= 0)[..., None], states[rows], 0.0)
+    joint = np.zeros((*nodes.shape, nodes.shape[1]))
+    if inverse.size > 0:
+        _selected(pattern, nodes, place, inverse, joint)
+    return process_moments(layout, cell, gains, remaining, about, joint)
 
 
 def predictor_by(
-    fill: Callable, layout: Layout, trend: np.ndarray, trend_root: np.ndarray
+    moments: Callable, layout: Layout, trend: np.ndarray, trend_root: np.ndarray
 ) -> Callable:
     """A predictor as ``Collocation.predict`` calls it, in chunks: mean and covariance.
 
     Parameters
     ----------
-    fill : function of Epochs
-        Which fills them.
+    moments : function
+        Estimates (q, k, p + 1) of the processes from the columns [A, l - A x], and their
+        covariance (q, k, k), at epochs gps_time (q,) and clocks (q, s).
     layout : Layout
     trend, trend_root : (p,), (p, p) array
         The root is None where only means are asked for.
     """
-    if trend_root is None:
-        root = np.zeros((len(trend), len(trend)))
-    else:
-        root = trend_root
     processes = np.bincount(layout.signal, minlength=layout.states.size).tolist()
 
     def predict(gps_time, clocks, design, mixings):
@@ -218,18 +179,17 @@ def predictor_by(
         covariance = np.empty((q, r, r))
         for i in range(0, q, CHUNK):
             part = slice(i, i + CHUNK)
-            blocks = [np.zeros((len(gps_time[part]), r, 0)), *(m[part] for m in mixings)]
-            epochs = Epochs(
-                np.ascontiguousarray(gps_time[part]),
-                np.ascontiguousarray(clocks[part]),
-                np.ascontiguousarray(design[part], dtype=float),
-                np.concatenate(blocks, axis=2),
-                trend,
-                root,
-                mean[part],
-                covariance[part],
+            count = len(gps_time[part])
+            mixing = np.concatenate([np.zeros((count, r, 0)), *(m[part] for m in mixings)], axis=2)
+            values, spread = moments(
+                np.ascontiguousarray(gps_time[part]), np.ascontiguousarray(clocks[part])
             )
-            fill(epochs)
+            mean[part] = design[part] @ trend + (mixing @ values[..., -1:])[..., 0]
+            if trend_root is None:
+                continue
+            # of the trend's covariance, what the signal does not absorb
+            left = (design[part] - mixing @ values[..., :-1]) @ trend_root
+            covariance[part] = mixing @ spread @ mixing.swapaxes(1, 2) + left @ left.swapaxes(1, 2)
         if trend_root is None:
             return (mean,)
         return (mean, covariance)

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import chain, combinations, product
 
 import numpy as np
@@ -311,9 +311,7 @@ class InformationSolver:
         states[:, -1] -= states[:, :-1] @ trend
         inverse = np.empty(0) if trend_root is None else self._inverse
         table = self.layout, self.knots, self.pattern, self._cells, states, inverse
-        return predictor_by(
-            lambda epochs: interpolate_knots(*table, epochs), self.layout, trend, trend_root
-        )
+        return predictor_by(partial(interpolate_knots, *table), self.layout, trend, trend_root)
 
     @property
     def _heights(self):

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -10,7 +10,6 @@ from mlscorr.collocation._recursion import (
     Recursion,
     filter_columns,
     filter_covariance,
-    precision_between,
     smooth_columns,
     smooth_covariance,
 )
@@ -197,25 +196,19 @@ class MarkovSolver:
     def precision(self, rows: np.ndarray) -> np.ndarray:
         """A block of V^-1."""
         r = self.mixing.shape[1]
-        position = self._position[np.asarray(rows) // r]
-        within = np.asarray(rows) % r
-        if not self.shared.size and (position == position[0]).all():
-            return self._smoothed[0][position[0]][within[:, None], within]
-        epochs, of = np.unique(position, return_inverse=True)
-        block = np.empty((len(epochs), r, len(epochs), r))
-        for a, early in enumerate(epochs):
-            block[a, :, a] = self._smoothed[0][early]
-            for b in range(a + 1, len(epochs)):
-                block[a, :, b] = precision_between(
-                    self._recursion, self._smoothed[1], early, epochs[b]
-                )
-                block[b, :, a] = block[a, :, b].T
-        flat = of * r + within
-        block = block.reshape(len(epochs) * r, -1)[np.ix_(flat, flat)]
-        if self.shared.size:
+        rows = np.asarray(rows)
+        position = self._position[rows // r]
+        if (position == position[0]).all():
+            within = rows % r
+            block = self._smoothed[0][position[0]][within[:, None], within]
+            if not self.shared.size:
+                return block
             shared = self._shared_weights[rows]
-            block = block - shared @ shared.T
-        return block
+            return block - shared @ shared.T
+        unit = np.zeros((self.order.size * r, rows.size))
+        unit[rows, np.arange(rows.size)] = 1.0
+        block = self.solve(unit)[rows]
+        return 0.5 * (block + block.T)
 
     def predictor(self, columns: np.ndarray, trend: np.ndarray, trend_root: np.ndarray) -> Callable:
         """The predictor of these columns; see Collocation.predict.
@@ -229,9 +222,7 @@ class MarkovSolver:
         """
         nodes = self._smooth(self._without_shared(self._padded(columns)))[1]
         table = (self.gps_time, self.clocks, self.layout, nodes, *self._node_covariances)
-        return predictor_by(
-            lambda epochs: interpolate(*table, epochs), self.layout, trend, trend_root
-        )
+        return predictor_by(partial(interpolate, *table), self.layout, trend, trend_root)
 
     def _padded(self, columns):
         """Columns with zeros in the rows of second views."""
@@ -288,7 +279,7 @@ class MarkovSolver:
     @cached_property
     def _node_covariances(self):
         """Covariances of the smoothed states with themselves and those of the next epoch."""
-        same, following = self._smoothed[2:]
+        same, following = self._smoothed[1:]
         if not self.shared.size:
             return same, following
         states = self._smooth(self.shared)[1] @ np.linalg.inv(self._woodbury[1])

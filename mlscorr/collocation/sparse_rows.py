@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mlscorr.collocation._knots import Knots, knot_gains
 from mlscorr.collocation._matrices import assign, whitening_root
@@ -21,6 +20,7 @@ from mlscorr.collocation._pattern import Pattern, locate, panel_width
 from mlscorr.collocation._states import Layout
 from mlscorr.collocation.markov import check_finite
 from mlscorr.collocation.model import NOT_POSITIVE, Noise, Signal, signal_clocks
+from mlscorr.compiled_loops import loop
 
 
 @dataclass(frozen=True)
@@ -114,8 +114,7 @@ class Sides(NamedTuple):
         own = noise.separate
         check_finite(rows.gps_time[:, 0], rows.gps_time, rows.misclosure, own, rows.design, mixing)
         cell = np.searchsorted(knots.times, gps_time, side="right")
-        order = np.argsort(cell, kind="stable")
-        gains, remaining = knot_gains(layout, knots, cell, clocks, order)
+        gains, remaining = knot_gains(layout, knots, cell, clocks)
         unknown = np.full(n, -1)
         sigma = np.zeros(rows.misclosure.shape)
         if len(noise.repeated):
@@ -182,7 +181,7 @@ def check_same(
         )
 
 
-@njit(cache=True, nogil=True)
+@loop
 def whiteners(
     layout: Layout, mixing: np.ndarray, remaining: np.ndarray, own: np.ndarray
 ) -> np.ndarray:
@@ -208,7 +207,7 @@ def whiteners(
     return white
 
 
-@njit(cache=True, nogil=True)
+@loop
 def add_information(
     layout: Layout, pattern: Pattern, cells: np.ndarray, sides: Sides, values: np.ndarray
 ) -> None:
@@ -243,7 +242,7 @@ def add_information(
                             target[q] += weight * right[m, q]
 
 
-@njit(cache=True, nogil=True)
+@loop
 def observe(
     layout: Layout,
     pattern: Pattern,
@@ -281,7 +280,7 @@ def observe(
                             y[i, m, c] += weights[m, p] * states[p, c]
 
 
-@njit(cache=True, nogil=True)
+@loop
 def row_covariances(
     layout: Layout, pattern: Pattern, cells: np.ndarray, sides: Sides, inverse: np.ndarray
 ) -> np.ndarray:
@@ -341,7 +340,7 @@ class Expanded(NamedTuple):
     processes: np.ndarray
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _room(layout, sides):
     """Room for an expanded observation."""
     _, e, r, _ = sides.mixing.shape
@@ -353,7 +352,7 @@ def _room(layout, sides):
     return Expanded(np.zeros(1, dtype=np.int64), nodes, begin, np.zeros((r, width)), processes)
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _expand(layout, first, cells, sides, i, out):
     """Expand observation i; cells are numbered in the order of elimination."""
     cell, gains, mixing, unknown, sigma, _, white = sides
@@ -386,7 +385,7 @@ def _expand(layout, first, cells, sides, i, out):
             row += white[i, m, other] * columns[other, : row.size]
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _enter(number, nodes, begin, columns, first, node):
     """Where the columns of a node begin; a new one's are zero."""
     for at in range(number[0]):

@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 from scipy.linalg import solve_triangular
 
 from mlscorr.collocation._recursion import Recursion, filter_covariance
 from mlscorr.collocation._states import Layout, carry
 from mlscorr.collocation.model import NOT_POSITIVE, Signal, signal_clocks
+from mlscorr.compiled_loops import loop
 
 CHUNK = 64  # columns filtered at once: their states stay in the first cache
 
@@ -256,7 +256,7 @@ def factor(
     return Whitener(recursion, common)
 
 
-@njit(cache=True, nogil=True)
+@loop
 def whiten_columns(
     recursion: Recursion, columns: np.ndarray, out: np.ndarray, inverse: bool = False
 ) -> None:
@@ -289,7 +289,7 @@ def whiten_columns(
                 x[a, b] += gains[i, a] * innovation[b]
 
 
-@njit(cache=True, nogil=True)
+@loop
 def common_innovations(shared: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Innovations where observations have unit errors in common.
 

@@ -1,7 +1,8 @@
 """The fast kernel: what each point moves, from its own time stamp."""
 
 import numpy as np
-from numba import njit
+
+from mlscorr.compiled_loops import loop
 
 
 def require_times(points: int, times: int) -> None:
@@ -22,7 +23,7 @@ def require_times(points: int, times: int) -> None:
         )
 
 
-@njit(cache=True, nogil=True)
+@loop
 def locate(
     gps_time: np.ndarray, constant: float, epochs: np.ndarray, step: float, is_gap: np.ndarray
 ) -> np.ndarray:
@@ -63,7 +64,7 @@ def locate(
     return index
 
 
-@njit(cache=True, nogil=True, inline="always")
+@loop(inline="always")
 def _increment(x, y, z, weight, a, b):
     """Shift + turn (x - T), interpolated between the table rows a and b."""
     v = 1.0 - weight
@@ -79,7 +80,7 @@ def _increment(x, y, z, weight, a, b):
     return ex, ey, ez
 
 
-@njit(cache=True, nogil=True)
+@loop
 def fill_increments(
     gps_time: np.ndarray,
     xyz: np.ndarray,
@@ -115,7 +116,7 @@ def fill_increments(
         )
 
 
-@njit(cache=True, nogil=True)
+@loop
 def move_integers(
     xs: np.ndarray,
     ys: np.ndarray,

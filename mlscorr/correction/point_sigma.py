@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from mlscorr.compiled_loops import loop
 from mlscorr.correction._kernel import locate, require_times
 from mlscorr.correction.pair import Correction
 from mlscorr.frames import map_root, skew
@@ -171,7 +171,7 @@ def _mounting_covariance(corrected, mounting, arm):
     return partials @ mounting.covariance @ partials.swapaxes(1, 2)
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _variances(xs, ys, zs, scale, offset, gps_time, constant, epochs, index, table, beam, out):
     row = np.empty(table.shape[1])
     for p in range(gps_time.size):

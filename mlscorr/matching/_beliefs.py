@@ -12,13 +12,12 @@ attitude across the range, and a part of g and u that isn't smooth. k, b and u a
 several beliefs compete, and the observations decide.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mlscorr.matching._pairs import CandidatePairs
-from mlscorr.matching.settings import COMPILED, SETTINGS, settings_tuple
+from mlscorr.matching.settings import SETTINGS
 from mlscorr.pos import PosErrors
 from mlscorr.survey import ControlPoints, TargetObservations, Trajectory
 
@@ -47,8 +46,6 @@ class Chain(NamedTuple):
         Of the control points' positions. Units: m^2.
     moved_share : (p,) array
         Probability that a pair's surveyed point lies elsewhere, by what isn't in the chain.
-    settings : tuple
-        Names as of Settings.
     """
 
     gps_time: np.ndarray
@@ -62,10 +59,8 @@ class Chain(NamedTuple):
     pairs: CandidatePairs
     pair_variance: np.ndarray
     moved_share: np.ndarray
-    settings: Any
 
 
-@njit(**COMPILED)
 def transition(chain: Chain, start: int, end: int) -> np.ndarray:
     """Transitions F of c, s and its rate from one observation to another, later or earlier.
 
@@ -83,21 +78,17 @@ def transition(chain: Chain, start: int, end: int) -> np.ndarray:
     matrix : (m + 1, 3, 3) array
         Of each belief, and at last of a drift that starts anew.
     """
-    forward = chain.forward
-    settings = chain.settings
-    turned = 1.0 - forward[start, 0] * forward[end, 0] - forward[start, 1] * forward[end, 1]
-    share = (settings.turning_sigma / settings.constant_sigma) ** 2
+    turned = 1.0 - chain.forward[start] @ chain.forward[end]
+    share = (SETTINGS.turning_sigma / SETTINGS.constant_sigma) ** 2
     matrix = np.zeros((len(chain.rate) + 1, 3, 3))
-    for m in range(len(matrix)):
-        matrix[m, 0, 0] = 1.0 - share * turned
+    matrix[:, 0, 0] = 1.0 - share * turned
     if chain.segment[start] == chain.segment[end]:
-        for m, rate in enumerate(chain.rate):
-            step = rate * (chain.gps_time[end] - chain.gps_time[start])
-            decay = np.exp(-abs(step))
-            matrix[m, 1, 1] = (1.0 + abs(step)) * decay
-            matrix[m, 1, 2] = step * decay
-            matrix[m, 2, 1] = -step * decay
-            matrix[m, 2, 2] = (1.0 - abs(step)) * decay
+        step = chain.rate * (chain.gps_time[end] - chain.gps_time[start])
+        decay = np.exp(-abs(step))
+        matrix[:-1, 1, 1] = (1.0 + abs(step)) * decay
+        matrix[:-1, 1, 2] = step * decay
+        matrix[:-1, 2, 1] = -step * decay
+        matrix[:-1, 2, 2] = (1.0 - abs(step)) * decay
     return matrix
 
 
@@ -139,7 +130,6 @@ def build_chain(
         pairs=pairs,
         pair_variance=control.sigma[pairs.control] ** 2,
         moved_share=np.full(len(pairs.control), SETTINGS.moved_share),
-        settings=settings_tuple(),
     )
 
 

@@ -9,12 +9,19 @@ filters know: their product, over the prior that both hold, is what all other ob
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
-from mlscorr.matching import _hypotheses as hypotheses
 from mlscorr.matching._beliefs import Chain
-from mlscorr.matching._hypotheses import Hypotheses, displacement, log_likelihoods, select
-from mlscorr.matching.settings import COMPILED, INNER
+from mlscorr.matching._hypotheses import (
+    Hypotheses,
+    displacement,
+    log_likelihoods,
+    predict,
+    select,
+    start,
+)
+from mlscorr.matching.settings import SETTINGS
+
+SHORT_DRIVE = 1000  # observations; hypotheses of so many are kept: some 30 kB each
 
 
 class Marginals(NamedTuple):
@@ -41,6 +48,9 @@ class Marginals(NamedTuple):
 def marginals(chain: Chain) -> Marginals:
     """Join hypotheses from the start of a drive with those from its end.
 
+    Of the past's hypotheses only those at the start of each part of the drive are kept, and the
+    part is walked again where the future comes to it: memory grows with sqrt(n).
+
     Parameters
     ----------
     chain : Chain
@@ -48,87 +58,59 @@ def marginals(chain: Chain) -> Marginals:
     n = len(chain.gps_time)
     p = len(chain.pairs.control)
     result = Marginals(np.zeros(p), np.zeros(p), np.zeros((n, 3)), np.zeros((n, 3)))
-    if p > 0:
-        _smooth(chain, result)
+    if p == 0:
+        return result
+    length = max(SHORT_DRIVE, int(np.ceil(np.sqrt(n))))
+    starts = range(0, n, length)
+    begins = [start(chain)]
+    for first in starts[:-1]:
+        now = begins[-1]
+        for row in range(first, first + length):
+            now = _pass(now, chain, row, row + 1)
+        begins.append(now)
+    future = start(chain)
+    for first in reversed(starts):
+        last = min(first + length, n) - 1
+        now = begins.pop()
+        past = [heaviest(now)]
+        for row in range(first, last):
+            now = _pass(now, chain, row, row + 1)
+            past.append(heaviest(now))
+        for row in range(last, first - 1, -1):
+            if row + 1 < n:
+                future = _pass(future, chain, row + 1, row)
+            _fill(join(past[row - first], heaviest(future), chain), chain, row, result)
     return result
 
 
-@njit(**COMPILED)
-def _smooth(chain, result):
-    """Fill in the marginals of all observations.
-
-    Of the past's hypotheses only every sqrt(n)-th are kept, and the stretch from there is walked
-    again where the future comes to it: memory grows with sqrt(n).
-    """
-    n = len(chain.gps_time)
-    length = int(np.ceil(np.sqrt(n)))
-    now = hypotheses.start(chain)
-    begins = [now]
-    for row in range(1, n):
-        now = hypotheses.predict(use(now, chain, row - 1), chain, row - 1, row)
-        if row % length == 0:
-            begins.append(now)
-    future = hypotheses.start(chain)
-    for part in range(len(begins) - 1, -1, -1):
-        first = part * length
-        last = min((part + 1) * length, n) - 1
-        past = [heaviest(begins[part], chain)]
-        now = begins[part]
-        for row in range(first + 1, last + 1):
-            now = hypotheses.predict(use(now, chain, row - 1), chain, row - 1, row)
-            past.append(heaviest(now, chain))
-        for row in range(last, first - 1, -1):
-            if row + 1 < n:
-                future = hypotheses.predict(use(future, chain, row + 1), chain, row + 1, row)
-            _fill(join(past[row - first], heaviest(future, chain), chain), chain, row, result)
+def _pass(now, chain, row, following):
+    """The hypotheses before the observation that follows this one, which is used."""
+    return predict(use(now, chain, row), chain, row, following)
 
 
-@njit(**INNER)
 def _fill(both, chain, row, result):
     """Fill in the marginals of an observation."""
     if len(both.weight) == 0:
         return  # past and future agree in no belief: nothing is said
-    density = hypotheses.log_likelihoods(both, chain, row)
+    density = _probabilities(log_likelihoods(both, chain, row))
+    pairs = chain.pairs.of(row)
     k = density.shape[1] // 2
-    first = chain.pairs.first[row]
-    _normalize(density.reshape(-1))
-    for hypothesis in range(len(density)):
-        for choice in range(k):
-            result.sound[first + choice] += density[hypothesis, choice]
-            result.moved[first + choice] += density[hypothesis, k + choice]
-    share = both.weight
-    _normalize(share)
-    value, variance = hypotheses.displacement(both, chain, row)
-    for axis in range(3):
-        expected = 0.0
-        square = 0.0
-        for hypothesis in range(len(share)):
-            expected += share[hypothesis] * value[hypothesis, axis]
-        for hypothesis in range(len(share)):
-            away = value[hypothesis, axis] - expected
-            square += share[hypothesis] * (variance[hypothesis, axis] + away**2)
-        result.expected[row, axis] = expected
-        result.sigma[row, axis] = np.sqrt(square)
+    result.sound[pairs] = density[:, :k].sum(axis=0)
+    result.moved[pairs] = density[:, k : 2 * k].sum(axis=0)
+    share = _probabilities(both.weight)
+    value, variance = displacement(both, chain, row)
+    expected = share @ value
+    result.expected[row] = expected
+    result.sigma[row] = np.sqrt(share @ (variance + (value - expected) ** 2))
 
 
-@njit(**INNER)
-def _normalize(weight):
-    """Make probabilities of logarithmic weights, in place."""
-    largest = -np.inf
-    total = 0.0
-    for row in range(len(weight)):
-        largest = max(largest, weight[row])
-    for row in range(len(weight)):
-        weight[row] = np.exp(weight[row] - largest)
-        total += weight[row]
-    for row in range(len(weight)):
-        weight[row] /= total
+def _probabilities(weight):
+    """Probabilities of logarithmic weights."""
+    probability = np.exp(weight - weight.max())
+    return probability / probability.sum()
 
 
-@njit(**COMPILED)
-def join(
-    before: hypotheses.Hypotheses, after: hypotheses.Hypotheses, chain: Chain
-) -> hypotheses.Hypotheses:
+def join(before: Hypotheses, after: Hypotheses, chain: Chain) -> Hypotheses:
     """Pairs (past, future) of hypotheses of one belief, joined; their prior counts once.
 
     With precisions L and means m, L = L1 + L2 - I and L m = L1 m1 + L2 m2. Both windows are
@@ -140,41 +122,62 @@ def join(
         At an observation, by those before it and by those after it.
     chain : Chain
     """
-    rows, others = _of_one_belief(before, after)
+    rows, others = np.nonzero(before.belief[:, None] == after.belief)
     w = len(before.window)
-    both = hypotheses.select(before, rows, w, w + len(after.window))
-    precisions, vectors, weights = _information(before)
-    later_precisions, later_vectors, later_weights = _information(after)
-    precision = np.empty((3, 3))
-    vector = np.empty(3)
-    for column, row in enumerate(after.window):
-        both.window[w + column] = row
-    for pair, (i, j) in enumerate(zip(rows, others)):  # noqa: B905 - numba knows no strict
-        for column in range(len(after.window)):
-            both.used[pair, w + column] = after.used[j, column]
-        weight = before.weight[i] + weights[i] + after.weight[j] + later_weights[j]
-        weight += 2.0 * chain.settings.least_log_weight * _clash(before, i, after, j, chain)
-        for axis in range(3):
-            for row in range(3):
-                vector[row] = vectors[i, axis, row] + later_vectors[j, axis, row]
-                for column in range(3):
-                    known = (
-                        precisions[i, axis, row, column] + later_precisions[j, axis, row, column]
-                    )
-                    precision[row, column] = known - (row == column)
-            x = both.mean[pair, axis]
-            p = both.covariance[pair, axis]
-            determinant = _invert(precision, p)
-            square = 0.0
-            for row in range(3):
-                x[row] = p[row, 0] * vector[0] + p[row, 1] * vector[1] + p[row, 2] * vector[2]
-                square += vector[row] * x[row]
-            weight += 0.5 * (square - np.log(determinant))
-        both.weight[pair] = weight
+    both = select(before, rows, w, w + len(after.window))
+    both.window[w:] = after.window
+    both.used[:, w:] = after.used[others]
+    precision, vector, weight = _information(before)
+    later_precision, later_vector, later_weight = _information(after)
+    vectors = vector[rows] + later_vector[others]
+    inverse, determinant = _inverse(precision[rows] + later_precision[others] - np.eye(3))
+    both.covariance[:] = inverse
+    both.mean[:] = (inverse @ vectors[..., None])[..., 0]
+    both.weight[:] += weight[rows] + after.weight[others] + later_weight[others]
+    both.weight[:] += 0.5 * (vectors * both.mean).sum(axis=(1, 2))
+    both.weight[:] -= 0.5 * np.log(determinant).sum(axis=1)
+    both.weight[_clash(both, w, chain)] += 2.0 * SETTINGS.least_log_weight
     return both
 
 
-@njit(**COMPILED)
+def _information(now):
+    """Precisions L, vectors L m and weights (log |L| - m L m) / 2, over all axes."""
+    precision, determinant = _inverse(now.covariance)
+    vector = (precision @ now.mean[..., None])[..., 0]
+    square = (vector * now.mean).sum(axis=(1, 2))
+    return precision, vector, -0.5 * (np.log(determinant).sum(axis=1) + square)
+
+
+def _inverse(matrix):
+    """Inverses of symmetric matrices (..., 3, 3) by their cofactors, and their determinants."""
+    a = matrix[..., 0, 0]
+    b = matrix[..., 0, 1]
+    c = matrix[..., 0, 2]
+    d = matrix[..., 1, 1]
+    e = matrix[..., 1, 2]
+    f = matrix[..., 2, 2]
+    inverse = np.empty_like(matrix)
+    inverse[..., 0, 0] = d * f - e * e
+    inverse[..., 1, 1] = a * f - c * c
+    inverse[..., 2, 2] = a * d - b * b
+    inverse[..., 0, 1] = inverse[..., 1, 0] = c * e - b * f
+    inverse[..., 0, 2] = inverse[..., 2, 0] = b * e - c * d
+    inverse[..., 1, 2] = inverse[..., 2, 1] = b * c - a * e
+    determinant = a * inverse[..., 0, 0] + b * inverse[..., 0, 1] + c * inverse[..., 0, 2]
+    inverse /= determinant[..., None, None]
+    return inverse, determinant
+
+
+def _clash(both, w, chain):
+    """Pairs (b,) that use one control point twice in one visit; w observations are of the past."""
+    past = both.window[:w, None]
+    future = both.window[w:]
+    is_visit = chain.pass_number[past] == chain.pass_number[future]
+    is_visit &= abs(chain.gps_time[past] - chain.gps_time[future]) <= SETTINGS.visit_gap
+    control = both.used[:, :w, None]
+    return ((control == both.used[:, None, w:]) & (control >= 0) & is_visit).any(axis=(1, 2))
+
+
 def use(now: Hypotheses, chain: Chain, row: int) -> Hypotheses:
     """The hypotheses after an observation: each branches into its pairs and none.
 
@@ -186,91 +189,65 @@ def use(now: Hypotheses, chain: Chain, row: int) -> Hypotheses:
     row : int
         Of the observation.
     """
-    first = chain.pairs.first[row]
-    k = chain.pairs.first[row + 1] - chain.pairs.first[row]
-    count = 3 * chain.settings.joined_hypotheses
-    smallest = chain.settings.least_log_weight
-    weight = log_likelihoods(now, chain, row).reshape(-1)
+    pairs = np.arange(chain.pairs.first[row], chain.pairs.first[row + 1])
+    k = len(pairs)
+    count = 3 * SETTINGS.joined_hypotheses
+    smallest = SETTINGS.least_log_weight
+    density = log_likelihoods(now, chain, row)
+    weight = density.ravel()
+    choices = density.shape[1]
+    kept = best_of_each(np.repeat(now.belief, choices), weight, 4 * count, smallest)
     w = len(now.window)
-    belief = np.empty(len(weight), np.int64)
-    choices = 2 * k + 1
-    for branch in range(len(weight)):
-        belief[branch] = now.belief[branch // choices]
-    kept = best_of_each(belief, weight, 4 * count, smallest)
     after = select(now, kept // choices, w, w + 1)
     choice = kept % choices
+    pair = np.concatenate([pairs, pairs, [-1]])[choice]
     after.window[w] = row
-    for place, branch in enumerate(kept):
-        if choice[place] < 2 * k:
-            pair = first + choice[place] % k
-        else:
-            pair = -1
-        after.weight[place] = weight[branch]
-        after.used[place, w] = chain.pairs.control[pair] if pair >= 0 else -1
-        if choice[place] < k:  # takes up the sound pairs only
-            for column in range(chain.settings.merging_matches - 1):
-                after.history[place, column] = after.history[place, column + 1]
-            after.history[place, -1] = pair
+    after.weight[:] = weight[kept]
+    after.used[:, w] = np.append(chain.pairs.control, -1)[pair]
+    is_sound = choice < k  # takes up the sound pairs only
+    after.history[is_sound, :-1] = after.history[is_sound, 1:]
+    after.history[is_sound, -1] = pair[is_sound]
     groups, total = merge(after.belief, after.history, after.used, after.weight)
     best = best_of_each(after.belief[groups], total, count, smallest)
     rows = groups[best]
     after = select(after, rows, w + 1, w + 1)
-    for place, group in enumerate(best):
-        after.weight[place] = total[group]
-    _update(after, chain, row, choice[rows])
+    after.weight[:] = total[best]
+    _update(after, chain, row, pair[rows], choice[rows] >= k)
     return after
 
 
-@njit(**INNER)
-def _update(after, chain, row, choice):
-    """Kalman update, in place, of hypotheses by what each takes an observation for.
+def _update(after, chain, row, pair, is_moved):
+    """Kalman update, in place, of hypotheses by the pair, or none, that each takes.
 
     K = P H^T / S, x = x + K v, P = P - K H P with H = (sigma, g, 0) per axis.
     """
-    first = chain.pairs.first[row]
-    k = chain.pairs.first[row + 1] - chain.pairs.first[row]
-    sigma = chain.settings.constant_sigma
+    taken = np.flatnonzero(pair >= 0)
+    pair = pair[taken]
     value, variance = displacement(after, chain, row)
-    cross = np.empty(3)  # P H^T
-    for hypothesis in range(len(choice)):
-        if choice[hypothesis] == 2 * k:
-            continue
-        pair = first + choice[hypothesis] % k
-        if choice[hypothesis] >= k:
-            extra = chain.settings.moved_sigma**2
-        else:
-            extra = 0.0
-        for axis in range(3):
-            gain = chain.gain[after.belief[hypothesis], row, axis]
-            x = after.mean[hypothesis, axis]
-            p = after.covariance[hypothesis, axis]
-            away = chain.pairs.misclosure[pair, axis] - value[hypothesis, axis]
-            spread = variance[hypothesis, axis] + chain.pair_variance[pair, axis] + extra
-            for i in range(3):
-                cross[i] = sigma * p[i, 0] + gain * p[i, 1]
-            for i in range(3):
-                x[i] += cross[i] / spread * away
-                for j in range(3):
-                    p[i, j] -= cross[i] / spread * cross[j]
+    gain = chain.gain[after.belief[taken], row]
+    p = after.covariance[taken]
+    cross = SETTINGS.constant_sigma * p[..., 0] + gain[..., None] * p[..., 1]  # P H^T
+    extra = SETTINGS.moved_sigma**2 * is_moved[taken, None]
+    spread = variance[taken] + chain.pair_variance[pair] + extra
+    away = chain.pairs.misclosure[pair] - value[taken]
+    step = cross / spread[..., None]
+    after.mean[taken] += step * away[..., None]
+    after.covariance[taken] = p - step[..., :, None] * cross[..., None, :]
 
 
-@njit(inline="always", error_model="numpy")
-def heaviest(now: Hypotheses, chain: Chain) -> Hypotheses:
+def heaviest(now: Hypotheses) -> Hypotheses:
     """Those of each belief that are joined with the other side's.
 
     Parameters
     ----------
     now : Hypotheses
-    chain : Chain
     """
-    count = chain.settings.joined_hypotheses
-    smallest = chain.settings.least_log_weight
-    rows = best_of_each(now.belief, now.weight, count, smallest)
+    count = SETTINGS.joined_hypotheses
+    rows = best_of_each(now.belief, now.weight, count, SETTINGS.least_log_weight)
     w = len(now.window)
     return select(now, rows, w, w)
 
 
-@njit(**COMPILED)
 def best_of_each(
     belief: np.ndarray, weight: np.ndarray, count: int, smallest_weight: float
 ) -> np.ndarray:
@@ -284,47 +261,15 @@ def best_of_each(
     smallest_weight : float
         Logarithm, against the best of all.
     """
-    largest = -np.inf
-    beliefs = 0
-    size = 0
-    for row in range(len(weight)):
-        largest = max(largest, weight[row])
-        beliefs = max(beliefs, belief[row] + 1)
-    rows = np.empty(len(weight), np.int64)
-    rank = np.zeros(beliefs, np.int64)
-    for row in range(len(weight)):
-        if weight[row] - largest >= smallest_weight:
-            rows[size] = row
-            size += 1
-    _sort(rows[:size], weight)
-    kept = 0
-    for row in rows[:size]:
-        if rank[belief[row]] < count:
-            rows[kept] = row
-            kept += 1
-        rank[belief[row]] += 1
-    return rows[:kept]
+    rows = np.flatnonzero(weight - weight.max(initial=-np.inf) >= smallest_weight)
+    rows = rows[np.argsort(-weight[rows], kind="stable")]
+    by_belief = np.argsort(belief[rows], kind="stable")
+    ordered = belief[rows[by_belief]]
+    rank = np.empty(len(rows), dtype=int)
+    rank[by_belief] = np.arange(len(rows)) - np.searchsorted(ordered, ordered)
+    return rows[rank < count]
 
 
-@njit(**INNER)
-def _sort(rows, weight):
-    """Sort rising rows by falling weight, in place; equal ones stay in order (Shell 1959)."""
-    gap = len(rows)
-    while gap > 1:
-        gap = max(1, 5 * gap // 11)  # Gonnet and Baeza-Yates 1991
-        for end in range(gap, len(rows)):
-            row = rows[end]
-            place = end
-            while place >= gap:
-                other = rows[place - gap]
-                if weight[other] > weight[row] or (weight[other] == weight[row] and other < row):
-                    break
-                rows[place] = other
-                place -= gap
-            rows[place] = row
-
-
-@njit(**COMPILED)
 def merge(
     belief: np.ndarray, history: np.ndarray, used: np.ndarray, weight: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -343,111 +288,18 @@ def merge(
     weight : (u,) array
         Logarithm of the sum over its group.
     """
-    n = len(weight)
-    groups = 0
-    keys = np.empty(n, np.int64)
-    rows = np.empty(n, np.int64)
-    total = np.empty(n)
-    table = np.full(2 * n, -1)  # of the groups, by key (Knuth 1997, 6.4)
-    for row in range(n):
-        keys[row] = _key(belief[row], history[row], used[row])
-        slot = abs(keys[row]) % len(table)
-        while table[slot] >= 0 and keys[rows[table[slot]]] != keys[row]:
-            slot = (slot + 1) % len(table)
-        if table[slot] < 0:
-            table[slot] = groups
-            rows[groups] = row
-            total[groups] = 0.0
-            groups += 1
-        group = table[slot]
-        total[group] += np.exp(weight[row] - weight[rows[group]])
-    for group in range(groups):
-        total[group] = weight[rows[group]] + np.log(total[group])
-    return rows[:groups], total[:groups]
+    key = _keys(np.column_stack([belief + 1, history, used]))
+    _, first, group = np.unique(key, return_index=True, return_inverse=True)
+    sums = np.bincount(group, np.exp(weight - weight[first][group]))
+    total = weight[first] + np.log(sums)
+    order = np.argsort(first)
+    return first[order], total[order]
 
 
-@njit(inline="always", error_model="numpy")
-def _key(belief, history, used):
-    """A whole number for one row of all three, equal where they are."""
+def _keys(table):
+    """A whole number for each row of integers, equal where they are."""
     factor = 6364136223846793005  # of a linear congruential sequence modulo 2^64
-    key = belief + 1
-    for pair in history:
-        key = (key ^ (key >> 29)) * factor + pair
-    for control in used:
-        key = (key ^ (key >> 29)) * factor + control
+    key = table[:, 0].copy()
+    for column in table[:, 1:].T:
+        key = (key ^ (key >> 29)) * factor + column
     return key
-
-
-@njit(inline="always", error_model="numpy")
-def _of_one_belief(before, after):
-    """Rows of past and future, of each pair that agrees in its belief."""
-    size = 0
-    for belief in before.belief:
-        for other in after.belief:
-            size += belief == other
-    rows = np.empty(size, np.int64)
-    others = np.empty(size, np.int64)
-    pair = 0
-    for i, belief in enumerate(before.belief):
-        for j, other in enumerate(after.belief):
-            if belief == other:
-                rows[pair] = i
-                others[pair] = j
-                pair += 1
-    return rows, others
-
-
-@njit(**INNER)
-def _information(now):
-    """Precisions L, vectors L m and weights (log |L| - m L m) / 2, over all axes."""
-    b = len(now.weight)
-    precision = np.empty((b, 3, 3, 3))
-    vector = np.zeros((b, 3, 3))
-    weight = np.zeros(b)
-    for hypothesis in range(len(weight)):
-        for axis in range(3):
-            matrix = precision[hypothesis, axis]
-            x = now.mean[hypothesis, axis]
-            square = np.log(_invert(now.covariance[hypothesis, axis], matrix))
-            for i in range(3):
-                for j in range(3):
-                    vector[hypothesis, axis, i] += matrix[i, j] * x[j]
-                square += vector[hypothesis, axis, i] * x[i]
-            weight[hypothesis] -= 0.5 * square
-    return precision, vector, weight
-
-
-@njit(**INNER)
-def _invert(matrix, out):
-    """Inverse of a symmetric 3 x 3 matrix by its cofactors, and its determinant."""
-    a = matrix[0, 0]
-    b = matrix[0, 1]
-    c = matrix[0, 2]
-    d = matrix[1, 1]
-    e = matrix[1, 2]
-    f = matrix[2, 2]
-    out[0, 0] = d * f - e * e
-    out[1, 1] = a * f - c * c
-    out[2, 2] = a * d - b * b
-    out[0, 1] = out[1, 0] = c * e - b * f
-    out[0, 2] = out[2, 0] = b * e - c * d
-    out[1, 2] = out[2, 1] = b * c - a * e
-    determinant = a * out[0, 0] + b * out[0, 1] + c * out[0, 2]
-    for i in range(3):
-        for j in range(3):
-            out[i, j] /= determinant
-    return determinant
-
-
-@njit(inline="always", error_model="numpy")
-def _clash(before, i, after, j, chain):
-    """Whether hypotheses of past and future use one control point twice in one visit."""
-    for column, row in enumerate(before.window):
-        control = before.used[i, column]
-        for place, other in enumerate(after.window):
-            if control >= 0 and control == after.used[j, place]:
-                apart = abs(chain.gps_time[row] - chain.gps_time[other])
-                same_pass = chain.pass_number[row] == chain.pass_number[other]
-                if same_pass and apart <= chain.settings.visit_gap:
-                    return True
-    return False

@@ -1,8 +1,6 @@
 """Numbers that the matching rests on."""
 
-from collections import namedtuple
-from dataclasses import astuple, dataclass, fields
-from typing import Any
+from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
@@ -39,12 +37,4 @@ class Settings:
     smallest_rival: float = 0.001  # probability; from which a rival is named
 
 
-COMPILED: Any = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
-INNER: Any = {**COMPILED, "no_cpython_wrapper": True}  # called by compiled functions alone
 SETTINGS = Settings()
-_Tuple = namedtuple("_Tuple", [field.name for field in fields(Settings)])  # type: ignore[misc]
-
-
-def settings_tuple() -> Any:
-    """The settings as they are at this moment, as a tuple with names: compiled loops take that."""
-    return _Tuple(*astuple(SETTINGS))

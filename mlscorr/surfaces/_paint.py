@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from mlscorr.compiled_loops import loop
 from mlscorr.surfaces.settings import SETTINGS
 from mlscorr.survey import Columns, PointCloud, TieFeatures
 
@@ -61,7 +61,7 @@ def find_crossings(cloud: PointCloud, passes: np.ndarray, group: int) -> Crossin
     return crossings[(segment >= 0) & (time <= passes[segment, 1])]
 
 
-@njit(cache=True)
+@loop
 def bright_runs(xyz: np.ndarray, intensity: np.ndarray, limits: np.ndarray) -> np.ndarray:
     """Runs of points that are brighter than the level ground before and after them.
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from mlscorr.compiled_loops import loop
 from mlscorr.surfaces.places import block_chance, place_key
 from mlscorr.surfaces.settings import SETTINGS
 from mlscorr.survey import Columns, PointCloud
@@ -124,7 +124,7 @@ def _symmetric(products):
     return matrix
 
 
-@njit(cache=True, inline="always")
+@loop(inline="always")
 def _slot_of(cell, moment, table, keys):
     """Where the row of a key stands, or would stand, in an open hash table of a power of two."""
     mask = len(table) - 1
@@ -138,7 +138,7 @@ def _slot_of(cell, moment, table, keys):
     return slot
 
 
-@njit(cache=True)
+@loop
 def hash_rows(keys: np.ndarray, count: int, size: int) -> np.ndarray:
     """An open hash table of the first rows of keys.
 
@@ -156,7 +156,7 @@ def hash_rows(keys: np.ndarray, count: int, size: int) -> np.ndarray:
     return table
 
 
-@njit(cache=True)
+@loop
 def add_points(
     xyz: np.ndarray,
     gps_time: np.ndarray,
@@ -249,7 +249,7 @@ def add_points(
     return len(xyz), count
 
 
-@njit(cache=True, inline="always")
+@loop(inline="always")
 def _split(place, grid):
     """Key of the cell around a place, and the offset (m) of the place from its middle."""
     x = place[0] - grid[0]
@@ -265,7 +265,7 @@ def _split(place, grid):
     return cell, x, y, z
 
 
-@njit(cache=True, inline="always")
+@loop(inline="always")
 def _add_point(sums, since, x, y, z):
     """Add a point, so long after the beginning and so far from the middle, to its cell's sums."""
     sums[0] += 1.0
@@ -279,14 +279,14 @@ def _add_point(sums, since, x, y, z):
     sums[20] += since * z
 
 
-@njit(cache=True, inline="always")
+@loop(inline="always")
 def _add_difference(sums, x, y, z):
     """Add the step from the point before."""
     sums[11] += 1.0
     _add_products(sums, 12, x, y, z)
 
 
-@njit(cache=True, inline="always")
+@loop(inline="always")
 def _add_products(sums, column, x, y, z):
     """Add xx, xy, xz, yy, yz, zz to the columns from one on."""
     sums[column] += x * x
@@ -297,7 +297,7 @@ def _add_products(sums, column, x, y, z):
     sums[column + 5] += z * z
 
 
-@njit(cache=True, nogil=True)
+@loop
 def add_near_planes(
     local: np.ndarray,
     since: np.ndarray,

@@ -10,9 +10,9 @@ from collections.abc import Iterator
 from functools import cache
 
 import numpy as np
-from numba import njit
 from scipy.sparse import coo_array
 
+from mlscorr.compiled_loops import loop
 from mlscorr.targets.settings import SETTINGS
 
 EMPTY = -1
@@ -69,7 +69,7 @@ def _component_tree(xyz, level, link):
         yield number, np.sort(rows[level[rows] >= number])
 
 
-@njit(cache=True)
+@loop
 def _grow(xyz, level, brightest_first, voxel, keys_of, keys, number, limits):
     """Components as voxels join them from the brightest level down.
 
@@ -126,7 +126,7 @@ def _grow(xyz, level, brightest_first, voxel, keys_of, keys, number, limits):
     return entries[:length].copy(), place
 
 
-@njit(cache=True)
+@loop
 def _join(parent, chain, sums, box, voxel, beside):
     """Join the components of two voxels, the smaller's voxels behind the larger's."""
     a = root_of(parent, voxel)
@@ -139,13 +139,14 @@ def _join(parent, chain, sums, box, voxel, beside):
     parent[b] = a
     behind[last[a]] = b
     last[a] = last[b]
-    sums[:, a] += sums[:, b]
+    for row in range(2):
+        sums[row, a] += sums[row, b]
     for axis in range(3):
         box[0][axis, a] = min(box[0][axis, a], box[0][axis, b])
         box[1][axis, a] = max(box[1][axis, a], box[1][axis, b])
 
 
-@njit(cache=True)
+@loop
 def _places(parent, behind):
     """Place (v,) of each voxel when all components follow each other."""
     place_of = np.empty(len(parent), np.int64)
@@ -215,10 +216,16 @@ def connected(points: np.ndarray, link: float) -> np.ndarray:
         keys += cells
     del cells
     order = np.argsort(keys, kind="stable")
-    label = np.empty(len(keys), np.int32)
     steps = _offsets(len(shape)) @ np.cumprod([1, *shape[:0:-1]])[::-1]
     keys = keys[order]
-    label[order] = _labels(keys, steps[steps > 0])
+    is_first = np.diff(keys, prepend=keys[0] - 1) > 0
+    occupied = keys[is_first]
+    parent = np.arange(len(occupied))
+    _link(occupied, steps[steps > 0], parent)
+    number = np.cumsum(parent == np.arange(len(parent)), dtype=np.int32) - 1
+    voxel = np.cumsum(is_first, dtype=np.int32) - 1
+    label = np.empty(len(keys), np.int32)
+    label[order] = number[parent][voxel]
     return label
 
 
@@ -230,18 +237,10 @@ def _offsets(dimensions):
     return offsets[np.sum(offsets**2, axis=1) < 9]
 
 
-@njit(cache=True)
-def _labels(keys, steps):
-    """Component number (n,) of keys in increasing order, which these steps connect."""
-    voxel = np.empty(len(keys), np.int32)
-    occupied = np.empty_like(keys)
-    count = 0
-    for i in range(len(keys)):
-        if count == 0 or keys[i] != occupied[count - 1]:
-            occupied[count] = keys[i]
-            count += 1
-        voxel[i] = count - 1
-    parent = np.arange(count)
+@loop
+def _link(occupied, steps, parent):
+    """Give voxels (v,) by their rising keys the lowest of those that steps connect for a parent."""
+    count = len(occupied)
     for step in steps:
         above = 0
         for low in range(count):
@@ -254,16 +253,11 @@ def _labels(keys, steps):
                 a = root_of(parent, low)
                 b = root_of(parent, above)
                 parent[max(a, b)] = min(a, b)
-    number = np.empty(count, np.int32)
-    components = 0
-    for i in range(count):  # the root of each is the lowest of its voxels
-        is_root = parent[i] == i
-        number[i] = components if is_root else number[root_of(parent, i)]
-        components += is_root
-    return number[voxel]
+    for i in range(count):
+        parent[i] = root_of(parent, i)
 
 
-@njit(cache=True)
+@loop
 def root_of(parent: np.ndarray, i: int) -> int:
     """What stands for the component of i, with the way to it shortened.
 
@@ -279,7 +273,7 @@ def root_of(parent: np.ndarray, i: int) -> int:
     return i
 
 
-@njit(cache=True)
+@loop
 def number_voxels(xyz: np.ndarray, low: np.ndarray, edge: float) -> tuple[np.ndarray, ...]:
     """Number the occupied cubes.
 
@@ -348,7 +342,7 @@ def sort_by_voxel(cell: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]
     return matrix.indices, matrix.indptr
 
 
-@njit  # numba can't call a generator that it read from its cache
+@loop(cache=False)  # numba can't call a generator that it read from its cache
 def neighbours(key: int, keys: np.ndarray, number: np.ndarray) -> Iterator[int]:
     """Numbers of the occupied cubes among the 27 about a key.
 
@@ -368,7 +362,7 @@ def neighbours(key: int, keys: np.ndarray, number: np.ndarray) -> Iterator[int]:
                         yield number[slot]
 
 
-@njit(cache=True)
+@loop
 def key_of(x: float, y: float, z: float, edge: float) -> np.int64:
     """Key of the cube that holds a place.
 
@@ -380,7 +374,7 @@ def key_of(x: float, y: float, z: float, edge: float) -> np.int64:
     return (np.int64(x / edge) << 42) | (np.int64(y / edge) << 21) | np.int64(z / edge)
 
 
-@njit(cache=True)
+@loop
 def _slot(keys, key):
     """Where a key stands, or would stand, in an open hash table of a power of two."""
     mask = len(keys) - 1

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numba import njit
 
+from mlscorr.compiled_loops import loop
 from mlscorr.targets._plane import Plane
 from mlscorr.targets.scanner_path import ScannerPath
 from mlscorr.targets.shapes import BRIGHT, DARK, MISS
@@ -76,7 +76,7 @@ def beams_at_plane(
     return points, np.where(on_plane, state, MISS), rows
 
 
-@njit(cache=True, error_model="numpy")
+@loop
 def _beams_near(xyz, gps_time, path, tolerance, place):
     """Rows (k,) of these beams, and which of them ended on the plane: thousands of calls look."""
     origin, axes, middle, radius = place
@@ -88,7 +88,8 @@ def _beams_near(xyz, gps_time, path, tolerance, place):
     above = np.zeros(len(epochs))
     epoch = 0
     for i in range(3):
-        above += (scanner[:, i] - origin[i]) * axes[2, i]
+        for k in range(len(epochs)):
+            above[k] += (scanner[k, i] - origin[i]) * axes[2, i]
     for row in range(len(xyz)):
         while epoch < len(epochs) - 2 and epochs[epoch + 1] <= gps_time[row]:
             epoch += 1

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from numba import njit
 
+from mlscorr.compiled_loops import loop
 from mlscorr.io import SETTINGS as IO
 from mlscorr.matching import SETTINGS as MATCHING
 from mlscorr.survey import ControlPoints, PointCloud, Survey
@@ -211,7 +211,7 @@ def _reaching(first, last, shape):
     return starts, ball[np.argsort(cell, kind="stable")]
 
 
-@njit(cache=True)
+@loop
 def _enter(xyz, raster, position, squares, free, rows):
     """Enter the row of each point at the free place of each ball it is in, or count them alone
     where there is no room.

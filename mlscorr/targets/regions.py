@@ -8,8 +8,8 @@ octave above it are looked at (a component tree; Najman and Couprie 2006).
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from mlscorr.compiled_loops import loop
 from mlscorr.targets._clusters import (
     OCTAVE,
     key_of,
@@ -68,11 +68,12 @@ def bright_regions(xyz: np.ndarray, intensity: np.ndarray) -> list[BrightRegion]
     thick = SETTINGS.thickness
     long = 1 / SETTINGS.smallest_width
     limits = SETTINGS.smallest_count, np.sqrt(2) * SETTINGS.largest_size, thick, long
-    table = _component_tree(xyz[bright] - low, level[bright], SETTINGS.largest_size / 10, limits)
+    edge_of_voxel = SETTINGS.largest_size / 10
+    table, moments = _component_tree(xyz[bright] - low, level[bright], edge_of_voxel, limits)
     order, starts = sort_by_voxel(cell, len(keys_of))
     shape = thick, *SETTINGS.rim, SETTINGS.largest_ratio, SETTINGS.rim_places // 4
     grid = order, starts, keys, number, edge
-    likeness = _likeness(table, xyz, low, level, grid, shape, SETTINGS.piece_points)
+    likeness = _likeness(table[:, 0], moments, xyz, low, level, grid, shape, SETTINGS.piece_points)
     return _as_regions(table, *likeness.T, low)
 
 
@@ -82,7 +83,7 @@ def _levels(intensity):
     return np.floor(steps).astype(np.int8)[np.asarray(intensity).astype(np.uint16)]
 
 
-@njit(cache=True)
+@loop
 def _background(cell, keys_of, keys, number, level):
     """Level (c,) that a point must exceed to be bright, for each cell."""
     histogram = np.zeros((len(keys_of), LEVELS), np.int32)
@@ -91,12 +92,16 @@ def _background(cell, keys_of, keys, number, level):
     dark = np.empty(len(keys_of), np.int8)
     around = np.empty(LEVELS, np.int64)
     for c in range(len(keys_of)):
-        around[:] = 0
+        for step in range(LEVELS):
+            around[step] = 0
+        total = 0
         occupied = 0
         for near in neighbours(keys_of[c], keys, number):
-            around += histogram[near]
+            for step in range(LEVELS):
+                around[step] += histogram[near, step]
+                total += histogram[near, step]
             occupied += 1
-        half = around.sum() / 2
+        half = total / 2
         below = 0
         step = 0
         while below + around[step] < half:
@@ -107,37 +112,55 @@ def _background(cell, keys_of, keys, number, level):
     return dark
 
 
-@njit(cache=True)
 def _component_tree(local, level, edge, limits):
     """Components (k, 17) of bright points (n, 3) at each level, those that may be a target.
 
     Columns: level, points, low (3), high (3), sum (3), sum of products (xx, yy, zz, xy, xz, yz).
+    Their _moments come too.
     """
+    count, extent, thick, ratio = limits
     voxel, keys_of, keys, number = number_voxels(local, np.zeros(3), edge)
     n = len(keys_of)
     brightest = np.zeros(n, np.int64)
+    np.maximum.at(brightest, voxel, level)
     table = np.zeros((n, 17))
+    table[:, 1] = np.bincount(voxel, minlength=n)
     table[:, 2:5] = 1e12
     table[:, 5:8] = -1e12
-    for i in range(len(local)):
-        v = voxel[i]
-        brightest[v] = max(brightest[v], level[i])
-        table[v, 1] += 1
-        x = local[i, 0]
-        y = local[i, 1]
-        z = local[i, 2]
-        for axis in range(3):
-            table[v, 2 + axis] = min(table[v, 2 + axis], local[i, axis])
-            table[v, 5 + axis] = max(table[v, 5 + axis], local[i, axis])
-            table[v, 8 + axis] += local[i, axis]
-            table[v, 11 + axis] += local[i, axis] ** 2
-        table[v, 14] += x * y
-        table[v, 15] += x * z
-        table[v, 16] += y * z
+    for axis in range(3):
+        column = local[:, axis]
+        np.minimum.at(table[:, 2 + axis], voxel, column)
+        np.maximum.at(table[:, 5 + axis], voxel, column)
+        table[:, 8 + axis] = np.bincount(voxel, column, n)
+        table[:, 11 + axis] = np.bincount(voxel, column**2, n)
+    for column, (i, j) in zip((14, 15, 16), ((0, 1), (0, 2), (1, 2)), strict=True):
+        table[:, column] = np.bincount(voxel, local[:, i] * local[:, j], n)
+    order = np.argsort(-brightest, kind="stable")
+    table = _joined(table, brightest, order, keys_of, keys, number, count, extent)
+    mean, sigma, axes = _moments(table)
+    may_be = (sigma[:, 0] < thick) & (sigma[:, 1] > thick) & (sigma[:, 2] < ratio * sigma[:, 1])
+    return table[may_be], (mean[may_be], sigma[may_be], axes[may_be])
+
+
+def _moments(table):
+    """Means (k, 3), standard deviations (k, 3) along axes, and axes (k, 3, 3) as columns."""
+    mean = table[:, 8:11] / table[:, 1:2]
+    products = table[:, [11, 14, 15, 14, 12, 16, 15, 16, 13]].reshape(-1, 3, 3)
+    spread = products / table[:, 1, None, None] - mean[:, :, None] * mean[:, None]
+    values, axes = np.linalg.eigh(spread)
+    return mean, np.sqrt(np.maximum(values, 0.0)), axes
+
+
+@loop
+def _joined(table, brightest, order, keys_of, keys, number, smallest, largest):
+    """Rows (k, 17) of the components of voxels, of enough points and not too large, at each level.
+
+    A component that a level adds to has a voxel of that level, which no other one has.
+    """
+    n = len(order)
     parent = np.full(n, -1)
-    order = np.argsort(-brightest, kind="mergesort")
     touched = np.full(n, -1)
-    result = np.empty((3 * n + 16, 17))
+    result = np.empty((n, 17))
     count = 0
     first = 0
     while first < n:
@@ -152,16 +175,22 @@ def _component_tree(local, level, edge, limits):
             end += 1
         for k in range(first, end):
             root = root_of(parent, order[k])
-            if touched[root] != now and count < len(result) and _may_be_target(table[root], limits):
-                result[count] = table[root]
-                result[count, 0] = now
-                count += 1
+            if touched[root] == now:
+                continue
             touched[root] = now
+            extent = 0.0
+            for axis in range(3):
+                extent = max(extent, table[root, 5 + axis] - table[root, 2 + axis])
+            if table[root, 1] >= smallest and extent <= largest:
+                result[count, 0] = now
+                for column in range(1, 17):
+                    result[count, column] = table[root, column]
+                count += 1
         first = end
     return result[:count].copy()
 
 
-@njit(cache=True)
+@loop
 def _join(parent, table, voxel, beside):
     """Join the components of two voxels."""
     a = root_of(parent, voxel)
@@ -177,35 +206,8 @@ def _join(parent, table, voxel, beside):
         table[a, column] += table[b, column]
 
 
-@njit(cache=True)
-def _moments(row):
-    """Mean (3,), standard deviations (3,) along axes, and axes (3, 3) as columns."""
-    n = row[1]
-    mean = row[8:11] / row[1]
-    spread = np.empty((3, 3))
-    for axis in range(3):
-        spread[axis, axis] = row[11 + axis] / n - mean[axis] ** 2
-    spread[0, 1] = spread[1, 0] = row[14] / n - mean[0] * mean[1]
-    spread[0, 2] = spread[2, 0] = row[15] / n - mean[0] * mean[2]
-    spread[1, 2] = spread[2, 1] = row[16] / n - mean[1] * mean[2]
-    values, axes = np.linalg.eigh(spread)
-    return mean, np.sqrt(np.maximum(values, 0.0)), axes
-
-
-@njit(cache=True)
-def _may_be_target(row, limits):
-    """Whether a component is compact, flat, and not a strip."""
-    count, extent, thick, ratio = limits
-    if row[1] < count:
-        return False
-    if max(row[5] - row[2], row[6] - row[3], row[7] - row[4]) > extent:
-        return False
-    _, sigma, _ = _moments(row)
-    return sigma[0] < thick and sigma[1] > thick and sigma[2] < ratio * sigma[1]
-
-
-@njit(cache=True)
-def _likeness(table, xyz, low, level, grid, shape, largest):
+@loop
+def _likeness(levels, moments, xyz, low, level, grid, shape, largest):
     """How far each component agrees with a disc, a square or a checkerboard, and the level from
     which it does best: (k, 2).
 
@@ -213,18 +215,21 @@ def _likeness(table, xyz, low, level, grid, shape, largest):
     """
     order, starts, keys, number, edge = grid
     thick, end, border, ratio, directions = shape
-    result = np.zeros((len(table), 2))
+    means, sigmas, all_axes = moments
+    result = np.zeros((len(levels), 2))
     uv = np.empty((largest, 2))
     level_of = np.empty(largest, np.int8)
-    for k in range(len(table)):
-        row = table[k]
-        mean, sigma, axes = _moments(row)
-        corner = np.sqrt(6.0) * sigma[2]  # of a square, if this is one
+    bright = np.empty(largest, np.bool_)
+    for k in range(len(levels)):
+        mean = means[k]
+        axes = all_axes[k]
+        corner = np.sqrt(6.0) * sigmas[k, 2]  # of a square, if this is one
         around = border * corner
         n = 0
         middle = key_of(mean[0], mean[1], mean[2], edge)
         for near in neighbours(middle, keys, number):
-            for i in order[starts[near] : starts[near + 1]]:
+            for place in range(starts[near], starts[near + 1]):
+                i = order[place]
                 x = xyz[i, 0] - low[0] - mean[0]
                 y = xyz[i, 1] - low[1] - mean[1]
                 z = xyz[i, 2] - low[2] - mean[2]
@@ -236,11 +241,12 @@ def _likeness(table, xyz, low, level, grid, shape, largest):
                     level_of[n] = level[i]
                     n += 1
         for step in range(2):  # a voxel takes the level of its brightest point, others are below
-            bright = level_of[:n] >= row[0] - step
-            share = jaccard_index(uv[:n], bright, end * corner, ratio, directions)
+            for i in range(n):
+                bright[i] = level_of[i] >= levels[k] - step
+            share = jaccard_index(uv[:n], bright[:n], end * corner, ratio, directions)
             if share > result[k, 0]:
                 result[k, 0] = share
-                result[k, 1] = row[0] - step
+                result[k, 1] = levels[k] - step
     return result
 
 
@@ -265,7 +271,7 @@ def _as_regions(table, likeness, level, low):
     return [BrightRegion(low + middle[k], radius[k], threshold[k], likeness[k]) for k in kept]
 
 
-@njit(cache=True)
+@loop
 def jaccard_index(
     uv: np.ndarray, bright: np.ndarray, longest: float, largest_ratio: float, directions: int
 ) -> float:
@@ -283,7 +289,9 @@ def jaccard_index(
     directions : int
         In which it is measured.
     """
-    spanned = bright & (uv[:, 0] ** 2 + uv[:, 1] ** 2 <= longest**2)
+    spanned = np.empty(len(uv), np.bool_)
+    for i in range(len(uv)):
+        spanned[i] = bright[i] and uv[i, 0] ** 2 + uv[i, 1] ** 2 <= longest**2
     best_area = np.inf
     turn = 0.0
     diameter = 0.0
@@ -323,10 +331,13 @@ def jaccard_index(
         for shape in range(first, 4):
             both[shape] += inside[shape] and bright[i]
             either[shape] += inside[shape] or bright[i]
-    return (both / np.maximum(either, 1.0)).max()
+    share = 0.0
+    for shape in range(first, 4):
+        share = max(share, both[shape] / max(either[shape], 1.0))
+    return share
 
 
-@njit(cache=True)
+@loop
 def _extent(uv, bright, angle):
     """Bounds of the bright points along a direction and across it."""
     low_x = np.inf

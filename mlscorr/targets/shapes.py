@@ -7,9 +7,9 @@ that a ring's dark inner disc takes, 0 for none).
 from functools import cache
 
 import numpy as np
-from numba import njit
 from scipy.special import ndtr
 
+from mlscorr.compiled_loops import loop
 from mlscorr.targets.settings import SETTINGS
 
 # what a beam did at the plane: went by, met dark, met bright
@@ -80,7 +80,7 @@ def form_of(kind: str, by_edges: bool) -> int:
     return FORMS[kind]
 
 
-@njit(cache=True)
+@loop
 def _within(x, y, half, inner, form):
     """Distance (m) inside the outline of a place in the shape's own axes, negative outside."""
     if form == WHITE:
@@ -95,7 +95,7 @@ def _within(x, y, half, inner, form):
     return half - radius
 
 
-@njit(cache=True)
+@loop
 def distance_inside(points: np.ndarray, outline: np.ndarray, form: int) -> np.ndarray:
     """Distance (n,) of points inside an outline, negative outside. Units: m.
 
@@ -128,7 +128,7 @@ def _tables(wrong):
     return share, np.log(share)
 
 
-@njit(cache=True)
+@loop
 def _from_table(table, distance, width):
     """Value at a distance inside the outline: quick where it is constant, nearly everywhere."""
     if distance > TABLE_SIGMAS * width:
@@ -164,7 +164,7 @@ def log_likelihood(
     return _log_likelihood(points, side, outlines, form, width, *_tables(SETTINGS.wrong_side))
 
 
-@njit(cache=True)
+@loop
 def _log_likelihood(points, side, outlines, form, width, share, log_share):
     result = np.zeros(len(outlines))
     for c in range(len(outlines)):

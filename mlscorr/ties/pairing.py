@@ -3,9 +3,9 @@
 from dataclasses import replace
 
 import numpy as np
-from numba import njit
 from scipy.spatial import cKDTree
 
+from mlscorr.compiled_loops import loop
 from mlscorr.surfaces import direction_class, integer_hash, kind_number
 from mlscorr.survey import PAINTED, TIE_KINDS, TieFeatures, Ties
 from mlscorr.ties.settings import SETTINGS
@@ -310,7 +310,7 @@ def _attitude(features):
     return attitude + 4.0 * kind_number(features)[:, None]
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _pairs_near(cells, edge, visit, number, side, views, limits):
     """Pairs within the limits, each as first * n + second, and their distances.
 
@@ -361,7 +361,7 @@ def _pairs_near(cells, edge, visit, number, side, views, limits):
     return np.array(pairs), np.array(distances)
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _distance(views, first, second, limits):
     """Distance of a pair of features in units of gate and cell; infinite if it is none."""
     points, shift, direction, kinds, gps_time, scanner, extent, noise, variances = views

@@ -29,7 +29,7 @@ def test_between_knots_a_step_apart_little_is_left(family, time):
     epochs = np.array([0.0, 0.25, 0.5, 0.75, 1.0]) * step
     knots = Knots(np.array([0, 2]), epochs[[0, -1]], epochs[[0, -1]], np.array([[[0, 1]]]))
     cell = np.zeros(5, dtype=np.int64)
-    _, remaining = knot_gains(layout, knots, cell, epochs[:, None], np.arange(5))
+    _, remaining = knot_gains(layout, knots, cell, epochs[:, None])
     assert np.sqrt(remaining.max()) == pytest.approx(SHARE, rel=0.1)
     assert np.argmax(remaining) == 2
 

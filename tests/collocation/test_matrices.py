@@ -5,13 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mlscorr.collocation._matrices import (
-    make_symmetric,
-    multiply,
-    multiply_transposed,
-    subtract_product,
-    whitening_root,
-)
+from mlscorr.collocation._matrices import multiply, multiply_transposed, whitening_root
 
 SHAPES = [(1, 1, 1), (3, 6, 1), (2, 3, 4), (6, 6, 6), (3, 0, 2)]
 sizes = st.integers(1, 5)
@@ -19,29 +13,12 @@ sizes = st.integers(1, 5)
 
 @pytest.mark.parametrize("rows, inner, columns", SHAPES)
 def test_products_are_those_of_matrices(rows, inner, columns):
-    "A b, a^T b and x - a b^T to the last digits, in shapes of no, one and several elements"
+    "A b and a^T b to the last digits, in shapes of no, one and several elements"
     rng = np.random.default_rng(rows + 10 * inner)
     a = rng.normal(size=(rows, inner))
     b = rng.normal(size=(inner, columns))
     np.testing.assert_allclose(multiply(a, b), a @ b, atol=1e-14)
     np.testing.assert_allclose(multiply_transposed(a.T.copy(), b), a @ b, atol=1e-14)
-    x = rng.normal(size=(rows, columns))
-    left = x.copy()
-    subtract_product(left, a, b)
-    np.testing.assert_allclose(left, x - a @ b, atol=1e-14)
-
-
-@settings(max_examples=50, deadline=None)
-@given(size=sizes, seed=st.integers(0, 10_000))
-def test_what_is_made_symmetric_is_the_symmetric_part(size, seed):
-    "(x + x^T) / 2, whatever x is; twice is once"
-    x = np.random.default_rng(seed).normal(size=(size, size))
-    part = x.copy()
-    make_symmetric(part)
-    np.testing.assert_allclose(part, (x + x.T) / 2, atol=1e-15)
-    again = part.copy()
-    make_symmetric(again)
-    np.testing.assert_array_equal(again, part)
 
 
 @settings(max_examples=100, deadline=None)

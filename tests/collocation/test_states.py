@@ -7,13 +7,10 @@ from scipy.linalg import block_diag
 from mlscorr.collocation import Covariance, Signal
 from mlscorr.collocation._states import (
     Layout,
-    add_blocks,
     carry,
-    carry_square,
+    dense_blocks,
     fill_noise,
     fill_transition,
-    observe,
-    send_back,
 )
 from tests.collocation.joint_states import ALL_FAMILIES, Bed, carried, stationary
 
@@ -22,15 +19,15 @@ BEDS = [Bed(seed) for seed in range(3)] + [Bed(9, (family,) * 3) for family in A
 
 
 def transitions(bed, lag):
-    out = np.zeros((3, 3, 3))
-    fill_transition(bed.layout, np.full(3, lag), out)
-    return out
+    out = np.zeros((1, 3, 3, 3))
+    fill_transition(bed.layout, np.full((1, 3), lag), out)
+    return out[0]
 
 
 def noises(bed, lag):
-    out = np.zeros((3, 3, 3))
-    fill_noise(bed.layout, np.full(3, lag), out)
-    return out
+    out = np.zeros((1, 3, 3, 3))
+    fill_noise(bed.layout, np.full((1, 3), lag), out)
+    return out[0]
 
 
 def test_the_layout_counts_states_of_processes():
@@ -69,7 +66,7 @@ def test_time_carries_by_the_matrix_exponential(bed, lag):
 @pytest.mark.parametrize("transposed", [False, True])
 @pytest.mark.parametrize("bed", BEDS, ids=lambda bed: "-".join(bed.families))
 def test_all_states_are_carried_at_once(bed, transposed):
-    "F x, F^T x and F x F^T block by block are the products with the whole matrix"
+    "F x and F^T x block by block are the products with the whole matrix"
     rng = np.random.default_rng(1)
     f = bed.transition(7.0)
     f = f.T if transposed else f
@@ -78,12 +75,7 @@ def test_all_states_are_carried_at_once(bed, transposed):
     moved = x.copy()
     carry(bed.layout, blocks, moved, transposed)
     np.testing.assert_allclose(moved, f @ x, atol=1e-12)
-    a = rng.normal(size=(bed.layout.size, bed.layout.size))
-    square = a @ a.T
-    before = (a @ a.T).copy()
-    result = carry_square(bed.layout, blocks, square, transposed)
-    np.testing.assert_allclose(result, f @ square @ f.T, atol=1e-11)
-    np.testing.assert_array_equal(square, before)
+    assert dense_blocks(bed.layout, blocks[None])[0] == pytest.approx(bed.transition(7.0))
 
 
 def test_two_steps_are_a_long_one():
@@ -97,28 +89,12 @@ def test_two_steps_are_a_long_one():
         np.testing.assert_allclose(x, long, atol=1e-13)
 
 
-def test_noise_is_added_to_each_process_alone():
-    "Blocks go to the diagonal, of each process's size; what stands between processes stays"
+def test_noise_stands_in_the_block_of_each_process_alone():
+    "Blocks stand on the diagonal, of each process's size; zeros between processes"
     for bed in BEDS:
-        spread = noises(bed, np.inf)
-        x = np.ones((bed.layout.size, bed.layout.size))
-        add_blocks(bed.layout, spread, x)
+        spread = dense_blocks(bed.layout, noises(bed, np.inf)[None])[0]
         expected = block_diag(*(stationary(family) for family in bed.processes))
-        np.testing.assert_allclose(x - 1.0, expected, atol=1e-12)
-
-
-def test_observations_see_the_first_state_of_each_process():
-    "H x and x + H^T y are those of the matrix that has B in the columns of first states"
-    for bed in BEDS:
-        rng = np.random.default_rng(3)
-        r = bed.mixing.shape[1]
-        h = bed.observing[:r, : bed.layout.size]
-        x = rng.normal(size=(bed.layout.size, 3))
-        y = rng.normal(size=(r, 3))
-        np.testing.assert_allclose(observe(bed.layout.first, bed.mixing[0], x), h @ x, atol=1e-13)
-        back = x.copy()
-        send_back(bed.layout.first, bed.mixing[0], y, back)
-        np.testing.assert_allclose(back, x + h.T @ y, atol=1e-13)
+        np.testing.assert_allclose(spread, expected, atol=1e-12)
 
 
 def test_a_process_knows_itself_by_its_covariance_function():
@@ -127,9 +103,11 @@ def test_a_process_knows_itself_by_its_covariance_function():
         covariance = Covariance(family, 12.0)
         layout = Layout.of([Signal(np.ones((1, 1, 1)), covariance)])
         for lag in LAGS:
-            f = np.zeros((1, 3, 3))
-            p = np.zeros((1, 3, 3))
-            fill_transition(layout, np.array([lag]), f)
-            fill_noise(layout, np.array([np.inf]), p)
+            f = np.zeros((1, 1, 3, 3))
+            p = np.zeros((1, 1, 3, 3))
+            fill_transition(layout, np.array([[lag]]), f)
+            fill_noise(layout, np.array([[np.inf]]), p)
             d = covariance.states
-            assert (f[0, :d, :d] @ p[0, :d, :d])[0, 0] == pytest.approx(covariance(lag), abs=1e-12)
+            assert (f[0, 0, :d, :d] @ p[0, 0, :d, :d])[0, 0] == pytest.approx(
+                covariance(lag), abs=1e-12
+            )

@@ -15,7 +15,6 @@ from mlscorr.matching._beliefs import Chain, build_chain
 from mlscorr.matching._hypotheses import predict, start
 from mlscorr.matching._marginals import join, marginals, use
 from mlscorr.matching._pairs import CandidatePairs, find_pairs
-from mlscorr.matching.settings import settings_tuple
 from mlscorr.pos import PosErrors
 from mlscorr.survey import SEARCH_RADIUS, Pos
 from tests.matching.test_association import (
@@ -167,7 +166,6 @@ def small_chain(rng):
         pairs=pairs,
         pair_variance=np.full((8, 3), 0.01**2),
         moved_share=np.full(8, SETTINGS.moved_share),
-        settings=settings_tuple(),
     )
 
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 from scipy.spatial import cKDTree
 
+from mlscorr.compiled_loops import loop
 from mlscorr.gap.closure._settings import SETTINGS
 from mlscorr.gap.residuals import SETTINGS as OBSERVE
 from mlscorr.gap.residuals import Rows
@@ -290,7 +290,7 @@ def _extent(target, apart):
     return SETTINGS.around * target.size + SETTINGS.search_margin + apart
 
 
-@njit(cache=True)
+@loop
 def _passing_any(start, end, place, squared_extent):
     """Which beams (n,) from start to end (n, 3) pass one of the places (k, 3), or would."""
     near = np.zeros(len(start), np.bool_)

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from mlscorr.compiled_loops import loop
 from mlscorr.gap.evidence.observations import ErrorModel, Observations
 from mlscorr.gap.evidence.settings import SETTINGS
 from mlscorr.gap.residuals import Rows
@@ -111,7 +111,7 @@ def fit_mixture(
     return MixtureFit(*_fit(columns, variance, density, *SETTINGS.odd_shares).T)
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _fit(columns, variance, density, smallest, first, largest):
     """Rows of log likelihood, offset, weight, share, by expectation and maximisation."""
     k, q = columns.shape

@@ -20,8 +20,8 @@ from typing import BinaryIO, NamedTuple
 
 import lazrs
 import numpy as np
-from numba import njit
 
+from mlscorr.compiled_loops import loop
 from mlscorr.io.clouds.las_checks import ENTRY, EVLR_HEADER, INFO, evlrs
 from mlscorr.io.clouds.las_crs import cloud_box
 from mlscorr.io.clouds.las_layout import (
@@ -173,7 +173,7 @@ class _Node:
             yield self.key, records
 
 
-@njit(cache=True)
+@loop
 def _sample(places, shift, is_taken):
     """Which points (n,) are the first of their cell, which is then taken."""
     chosen = np.zeros(len(places), np.bool_)

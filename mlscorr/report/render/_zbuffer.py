@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from mlscorr.compiled_loops import loop
 from mlscorr.report.render.view import Camera
 
 DEEPEST = 20_000.0  # m before and behind the focus
@@ -121,7 +121,7 @@ class Canvas:
         return _light(self.pixels, self.camera.scale * DEPTH_STEP)
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _draw(xyz, value, focus, axes, scale, distance, half_depth, pixels):
     height, width = pixels.shape
     for p in range(xyz.shape[0]):
@@ -147,7 +147,7 @@ def _draw(xyz, value, focus, axes, scale, distance, half_depth, pixels):
         pixels[i, j] = min(pixels[i, j], key)
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _grow(pixels, disc, grown):
     height, width = pixels.shape
     for i in range(height):
@@ -162,7 +162,7 @@ def _grow(pixels, disc, grown):
                     grown[row, column] = key
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _light(pixels, pixels_per_step):
     deepest = 3.0  # pixels of depth beyond which an edge is not darker; half of it is no edge
     height, width = pixels.shape

@@ -9,8 +9,8 @@ from functools import cached_property
 from math import sqrt
 
 import numpy as np
-from numba import njit
 
+from mlscorr.compiled_loops import loop
 from mlscorr.simulate.scan.rays import Rays
 from mlscorr.simulate.scan.threads import Workspace, in_slices
 from mlscorr.simulate.scene import Mesh
@@ -114,7 +114,7 @@ class Surfaces:
         return Hits(*whole[0].T, *whole[1:], pulse)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@loop(inline="always")
 def _meet(rays, p, x, y, z, planes, t, grazing, fading, max_range):
     """Range, cosine of incidence and strength where a direction from a ray's start meets a plane.
 
@@ -133,7 +133,7 @@ def _meet(rays, p, x, y, z, planes, t, grazing, fading, max_range):
     return distance, abs(slope), planes[t, 4] * abs(slope) / spread
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _thin(rays, triangle, met, hit, point, origin, planes, grazing, fading, max_range):
     for p in range(len(rays)):
         x = rays[p, 3]
@@ -155,7 +155,7 @@ def _thin(rays, triangle, met, hit, point, origin, planes, grazing, fading, max_
         point[p, 2] = origin[2] + (rays[p, 2] + away * z)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@loop(inline="always")
 def _sub_ray(rays, p, u, v):
     """Unit direction (3,) of a sub-ray, u along the sweep and v across it. Units: rad."""
     dx = rays[p, 3]
@@ -171,7 +171,7 @@ def _sub_ray(rays, p, u, v):
     return x / length, y / length, z / length
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _fan(rays, fan, offsets):
     for p in range(len(rays)):
         for k in range(len(offsets)):
@@ -183,7 +183,7 @@ def _fan(rays, fan, offsets):
             fan[p, k, 5] = z
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _wide(
     rays,
     triangle,
@@ -238,7 +238,7 @@ def _wide(
     return pulse[:count], later[:count], later_hit[:count]
 
 
-@njit(cache=True, nogil=True, inline="always")
+@loop(inline="always")
 def _parts(rays, p, triangle, offsets, power, planes, grazing, fading, max_range, parts):
     """What each sub-ray meets, nearest first: rows range, incidence, strength, triangle."""
     filled = 0
@@ -265,7 +265,7 @@ def _parts(rays, p, triangle, offsets, power, planes, grazing, fading, max_range
     return filled
 
 
-@njit(cache=True, nogil=True, inline="always")
+@loop(inline="always")
 def _echo(parts, start, filled, pulse_length):
     """The echo that starts with a part: the row after it, range, incidence, strength, triangle.
 

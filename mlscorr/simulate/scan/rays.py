@@ -10,8 +10,8 @@ from functools import cached_property
 from math import cos, sin
 
 import numpy as np
-from numba import njit
 
+from mlscorr.compiled_loops import loop
 from mlscorr.simulate.scan.threads import Workspace, in_slices
 from mlscorr.survey import Columns, Mounting, Trajectory
 
@@ -194,7 +194,7 @@ class Platform:
         return xyz
 
 
-@njit(cache=True, nogil=True, inline="always")
+@loop(inline="always")
 def _times(m, x, y, z):
     """Matrix (3, 3) times vector."""
     return (
@@ -204,7 +204,7 @@ def _times(m, x, y, z):
     )
 
 
-@njit(cache=True, nogil=True, inline="always")
+@loop(inline="always")
 def _sine(angle):
     """Sine, and 1 - cosine: by their series for the small turns from one epoch to the next."""
     if abs(angle) > 0.02:  # rad, where the first term that is left out is 1e-16 of the result
@@ -216,7 +216,7 @@ def _sine(angle):
     )
 
 
-@njit(cache=True, nogil=True, inline="always")
+@loop(inline="always")
 def _turn(table, i, s, c, x, y, z):
     """R Exp(angle axis) times a vector, with s, c the angle's sine and 1 - cosine (Rodrigues)."""
     kx = table[i, 12]
@@ -238,13 +238,13 @@ def _turn(table, i, s, c, x, y, z):
     )
 
 
-@njit(cache=True, nogil=True, inline="always")
+@loop(inline="always")
 def _position(table, i, weight, axis):
     """Position on one axis between two epochs."""
     return table[i, axis] + weight * (table[i + 1, axis] - table[i, axis])
 
 
-@njit(cache=True, nogil=True, inline="always")
+@loop(inline="always")
 def _walk(epochs, time, i):
     """Index of the step that holds a time, from that of the time before."""
     while i < epochs.size - 2 and time > epochs[i + 1]:
@@ -254,7 +254,7 @@ def _walk(epochs, time, i):
     return i
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _aim(
     number,
     gps_time,
@@ -307,7 +307,7 @@ def _aim(
             slot = 0
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _place(gps_time, angle, elevation, distance, xyz, origin, epochs, table, boresight, lever):
     if gps_time.size == 0:
         return

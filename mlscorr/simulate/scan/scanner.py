@@ -15,9 +15,9 @@ from dataclasses import dataclass, fields
 from functools import partial
 
 import numpy as np
-from numba import njit
 from numpy.random import Generator
 
+from mlscorr.compiled_loops import loop
 from mlscorr.frames import from_polar
 from mlscorr.simulate.scan.echoes import POWER, Hits, Surfaces
 from mlscorr.simulate.scan.rays import Platform, Turn
@@ -247,7 +247,7 @@ class ScannerNoise:
         return intensity
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _receive(strength, speckle, intensity):
     for p in range(strength.size):
         received = FULL_SCALE * strength[p] * max(1.0 + speckle[p], 0.0)
