@@ -89,7 +89,7 @@ def mounting_prior(equations: Equations) -> Prior:
 def _prior(equations, time, attitude_follows):
     start = {
         "drift_time": time,
-        "jitter_time": equations.interval,  # correlated over one interval
+        "jitter_time": min(equations.interval, SETTINGS.jitter_time),
         "bias_time": time,
         "attitude_time": SETTINGS.attitude_time,
         "walk_scale": SETTINGS.walk_scale,

@@ -48,7 +48,15 @@ def test_drift_is_correlated_over_four_control_intervals(n):
     interval = 194.0 / (n - 1)
     assert start(prior, "drift_time") == pytest.approx(4.0 * interval, rel=1e-6)
     assert start(prior, "bias_time") == pytest.approx(4.0 * interval, rel=1e-6)
-    assert start(prior, "jitter_time") == pytest.approx(interval, rel=1e-6)
+
+
+@pytest.mark.parametrize("interval", [40.0, 2.0])
+def test_noise_of_gnss_lasts_seconds_between_any_control(interval):
+    "It lasts 3 s however far apart control points are, and one interval where they are closer"
+    times = 3.0 + interval * np.arange(5)
+    case = Case(EPOCHS, CONSTANT, times, np.random.default_rng(1), np.full((len(EPOCHS), 3), 0.02))
+    equations = position_equations(case.recorded, case.matched, Pos(), 0, position_prior)
+    assert start(position_prior(equations), "jitter_time") == pytest.approx(min(interval, 3.0))
 
 
 def test_without_sigmas_the_believed_time_holds():
