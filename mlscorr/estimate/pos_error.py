@@ -13,7 +13,12 @@ from threadpoolctl import threadpool_limits
 from mlscorr.collocation import Collocation
 from mlscorr.correction import Correction
 from mlscorr.estimate._prediction import GridPredictions, pose_rows, predict_pose_error
-from mlscorr.estimate._runs import find_windows, weighed_refusals, with_windows
+from mlscorr.estimate._runs import (
+    doubtful_drift,
+    find_windows,
+    weighed_refusals,
+    with_windows,
+)
 from mlscorr.estimate._tie_equations import TieEquations
 from mlscorr.estimate._wording import sentences_of
 from mlscorr.estimate.equations import (
@@ -27,7 +32,12 @@ from mlscorr.estimate.guards import Guards, find_guards, guard_warnings, sparse_
 from mlscorr.estimate.inputs import checked_inputs, filled_sigmas
 from mlscorr.estimate.mounting import prior_sigma
 from mlscorr.estimate.outages import with_drift_history
-from mlscorr.estimate.posterior import Objective, most_probable, position_prior
+from mlscorr.estimate.posterior import (
+    Objective,
+    drifting_prior,
+    most_probable,
+    position_prior,
+)
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.signals import SignalParameters
 from mlscorr.estimate.support import Support, find_support
@@ -196,7 +206,8 @@ def estimate_correction(
         *(window.statement for window in windows),
         *sparse_warnings(kept, order),
     )
-    return _estimate(trajectory, matched.name, GridPredictions(kept), screening, notes)
+    doubt = doubtful_drift(equations, screening)
+    return _estimate(trajectory, matched.name, GridPredictions(kept), screening, notes, doubt)
 
 
 def _screened(trajectory, matched, pos, order):
@@ -218,6 +229,7 @@ def _screened(trajectory, matched, pos, order):
         more = find_windows(equations, screening)
         if not more:
             break
+    plain = replace(plain, prior=drifting_prior)
     weighed = weighed_refusals(equations, plain, screening, len(windows))
     if screening.outliers and not weighed.outliers:
         return plain, weighed, ()
@@ -319,8 +331,11 @@ def _tie_equations(equations, ties, mountings):
     return with_mountings(equations, nothing, np.zeros(len(sigma)), sigma), rows
 
 
-def _estimate(trajectory, names, predictions, screening, notes):
-    """The Estimate by equations, as predictions have them, and the parameters chosen for them."""
+def _estimate(trajectory, names, predictions, screening, notes, doubt=None):
+    """The Estimate by equations, as predictions have them, and the parameters chosen for them.
+
+    A doubt (n, 3; m) adds to the position's covariance, as doubtful_drift has it.
+    """
     kept = predictions.equations
     posterior = screening.posterior
     used = np.isin(np.asarray(names, dtype=object), kept.names)
@@ -329,8 +344,10 @@ def _estimate(trajectory, names, predictions, screening, notes):
     left_out = np.full((len(names), 3), np.nan)
     if len(kept.target_rows) > 1:
         left_out[used] = leave_targets_out(kept, solved)
-    pose_error = predict_pose_error(kept, posterior, predictions, solved)
-    correction = Correction.by_pose_error(trajectory, *pose_error)
+    pose, covariance = predict_pose_error(kept, posterior, predictions, solved)
+    if doubt is not None:
+        covariance[:, :3, :3] += doubt[:, :, None] * doubt[:, None, :]
+    correction = Correction.by_pose_error(trajectory, pose, covariance)
     return Estimate(
         correction=correction,
         equations=kept,

@@ -7,7 +7,7 @@ whose mode and spread (Laplace, importance sampling) stand for the parameters in
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from scipy.linalg import cholesky
@@ -71,6 +71,20 @@ def position_prior(equations: Equations) -> Prior:
     if equations.trajectory.position_sigma is None:
         time = equations.pos.correlation_time
     return _prior(equations, time, attitude_follows=True)
+
+
+def drifting_prior(equations: Equations) -> Prior:
+    """Prior of a correction where the POS drifts between control points without stating it.
+
+    What control points differ by is drift then, whatever its size, and no noise of GNSS.
+
+    Parameters
+    ----------
+    equations : Equations
+    """
+    prior = position_prior(equations)
+    is_drift = ~np.isin(prior.free, [NAMES.index("jitter_scale"), NAMES.index("jitter_time")])
+    return replace(prior, free=prior.free[is_drift], spread=prior.spread[is_drift])
 
 
 def mounting_prior(equations: Equations) -> Prior:
