@@ -160,6 +160,8 @@ class DriftHistory:
         Of the size of all axes; noise of single epochs counts for nothing.
         """
         time = self.trajectory.gps_time
+        if len(self.smoothed) == 0:  # sigma may be zero then
+            return np.zeros(len(time))
         variance = self.drift**2 + self.least**2 + self.added**2
         logarithm = np.log(variance.sum(axis=1)) / 2
         change = np.zeros(len(time))
