@@ -103,12 +103,14 @@ def mounting_prior(equations: Equations) -> Prior:
 def _prior(equations, time, attitude_follows):
     start = {
         "drift_time": time,
-        "jitter_time": min(equations.interval, SETTINGS.jitter_time),
+        "jitter_time": equations.interval,
         "bias_time": time,
         "attitude_time": SETTINGS.attitude_time,
         "walk_scale": SETTINGS.walk_scale,
         "trend_sigma": SETTINGS.trend_sigma,
     }
+    if equations.stated.history.is_stated:  # else jitter may stand for drift, too
+        start["jitter_time"] = min(equations.interval, SETTINGS.jitter_time)
     is_held = len(equations.names) > 0
     if not is_held:  # nothing tells of what all passes share, of which the POS states this
         start["trend_sigma"] = float(np.sqrt(np.mean(equations.stated_epochs.gnss**2)))

@@ -51,12 +51,14 @@ def test_drift_is_correlated_over_four_control_intervals(n):
 
 
 @pytest.mark.parametrize("interval", [40.0, 2.0])
-def test_noise_of_gnss_lasts_seconds_between_any_control(interval):
-    "It lasts 3 s however far apart control points are, and one interval where they are closer"
+def test_noise_of_gnss_lasts_seconds_where_sigma_shows_what_grows(interval):
+    "3 s however far apart control points are, one interval where they are closer; else an interval"
     times = 3.0 + interval * np.arange(5)
-    case = Case(EPOCHS, CONSTANT, times, np.random.default_rng(1), np.full((len(EPOCHS), 3), 0.02))
-    equations = position_equations(case.recorded, case.matched, Pos(), 0, position_prior)
-    assert start(position_prior(equations), "jitter_time") == pytest.approx(min(interval, 3.0))
+    growing = outage_case(1, 5).recorded.position_sigma
+    for sigma, expected in ((growing, min(interval, 3.0)), (np.full_like(growing, 0.02), interval)):
+        case = Case(EPOCHS, CONSTANT, times, np.random.default_rng(1), sigma)
+        equations = position_equations(case.recorded, case.matched, Pos(), 0, position_prior)
+        assert start(position_prior(equations), "jitter_time") == pytest.approx(expected)
 
 
 def test_without_sigmas_the_believed_time_holds():
