@@ -1,15 +1,17 @@
 """Is the collocation ever worse than interpolation between control points?
 
 python benchmarks/pos_study.py [FILE of real POS errors (.err)] [--seeds 2] [--every 1]
+    [--first-seed 0] [--control 3] [--only TEXT]
 
 RMS in 3D of the whole trajectory over many drives: windows of a real error series with and without
 its sigma(t); clones of the paper's car and boat; MEMS and tactical units, filtered and smoothed,
 with their stated sigmas, without any, and with sigmas ten times too small and too large; a POS
-whose GNSS loses its fixed solution now and again; and one that drifts for seconds, three to eight
-times in a window, and states 2 cm all along. Beside it what practitioners use on the same
-control points: linear and monotone interpolation, the former cut at the steps of the path, and a
-Gaussian process of scikit-learn. With --every 4 each fourth control point along the drive takes
-part, with its passes.
+whose GNSS loses its fixed solution now and again; one that drifts for seconds, three to eight
+times in a window, and states 2 cm all along; and a tactical unit without outages that states a
+seventh of its error. Beside it what practitioners use on the same control points: linear and
+monotone interpolation, the former cut at the steps of the path, and a Gaussian process of
+scikit-learn. With --every 4 each fourth control point along the drive takes part, with its passes;
+with --control 6 six of them, spread evenly. A table at the end has a line for each kind of POS.
 """
 
 import argparse
@@ -37,6 +39,12 @@ HELD = 0.02
 FLOAT = 0.4
 MEMORY = 60.0
 WORSE = 1.1  # times the best peer: beyond it a survey counts as worse
+# A tactical unit without outages, as a series of precise point positioning has it
+UNDERSTATED = 7.0  # true error over stated sigma
+SIZES = (0.1, 1.0)  # m, one sigma of an axis
+DECORRELATED = (40.0, 200.0)  # s, after which correlation is 1 / e
+ROUGH = 0.01  # m, one sigma of what changes within seconds
+TONES = 40  # sines whose sum is normal to a percent
 
 
 def surveys(series, seeds):
@@ -47,7 +55,7 @@ def surveys(series, seeds):
             hidden = replace(trajectory, position_sigma=None)
             yield f"real {name} no sigma", hidden, matched, error, UNSTATED
     for name, scenario in drives().items():
-        for seed in range(seeds):
+        for seed in seeds:
             survey = feature_survey(scenario, seed)
             error = survey.true.position - survey.recorded.position
             for title, factor in (("", 1.0), (" no sigma", None), (" / 10", 0.1), (" x 10", 10.0)):
@@ -60,9 +68,10 @@ def surveys(series, seeds):
                 recorded = replace(survey.recorded, position_sigma=sigma)
                 pos = UNSTATED if factor is None else None
                 yield f"{name}{title}", recorded, survey.matched, error, pos
-    for seed in range(seeds):
+    for seed in seeds:
         yield "not fixed at times", *unfixed(seed), None
         yield "drifting for seconds", *bumped(seed), None
+        yield "tactical, understated", *understated(seed), None
 
 
 def unfixed(seed):
@@ -90,6 +99,26 @@ def bumped(seed):
         share = np.clip((time - begin) / length, 0.0, 1.0)[:, None]
         error += FLOAT * rng.normal(size=3) * np.sin(np.pi * share) ** 2
     return window(345_600.0 + time, error, np.full_like(error, HELD), seed)
+
+
+def understated(seed):
+    """Recorded trajectory, matched control and error of a drive with a sigma of a seventh of it."""
+    rng = np.random.default_rng([seed, 2])
+    time = np.arange(0.0, WINDOW, 0.1)
+    size = np.exp(rng.uniform(*np.log(SIZES))) * np.array([1.0, 1.0, 1.5])
+    highest = 0.35 / np.exp(rng.uniform(*np.log(DECORRELATED)))  # Hz: sinc(0.7) is 1 / e and more
+    slow = _tones(rng, time, 0.0, highest)
+    rough = _tones(rng, time, 0.02, 0.5)
+    error = size * slow + ROUGH * rough
+    return window(345_600.0 + time, error, np.tile(size / UNDERSTATED, (len(time), 1)), seed)
+
+
+def _tones(rng, time, lowest, highest):
+    """Sums (n, 3) of sines of random phase in a band (Hz), of variance one."""
+    frequency = rng.uniform(lowest, highest, (TONES, 3))
+    phase = rng.uniform(0.0, 2 * np.pi, (TONES, 3))
+    angle = 2 * np.pi * time[:, None, None] * frequency + phase
+    return np.sqrt(2 / TONES) * np.sin(angle).sum(axis=1)
 
 
 def drives():
@@ -121,23 +150,62 @@ def row(trajectory, matched, error, pos):
     return [raw, *peers, left(correction, error), float(within)]
 
 
+def some(matched, every, number):
+    """Matched control without some points: each n-th, or a number of them, spread evenly."""
+    names = list(dict.fromkeys(matched.name))
+    if number is None:
+        kept = names[::every]
+    else:
+        rows = np.linspace(0, len(names) - 1, number).round().astype(int)
+        kept = [names[i] for i in np.unique(rows)]
+    return matched[np.isin(matched.name, kept)]
+
+
+def kind_of(name):
+    """The kind of POS: windows of one series are one."""
+    if name.startswith("real"):
+        return " ".join(word for word in name.split() if not word.isdigit() and word != "s")
+    return name
+
+
+def by_kind(found):
+    """Print a line for each kind of POS: geometric means, and how often sigmas are right."""
+    print(f"{'kind':34s} surveys       linear      mlscorr   ratio   worst   within   least")
+    for kind in dict.fromkeys(kind for kind, _ in found):
+        table = np.array([row for other, row in found if other == kind])
+        ratio = table[:, -2] / table[:, 1]
+        linear, own, mean = np.exp(np.log([table[:, 1], table[:, -2], ratio]).mean(axis=1))
+        print(
+            f"{kind:34s}{len(table):8d}{linear:13.4f}{own:13.4f}{mean:8.2f}{ratio.max():8.2f}"
+            f"{table[:, -1].mean():9.1%}{table[:, -1].min():8.0%}"
+        )
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("series", nargs="?", help="of real POS errors, as OB_GINS writes (.err)")
     parser.add_argument("--seeds", type=int, default=2)
+    parser.add_argument("--first-seed", type=int, default=0)
     parser.add_argument("--every", type=int, default=1, help="only each n-th control point")
+    parser.add_argument("--control", type=int, help="number of control points instead")
+    parser.add_argument("--only", default="", help="surveys whose names have this text in them")
     arguments = parser.parse_args()
     titles = ["raw", *PEERS, "mlscorr"]
     print(f"{'survey':34s}" + "".join(f"{title:>13s}" for title in titles) + "   within")
-    rows = []
-    for name, trajectory, matched, *truth in surveys(arguments.series, arguments.seeds):
-        kept = list(dict.fromkeys(matched.name))[:: arguments.every]
-        rows.append(row(trajectory, matched[np.isin(matched.name, kept)], *truth))
+    seeds = range(arguments.first_seed, arguments.first_seed + arguments.seeds)
+    found = []
+    for name, trajectory, matched, *truth in surveys(arguments.series, seeds):
+        if arguments.only not in name:
+            continue
+        control = some(matched, arguments.every, arguments.control)
+        found.append((kind_of(name), row(trajectory, control, *truth)))
+        rows = [values for _, values in found]
         numbers = "".join(f"{value:13.3f}" for value in rows[-1][:-1])
         best = min(rows[-1][1:-2])
         mark = "  worse" if rows[-1][-2] > WORSE * best else ""
         print(f"{name:34s}{numbers}{rows[-1][-1]:9.0%}{mark}", flush=True)
-    table = np.array(rows)
+    by_kind(found)
+    table = np.array([values for _, values in found])
     ratio = table[:, 1:-2].min(axis=1) / table[:, -2]
     means = np.exp(np.log(table[:, :-1]).mean(axis=0))
     print(f"{'geometric mean':34s}" + "".join(f"{value:13.3f}" for value in means))

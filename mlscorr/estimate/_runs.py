@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import expit
 
 from mlscorr.estimate.adjustment import Adjustment
 from mlscorr.estimate.posterior import choose_parameters
@@ -166,7 +167,7 @@ def weighed_refusals(
     adjustment : Adjustment
         Of all targets.
     plain : Adjustment
-        The same before anything was raised in windows.
+        The same before anything was raised in windows, of a POS that drifts without stating it.
     screening : Screening
         Of the former.
     windows : int
@@ -182,10 +183,35 @@ def weighed_refusals(
     values = {"names": tuple(names), "targets": len(adjustment.target_rows), "size": float(size)}
     if odds < np.log(SETTINGS.strong_evidence):
         doubt = Statement("wrong or drift", "warning", values | {"odds": float(np.exp(odds))})
-        return replace(screening, warnings=(*screening.warnings, doubt))
+        warnings = (*screening.warnings, doubt)
+        return replace(screening, warnings=warnings, drift_probability=float(expit(odds)))
     doubt = Statement("rather drift", "warning", values)
     posterior = choose_parameters(plain)
     return Screening(posterior, (), tuple(all_tests(plain, posterior)), (doubt,))
+
+
+def doubtful_drift(adjustment: Adjustment, screening: Screening) -> np.ndarray:
+    """One sigma (n, 3) at every epoch of the drift that refused targets may show. Units: m.
+
+    With the probability p that they are right, the POS is off there by what they deviate by, d:
+    p d d^T beside the covariance of the estimate without them. Between targets it is linear in
+    time, and zero at those in use.
+
+    Parameters
+    ----------
+    adjustment : Adjustment
+        Of all targets.
+    screening : Screening
+        Of these adjustment.
+    """
+    deviation = np.zeros((len(adjustment.names), 3))
+    for test in screening.outliers:
+        deviation[adjustment.names == test.name] = test.left_out
+    order = np.argsort(adjustment.observed, kind="stable")
+    time = adjustment.trajectory.gps_time
+    known = adjustment.observed[order]
+    drift = np.column_stack([np.interp(time, known, axis) for axis in deviation[order].T])
+    return np.sqrt(screening.drift_probability) * drift
 
 
 def drift_odds(

@@ -39,8 +39,8 @@ def _wrong_or_drift(names, targets, odds, size):
     return (
         f"{_refused(names, targets)} were refused as wrong. That the POS drifts for a short time "
         f"beside each of them, and doesn't state it, is {odds:.1f} times as probable: then up to "
-        f"{size:.2f} m are left there, which no sigma holds. Survey these points again, or "
-        "more of them around."
+        f"{size:.2f} m are left there, and sigmas are larger for it. Survey these points again, "
+        "or more of them around."
     )
 
 

@@ -13,7 +13,12 @@ from threadpoolctl import threadpool_limits
 from mlscorr.collocation import Collocation
 from mlscorr.correction import Correction
 from mlscorr.estimate._prediction import GridPredictions, pose_rows, predict_pose_error
-from mlscorr.estimate._runs import find_windows, weighed_refusals, with_windows
+from mlscorr.estimate._runs import (
+    doubtful_drift,
+    find_windows,
+    weighed_refusals,
+    with_windows,
+)
 from mlscorr.estimate._wording import sentences_of
 from mlscorr.estimate.adjustment import (
     NO_TREND,
@@ -26,7 +31,12 @@ from mlscorr.estimate.guards import Guards, find_guards, guard_warnings, sparse_
 from mlscorr.estimate.inputs import checked_inputs, filled_sigmas
 from mlscorr.estimate.mounting import prior_sigma
 from mlscorr.estimate.outages import with_drift_history
-from mlscorr.estimate.posterior import Objective, most_probable, position_prior
+from mlscorr.estimate.posterior import (
+    Objective,
+    drifting_prior,
+    most_probable,
+    position_prior,
+)
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.support import Support, find_support
 from mlscorr.estimate.target_tests import Screening, TargetTest, screen
@@ -195,7 +205,8 @@ def estimate_correction(
         *(window.statement for window in windows),
         *sparse_warnings(kept, order),
     )
-    return _estimate(trajectory, matched.name, GridPredictions(kept), screening, notes)
+    doubt = doubtful_drift(adjustment, screening)
+    return _estimate(trajectory, matched.name, GridPredictions(kept), screening, notes, doubt)
 
 
 def _screened(trajectory, matched, pos, order):
@@ -217,6 +228,7 @@ def _screened(trajectory, matched, pos, order):
         more = find_windows(adjustment, screening)
         if not more:
             break
+    plain = replace(plain, prior=drifting_prior)
     weighed = weighed_refusals(adjustment, plain, screening, len(windows))
     if screening.outliers and not weighed.outliers:
         return plain, weighed, ()
@@ -317,8 +329,11 @@ def _tied_adjustment(adjustment, ties, mountings):
     return tied.with_unknowns({TIE: columns}, np.zeros(len(sigma)), sigma)
 
 
-def _estimate(trajectory, names, predictions, screening, notes):
-    """The Estimate by equations, as predictions have them, and the parameters chosen for them."""
+def _estimate(trajectory, names, predictions, screening, notes, doubt=None):
+    """The Estimate by adjustment, as predictions have them, and the parameters chosen for them.
+
+    A doubt (n, 3; m) adds to the position's covariance, as doubtful_drift has it.
+    """
     kept = predictions.adjustment
     posterior = screening.posterior
     used = np.isin(np.asarray(names, dtype=object), kept.names)
@@ -327,8 +342,10 @@ def _estimate(trajectory, names, predictions, screening, notes):
     left_out = np.full((len(names), 3), np.nan)
     if len(kept.target_rows) > 1:
         left_out[used] = leave_targets_out(kept, solved)
-    pose_error = predict_pose_error(kept, posterior, predictions, solved)
-    correction = Correction.by_pose_error(trajectory, *pose_error)
+    pose, covariance = predict_pose_error(kept, posterior, predictions, solved)
+    if doubt is not None:
+        covariance[:, :3, :3] += doubt[:, :, None] * doubt[:, None, :]
+    correction = Correction.by_pose_error(trajectory, pose, covariance)
     return Estimate(
         correction=correction,
         adjustment=kept,

@@ -7,7 +7,7 @@ whose mode and spread (Laplace, importance sampling) stand for the parameters in
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from scipy.linalg import cholesky
@@ -73,6 +73,20 @@ def position_prior(adjustment: Adjustment) -> Prior:
     return _prior(adjustment, time, attitude_follows=True)
 
 
+def drifting_prior(adjustment: Adjustment) -> Prior:
+    """Prior of a correction where the POS drifts between control points without stating it.
+
+    What control points differ by is drift then, whatever its size, and no noise of GNSS.
+
+    Parameters
+    ----------
+    adjustment : Adjustment
+    """
+    prior = position_prior(adjustment)
+    is_drift = ~np.isin(prior.free, [NAMES.index("jitter_scale"), NAMES.index("jitter_time")])
+    return replace(prior, free=prior.free[is_drift], spread=prior.spread[is_drift])
+
+
 def mounting_prior(adjustment: Adjustment) -> Prior:
     """Prior of a calibration.
 
@@ -89,12 +103,14 @@ def mounting_prior(adjustment: Adjustment) -> Prior:
 def _prior(adjustment, time, attitude_follows):
     start = {
         "drift_time": time,
-        "jitter_time": adjustment.interval,  # correlated over one interval
+        "jitter_time": adjustment.interval,
         "bias_time": time,
         "attitude_time": SETTINGS.attitude_time,
         "walk_scale": SETTINGS.walk_scale,
         "trend_sigma": SETTINGS.trend_sigma,
     }
+    if adjustment.errors.history.is_stated:  # else jitter may stand for drift, too
+        start["jitter_time"] = min(adjustment.interval, SETTINGS.jitter_time)
     is_held = len(adjustment.names) > 0
     if not is_held:  # nothing tells of what all passes share, of which the POS states this
         start["trend_sigma"] = float(np.sqrt(np.mean(adjustment.errors.epochs.gnss**2)))

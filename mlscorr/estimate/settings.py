@@ -54,6 +54,10 @@ class Settings:
     # fixed by benchmarks/lsc_study.py. What is stated of position is right within a factor of ten,
     # or in another unit; the paper's rule for correlation times within two.
     start_ratio: float = 4.0  # correlation time over control interval: 3 to 5, paper 3.1.4
+    # s, where sigma(t) shows what grows without GNSS; one control interval where that is shorter.
+    # After it half of the variance of a GNSS/INS between outages has changed, and no more after a
+    # minute than after 5 s (OB_GINS in Wuhan, 357962 to 358049 s, outside the windows that grade)
+    jitter_time: float = 3.0
     attitude_time: float = 120.0  # s, paper's Table 7: gyro biases change over minutes
     # m, of a coefficient: 1 cm of a base station to 1 m between ETRS89 and ITRF, as two sigmas
     trend_sigma: float = 0.1

@@ -177,12 +177,15 @@ class Screening:
     tests : tuple of TargetTest
         Of the targets that are left.
     warnings : tuple of Statement
+    drift_probability : float
+        That the outliers are right, and the POS drifts there without stating it.
     """
 
     posterior: Posterior
     outliers: tuple[TargetTest, ...]
     tests: tuple[TargetTest, ...]
     warnings: tuple[Statement, ...]
+    drift_probability: float = 0.0
 
     @classmethod
     def believed(cls, adjustment: Adjustment) -> Screening:

@@ -33,6 +33,8 @@ class DriftHistory:
     returns : (r,) array
         When drift is back without a step of the path: sigma(t) has sunk gently from the middle of
         an outage, as of a smoother, or has fallen at once. Units: s.
+    smoothed : (j,) array
+        The former of these. Units: s.
     starts : (k + r + 1,) array
         When it begins to grow after the start, each restart and each return: where sigma(t) says
         so, never (infinite) where it says that it doesn't, else at once. Units: s.
@@ -51,6 +53,7 @@ class DriftHistory:
     steps: Steps
     restarts: np.ndarray
     returns: np.ndarray
+    smoothed: np.ndarray
     starts: np.ndarray
     sigma: np.ndarray
     held: np.ndarray
@@ -149,6 +152,27 @@ class DriftHistory:
         """The part (n, 3) of the stated sigma that grows where GNSS is missing. Units: m."""
         return self._continuous(np.sqrt(np.maximum(self.sigma**2 - self.level**2, 0.0)))
 
+    @cached_property
+    def folds(self) -> np.ndarray:
+        """E-folds (n,) by which sigma(t) has risen and sunk so far in outages of a smoother.
+
+        Of the size of all axes; noise of single epochs counts for nothing.
+        """
+        time = self.trajectory.gps_time
+        if len(self.smoothed) == 0:  # sigma may be zero then
+            return np.zeros(len(time))
+        variance = self.drift**2 + self.least**2 + self.added**2
+        logarithm = np.log(variance.sum(axis=1)) / 2
+        change = np.zeros(len(time))
+        for end in self.smoothed:
+            start = self.edges[np.searchsorted(self.edges, end) - 1]
+            first, last = np.searchsorted(time, [start, end])
+            peak = first + int(np.argmax(logarithm[first : last + 1]))
+            risen = np.maximum.accumulate(logarithm[first : peak + 1])
+            sunk = np.minimum.accumulate(logarithm[peak : last + 1])
+            change[first + 1 : last + 1] = np.abs(np.diff(np.append(risen, sunk[1:])))
+        return np.cumsum(change)
+
     def _continuous(self, amplitude):
         time = self.trajectory.gps_time
         steps = self.steps
@@ -182,14 +206,16 @@ def _history(trajectory):
     level = np.tile(held, (len(time), 1))
     if not held.any():
         starts = np.append(time[0], restarts)
-        return DriftHistory(trajectory, steps, restarts, np.empty(0), starts, stated, held, level)
+        none = np.empty(0)
+        return DriftHistory(trajectory, steps, restarts, none, none, starts, stated, held, level)
     size = np.linalg.norm(steady, axis=1)
     changes = quick_changes(time, size)
     falls = _falls(time, size, changes, held, restarts)
     is_raised = np.maximum(steady**2 - held**2, 0.0).sum(axis=1) > held @ held
-    returns = _returns(time, size, runs(is_raised), np.sort(np.append(restarts, falls)))
+    smoothed = _returns(time, size, runs(is_raised), np.sort(np.append(restarts, falls)))
+    returns = smoothed
     if _shows_steps(trajectory):
-        returns = np.sort(np.append(returns, falls))
+        returns = np.sort(np.append(smoothed, falls))
     else:
         restarts = np.sort(np.append(restarts, falls))
     edges = np.sort(np.concatenate([time[:1], restarts, returns]))
@@ -209,7 +235,7 @@ def _history(trajectory):
         following = first
     first = np.array(grown[::-1])[np.searchsorted(grown[::-1], edges)]
     starts = np.where(first < np.append(edges[1:], np.inf), first, np.inf)
-    return DriftHistory(trajectory, steps, restarts, returns, starts, stated, held, level)
+    return DriftHistory(trajectory, steps, restarts, returns, smoothed, starts, stated, held, level)
 
 
 def _shows_steps(trajectory):

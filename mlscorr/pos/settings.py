@@ -21,6 +21,9 @@ class Settings:
     sigma_interval: float = 1.0  # s; of sigmas in SBET's companion smrmsg, beside a path of 200 Hz
     whole_step: float = 0.9  # of the largest size; a span that shows less cuts the step
     reacquisition_time: float = 10.0  # s; in which receivers fix ambiguities anew (data sheets)
+    # e-folds of a smoother's sigma(t) in one correlation time of its drift: an integrated random
+    # walk's sigma grows as t^1.5 and its correlation falls as t^-0.5
+    correlated_folds: float = 3.0
     # m, E, N, H: a fixed RTK solution, 1 cm and 1.5 cm + 1 ppm by receivers' data sheets, and as
     # much for what the inertial unit adds
     gnss_sigma: tuple[float, float, float] = (0.02, 0.02, 0.03)

@@ -105,7 +105,8 @@ def _drift(stated, parameters, position):
     """Drift with the stated sigma(t), or velocity and position random walk since GNSS went."""
     if parameters.family != INTEGRATED:
         drift = parameters.drift_scale * position * stated.drift[:, None]
-        return (Signal(drift, Covariance(parameters.family, parameters.drift_time), stated.clock),)
+        clock = stated.clock + parameters.drift_time * stated.folds_clock
+        return (Signal(drift, Covariance(parameters.family, parameters.drift_time), clock),)
     clock = stated.growth_clock
     velocity = parameters.drift_scale * position * stated.grown(1.5)[:, None]
     walk = parameters.walk_scale * position * stated.grown(0.5)[:, None]

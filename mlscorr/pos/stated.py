@@ -109,6 +109,16 @@ class StatedSigma:
         return self.gps_time - first + LEAP * self.history.segment(self.gps_time)
 
     @cached_property
+    def folds_clock(self) -> np.ndarray:
+        """Correlation times (n,) that pass as the sigma(t) of a smoother rises and sinks.
+
+        It rises within seconds of an outage's ends and stays long in its middle, and so does drift.
+        """
+        history = self.history
+        passed = history.folds / SETTINGS.correlated_folds
+        return np.interp(self.gps_time, history.trajectory.gps_time, passed)
+
+    @cached_property
     def gnss_clock(self) -> np.ndarray | None:
         """Time (n,) that leaps where another solution holds the POS; None where none does. s."""
         turns = self.history.turns

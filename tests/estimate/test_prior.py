@@ -48,7 +48,17 @@ def test_drift_is_correlated_over_four_control_intervals(n):
     interval = 194.0 / (n - 1)
     assert start(prior, "drift_time") == pytest.approx(4.0 * interval, rel=1e-6)
     assert start(prior, "bias_time") == pytest.approx(4.0 * interval, rel=1e-6)
-    assert start(prior, "jitter_time") == pytest.approx(interval, rel=1e-6)
+
+
+@pytest.mark.parametrize("interval", [40.0, 2.0])
+def test_noise_of_gnss_lasts_seconds_where_sigma_shows_what_grows(interval):
+    "3 s however far apart control points are, one interval where they are closer; else an interval"
+    times = 3.0 + interval * np.arange(5)
+    growing = outage_case(1, 5).recorded.position_sigma
+    for sigma, expected in ((growing, min(interval, 3.0)), (np.full_like(growing, 0.02), interval)):
+        case = Case(EPOCHS, CONSTANT, times, np.random.default_rng(1), sigma)
+        equations = position_equations(case.recorded, case.matched, Pos(), 0, position_prior)
+        assert start(position_prior(equations), "jitter_time") == pytest.approx(expected)
 
 
 def test_without_sigmas_the_believed_time_holds():

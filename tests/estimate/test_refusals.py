@@ -44,6 +44,32 @@ def test_many_lone_deviations_are_drift():
     assert doubt.values["names"] == ("T02", "T06", "T10", "T14", "T18")
 
 
+@pytest.mark.long
+def test_many_lone_deviations_are_followed_as_straight_lines_follow_them():
+    "A POS that swings out by decimetres for 14 s at a quarter of the points: no worse than lines"
+    case, error = bumped_case(5)
+    time = case.recorded.gps_time
+    misclosure = case.matched.misclosure.T
+    lines = np.column_stack([np.interp(time, case.matched.gps_time, axis) for axis in misclosure])
+    assert rms(case.remaining(case.estimate())) < 1.05 * rms(error - lines)
+
+
+@pytest.mark.long
+def test_sigma_is_larger_where_refused_points_may_show_drift():
+    "Three of 20 refused, drift as probable: 95 % of the drift beside them within 1.96 sigma"
+    case, _ = bumped_case(3)
+    estimate = case.estimate()
+    refused = [case.control.name.index(outlier.name) for outlier in estimate.outliers]
+    assert len(refused) == 3
+    sigma = estimate.correction.corrected.position_sigma
+    away = np.abs(EPOCHS[:, None] - even(20)).argmin(axis=1)
+    is_beside = np.isin(away, refused)
+    within = np.abs(case.remaining(estimate)) < 1.96 * sigma
+    assert within[is_beside].mean() > 0.9 and within[~is_beside].mean() > 0.9
+    is_far = ~np.isin(away, np.add.outer(refused, [-1, 0, 1]))
+    assert np.median(sigma[is_far]) < 0.02  # m
+
+
 def test_two_lone_deviations_of_twenty_are_blunders_rather():
     "More of them, or drift that was seen elsewhere in the drive, turn the odds"
     names = ["T02", "T06", "T10", "T14", "T18"]

@@ -53,6 +53,21 @@ def test_integrated_drift_is_two_walks_on_one_clock(stated):
     assert growth == pytest.approx((since[0] / since[1]) ** 1.5, rel=1e-6)
 
 
+def test_drift_changes_as_quickly_as_a_smoothed_sigma():
+    "Within 4 s in which sigma grows e-fold it is less alike than within 4 s in which it stays"
+    share = np.clip((TIME - TIME[40]) / 60.0, 0.0, 1.0)
+    sigma = np.repeat(np.hypot(0.02, (4.0 * share * (1.0 - share)) ** 1.5)[:, None], 3, axis=1)
+    path = np.array([528000.0, 3379000.0, 20.0]) + np.outer(TIME - TIME[0], [0.0, 10.0, 0.0])
+    trajectory = Trajectory(TIME, path, Rotation.identity(len(TIME)), sigma)
+    asked = TIME[0] + np.array([24.0, 28.0, 48.0, 52.0])
+    stated = stated_sigma(trajectory, Pos(), asked)
+    drift = pose_signals(stated, PARAMETERS, partials(4))[0]
+    lags = np.diff(drift.clock)[[0, 2]]
+    rise = np.log(np.linalg.norm(stated.position[1]) / np.linalg.norm(stated.position[0]))
+    assert lags[0] == pytest.approx(4.0 + 30.0 * rise / 3.0, rel=0.05)  # s, of 30 s and 3 e-folds
+    assert lags[1] == pytest.approx(4.0, abs=0.2)
+
+
 def test_drift_that_a_smoother_ties_down_is_a_walk_that_is_known_at_its_end():
     "Its covariance is that of a free walk of 40 s after its end, with its velocity, is known: 0"
     hump = np.clip(TIME - TIME[60], 0.0, 40.0)

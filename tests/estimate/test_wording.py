@@ -34,8 +34,8 @@ CATALOGUE = [
         {"names": ("T02", "T07"), "targets": 12, "size": 0.2, "odds": 3.04},
         "2 of 12 control points (T02, T07) were refused as wrong. That the POS drifts for a short "
         "time beside each of them, and doesn't state it, is 3.0 times as probable: then up to "
-        "0.20 m are left there, which no sigma holds. Survey these points again, or more of them "
-        "around.",
+        "0.20 m are left there, and sigmas are larger for it. Survey these points again, or more "
+        "of them around.",
     ),
     (
         "rather drift",

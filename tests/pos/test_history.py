@@ -68,6 +68,27 @@ def test_a_smoothed_outage_ends_where_sigma_has_sunk():
     assert history.segment(START + np.array([10.0, 150.0])).tolist() == [0, 0]
 
 
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_a_smoothed_sigma_is_counted_by_how_much_it_rises_and_sinks(noise):
+    "From 2 cm to 1 m and back in each of two outages: 4 ln 50, of which noise of 2 % makes no more"
+    chance = 1.0 + noise * np.random.default_rng(1).normal(size=len(TIME))
+    humps = [np.clip((TIME - begin) / 40.0, 0.0, 1.0) for begin in (30.0, 110.0)]
+    size = sum((4.0 * share * (1.0 - share)) ** 1.5 for share in humps)
+    history = drift_history(drive(chance * np.hypot(0.02, size)))
+    assert len(history.smoothed) == 2
+    assert history.folds[-1] == pytest.approx(4.0 * np.log(50.0), rel=0.12)
+    assert history.folds[(TIME > 75.0) & (TIME < 105.0)] == pytest.approx(
+        history.folds[-1] / 2, 0.05
+    )
+
+
+def test_drift_of_a_filter_keeps_its_clock():
+    "Sigma that grows to 1 m and falls at once is no smoother's: nothing is counted"
+    history = drift_history(drive(0.02 + grown(1.0)))
+    assert len(history.returns) == 1 and len(history.smoothed) == 0
+    assert not history.folds.any()
+
+
 def test_what_grows_until_it_falls_is_not_smoothed():
     "Growth that falls within a second at 120 s, and a hump that a step of the path cuts: none back"
     fall = np.interp(TIME, [119.9, 120.0, 120.4], [1.0, 0.6, 0.0])

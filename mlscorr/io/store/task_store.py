@@ -23,6 +23,7 @@ LOCK = "lock"
 KINDS = (str, int, float, Path, np.generic)  # of values that are told by what they print
 ROOMS = ("mlscorr", "numpy", "scipy", "pathlib", "upath")  # whose classes results hold
 MAKERS = {  # functions that make values; no other is called while a result is loaded
+    ("mlscorr.estimate.posterior", "drifting_prior"),
     ("mlscorr.estimate.posterior", "position_prior"),
     ("numpy._core.multiarray", "_reconstruct"),
     ("numpy._core.multiarray", "scalar"),
