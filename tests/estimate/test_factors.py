@@ -1,4 +1,4 @@
-"""The observation equations are the derivatives of misclosures, and their noise is all of it."""
+"""Factors are the derivatives of misclosures, and their noise is all of it."""
 
 from dataclasses import replace
 
@@ -6,11 +6,18 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mlscorr.estimate import estimate_correction, position_adjustment, position_prior
-from mlscorr.estimate.adjustment import _noise, mounting_adjustment, with_reacquisitions
+from mlscorr.estimate import (
+    TARGET,
+    estimate_correction,
+    position_adjustment,
+    position_prior,
+    target_factor,
+)
+from mlscorr.estimate.adjustment import mounting_adjustment, with_reacquisitions
+from mlscorr.estimate.factors import PRIOR, REACQUISITION
 from mlscorr.estimate.posterior import mounting_prior
 from mlscorr.frames import georeference, to_scanner
-from mlscorr.pos import Steps
+from mlscorr.pos import PosErrors, Steps
 from mlscorr.survey import SEARCH_RADIUS, Matched, Mounting, Pos
 from tests.beds.pos_errors import CONSTANT, EPOCHS, NOISE, START, SURVEYED, Case, smooth_case
 
@@ -37,16 +44,16 @@ def test_passes_of_one_target_share_its_survey_error():
 def test_partials_are_what_a_pose_moves():
     "Moved by 1 mm and turned by 1e-6 rad, the targets move as B says, to 1e-9 m"
     case = smooth_case(3, n=6)
-    adjustment = case.adjustment()
+    partials = case.adjustment().targets.partials[:, 0]
     times = case.observations.gps_time
     pose = case.recorded.at(times)
     body = pose.attitude.inv().apply(case.observations.position - pose.position)
     for axis in range(3):
         unit = np.eye(3)[axis]
-        assert adjustment.partials[:, :, axis] == pytest.approx(np.tile(unit, (6, 1)))
+        assert partials[:, :, axis] == pytest.approx(np.tile(unit, (6, 1)))
         turned = (Rotation.from_rotvec(1e-6 * unit) * pose.attitude).apply(body)
         moved = (turned - pose.attitude.apply(body)) / 1e-6
-        np.testing.assert_allclose(adjustment.partials[:, :, 3 + axis], moved, atol=1e-4)
+        np.testing.assert_allclose(partials[:, :, 3 + axis], moved, atol=1e-4)
 
 
 def test_misclosures_are_surveyed_less_observed():
@@ -56,9 +63,9 @@ def test_misclosures_are_surveyed_less_observed():
     case.observations = case.observations[shuffled]
     adjustment = case.adjustment()
     expected = (case.control.position - case.observations.position[np.argsort(shuffled)])[shuffled]
-    np.testing.assert_allclose(adjustment.misclosure, expected, atol=1e-9)
+    np.testing.assert_allclose(adjustment.targets.misclosure, expected, atol=1e-9)
     assert adjustment.names.tolist() == [case.control.name[i] for i in shuffled]
-    np.testing.assert_array_equal(adjustment.gps_time, case.observations.gps_time)
+    np.testing.assert_array_equal(adjustment.observed, case.observations.gps_time)
 
 
 def test_two_passes_share_the_survey_alone():
@@ -66,7 +73,8 @@ def test_two_passes_share_the_survey_alone():
     case = Case(EPOCHS, CONSTANT, [50.0, 90.0], np.random.default_rng(2))
     observations = case.observations[np.array([0, 1, 0])]
     matched = Matched.by_name(observations, case.control)
-    noise = position_adjustment(case.recorded, matched, Pos(), 0, position_prior).noise.matrix
+    adjustment = position_adjustment(case.recorded, matched, Pos(), 0, position_prior)
+    noise = adjustment.targets.noise.matrix
     between = SURVEYED**2 * np.eye(3)
     np.testing.assert_allclose(noise[0:3, 6:9], between, atol=1e-15)
     np.testing.assert_allclose(noise[0:3, 0:3], between + NOISE**2 * np.eye(3), atol=1e-15)
@@ -74,41 +82,48 @@ def test_two_passes_share_the_survey_alone():
 
 
 def steps_at(*times, size=0.5):
-    "Fall-backs of the POS at times (s after the start)"
+    "Re-acquisitions of GNSS at times (s after the start)"
     at = START + np.array(times)
     n = len(times)
     return Steps(at, at + 0.1, np.tile([size, 0.0, 0.0], (n, 1)), np.full(n, 0.01))
 
 
-def test_a_fall_back_is_a_place_seen_before_and_after_it():
-    "Of two views of a place that nobody surveyed only the difference counts: step and its sigma"
+def test_a_step_is_seen_by_the_poses_before_and_after_it():
+    "By as much as the path steps its error does: I before, -I after, and the step's variance"
     adjustment = smooth_case(5, n=8).adjustment(order=1)
     steps = steps_at(60.0, 120.0)
     complete = with_reacquisitions(adjustment, steps)
-    assert complete.fallbacks == 2 and len(complete.names) == 8 and len(complete.gps_time) == 12
-    ends = np.column_stack([steps.before, steps.after]).ravel()
-    np.testing.assert_array_equal(complete.gps_time[-4:], ends)
-    before, after = complete.misclosure[-4:].reshape(2, 2, 3).swapaxes(0, 1)
-    np.testing.assert_array_equal(before - after, steps.size)
-    np.testing.assert_array_equal(complete.partials[-1], np.eye(3, 6))
-    covariance = complete.noise.matrix
-    difference = np.hstack([np.eye(3), -np.eye(3)])
-    for first in (-12, -6):
-        rows = slice(first, first + 6 or None)
-        of_both = difference @ covariance[rows, rows] @ difference.T
-        np.testing.assert_allclose(of_both, 0.01**2 * np.eye(3), atol=1e-9)
-        assert np.diag(covariance)[rows].min() > SEARCH_RADIUS**2
-    assert not covariance[:-12, -12:].any() and not covariance[-12:-6, -6:].any()
-    assert not complete.design[-4:].any() and complete.design[:-4].any()
+    assert complete.targets is adjustment.targets
+    factor = complete.of_kind(REACQUISITION)
+    np.testing.assert_array_equal(factor.gps_time, np.column_stack([steps.before, steps.after]))
+    np.testing.assert_array_equal(factor.stated.gps_time, factor.gps_time.ravel())
+    np.testing.assert_array_equal(factor.misclosure, steps.size)
+    for partials in factor.partials:
+        np.testing.assert_array_equal(partials, [np.eye(3, 6), -np.eye(3, 6)])
+    np.testing.assert_allclose(factor.noise.matrix, 0.01**2 * np.eye(6), atol=1e-18)
+    np.testing.assert_allclose(factor.variance, 0.01**2)
+
+
+def test_a_step_tells_what_the_trend_differs_by():
+    "A line that drifts by 1 m in 200 s differs by 0.5 mm over 0.1 s, a shift by nothing"
+    adjustment = smooth_case(5, n=8).adjustment(order=1)
+    complete = with_reacquisitions(adjustment, steps_at(60.0))
+    step = complete.rows(None)[1]
+    ends = complete.pose_design(step.gps_time.ravel())[:, :3]
+    np.testing.assert_allclose(step.design[0], ends[0] - ends[1], atol=1e-12)
+    shift = replace(complete, order=0).rows(None)[1]
+    assert not shift.design.any()
 
 
 def test_no_step_no_row():
-    "Without fall-backs the equations are the same object; a jump of kilometres is none"
+    "Without re-acquisitions there is no factor of them; a jump of kilometres is none"
     adjustment = smooth_case(6, n=5).adjustment()
-    assert with_reacquisitions(adjustment, steps_at()) is adjustment
-    assert with_reacquisitions(adjustment, steps_at(50.0, size=2000.0)) is adjustment
-    gate = SEARCH_RADIUS
-    assert with_reacquisitions(adjustment, steps_at(50.0, size=0.99 * gate)).fallbacks == 1
+    for none in (steps_at(), steps_at(50.0, size=2000.0)):
+        assert with_reacquisitions(adjustment, none).factors == adjustment.factors
+        before = with_reacquisitions(adjustment, steps_at(50.0))
+        assert with_reacquisitions(before, none).factors == adjustment.factors
+    largest = steps_at(50.0, size=0.99 * SEARCH_RADIUS)
+    assert len(with_reacquisitions(adjustment, largest).of_kind(REACQUISITION)) == 1
 
 
 def mounting_case():
@@ -130,19 +145,18 @@ def test_a_mounting_moves_targets_as_its_columns_say():
         turn = Rotation.from_rotvec(small[3:]) * MOUNTING.boresight
         other = Mounting(MOUNTING.lever_arm + small[:3], turn)
         moved = (georeference(case.recorded, other, scanned, times) - before) / 1e-6
-        np.testing.assert_allclose(adjustment.mounting[:6, :, k], moved, atol=2e-3)
+        np.testing.assert_allclose(adjustment.targets.columns[:, :, k], moved, atol=2e-3)
 
 
-def test_two_epochs_hold_the_mounting_weakly():
-    "What was corrected already comes back as a misclosure with the sigmas of no measurement"
+def test_a_mounting_is_weakly_known():
+    "What was corrected already is believed to be needed back, with the sigmas of no measurement"
     case, position = mounting_case()
     corrected = np.array([0.1, -0.2, 0.3, 0.01, 0.02, -0.03])
     adjustment = mounting_adjustment(position, case.matched, [MOUNTING], corrected, WEAK)
-    assert len(adjustment.gps_time) == 8 and adjustment.fallbacks == 0
-    np.testing.assert_array_equal(adjustment.misclosure[-2:].ravel(), -corrected)
-    np.testing.assert_allclose(np.diag(adjustment.noise.matrix)[-6:], WEAK**2)
-    np.testing.assert_array_equal(adjustment.mounting[-2:].reshape(6, 6), np.eye(6))
-    assert not adjustment.partials[-2:].any()
+    assert [factor.kind for factor in adjustment.factors] == [TARGET, PRIOR]
+    expected = np.column_stack([np.eye(6), -corrected]) / WEAK[:, None]
+    np.testing.assert_allclose(adjustment.believed(None), expected, rtol=1e-12)
+    assert len(adjustment.solve(None).misclosure) == 18
     assert not adjustment.pose_design(case.recorded.gps_time[:4]).any()
 
 
@@ -161,11 +175,14 @@ def test_what_was_observed_stays_as_it_was():
     "A target seen inside a step has the step in its noise; the observations' own covariance stays"
     case = smooth_case(5, n=6)
     covariance = case.matched.observations.covariance.copy()
-    time = case.observations.gps_time[2:3]
-    adjustment = case.adjustment()
-    steps = Steps(time - 0.1, time + 0.1, np.array([[0.5, 0.0, 0.0]]), np.array([0.01]))
-    stepped = _noise(case.matched, steps).own
-    assert stepped[2, 0, 0] - covariance[2, 0, 0] == pytest.approx(0.25)  # m^2
-    np.testing.assert_array_equal(np.delete(stepped, 2, axis=0), np.delete(covariance, 2, axis=0))
+    at = int(np.searchsorted(case.recorded.gps_time, case.observations.gps_time[2]))
+    position = case.recorded.position.copy()
+    position[at:] += [0.5, 0.0, 0.0]  # m, between the epochs about the target
+    stepped = replace(case.recorded, position=position)
+    own = target_factor(PosErrors.stated(stepped), case.matched).noise.own
+    added = np.diag([0.25, 0.0, 0.0])  # m^2
+    np.testing.assert_allclose(own[2] - covariance[2], added, atol=0.01)
+    others = np.arange(6) != 2
+    np.testing.assert_array_equal(own[others], covariance[others])
     np.testing.assert_array_equal(case.matched.observations.covariance, covariance)
-    np.testing.assert_array_equal(adjustment.noise.own, covariance)
+    np.testing.assert_array_equal(case.adjustment().targets.noise.own, covariance)

@@ -14,8 +14,8 @@ from mlscorr.estimate import (
     estimate_correction,
     position_adjustment,
     position_prior,
+    tie_factor,
 )
-from mlscorr.estimate._tied_adjustment import TieEquations
 from mlscorr.estimate.posterior import (
     IMPROBABLE,
     NAMES,
@@ -255,9 +255,9 @@ def test_a_search_turns_back_from_scales_that_rounding_spoils():
     "Drift of kilometres beside ties seen twice to a micrometre: improbable, not the end"
     survey = tied_passes(1, number=40)
     control = estimate_correction(survey.trajectory, survey.matched).adjustment
-    ties = TieEquations.of(control.trajectory, control.pos, survey.ties, control.stated)
-    ties = replace(ties, variance=1e-7 * ties.variance).select(np.repeat(np.arange(40), 2))
-    objective = Objective.of(replace(control, ties=ties))
+    ties = tie_factor(control.errors, survey.ties).scaled(1e-7)
+    twice = ties.select(np.repeat(np.arange(40), 2))
+    objective = Objective.of(control.with_factor(twice))
     farthest = objective.initial + SETTINGS.farthest_spreads * objective.spread
     with pytest.raises(np.linalg.LinAlgError, match=r"not positive definite|Rounding leaves"):
         objective.blocks[0].weigh(objective.parameters("matern32", farthest))
