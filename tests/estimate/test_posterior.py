@@ -219,7 +219,9 @@ def test_looks_of_a_target_keep_their_order_in_a_block():
     "Of 75 targets seen twice, in no order of time: what is said of each look is said of that look"
     times = np.random.default_rng(4).uniform(2.0, 198.0, 150)
     case = Case(EPOCHS, CONSTANT, times, np.random.default_rng(4))
-    adjustment = replace(case.adjustment(), names=np.array(case.control.name[:75] * 2))
+    adjustment = case.adjustment()
+    twice = replace(adjustment.targets, name=np.array(case.control.name[:75] * 2))
+    adjustment = adjustment.with_factor(twice)
     for block in Objective.of(adjustment).blocks:
         for name in block.target_rows:
             looks = (part.observed[part.names == name] for part in (block, adjustment))

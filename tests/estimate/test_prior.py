@@ -12,16 +12,19 @@ from mlscorr.survey import Pos
 from tests.beds.pos_errors import CONSTANT, EPOCHS, Case, even, outage_case
 
 STEADY = "steady"
+PERFECT = "perfect"
 GROWING = "growing"
 
 
 def equations_of(kind, pos=None, n=5, prior=position_prior):
-    "Of a drive without sigmas, with steady ones, or with those of an outage"
+    "Of a drive without sigmas, with steady ones, all zero, or with those of an outage"
     if kind == GROWING:
         case = outage_case(1, n)
     else:
         if kind == STEADY:
             sigma = np.full((len(EPOCHS), 3), 0.02)
+        elif kind == PERFECT:
+            sigma = np.zeros((len(EPOCHS), 3))
         else:
             sigma = None
         case = Case(EPOCHS, CONSTANT, even(n), np.random.default_rng(1), sigma)
@@ -69,14 +72,14 @@ def test_the_attitude_follows_the_drift_in_a_correction_alone():
     assert spread(calibration, "attitude_time") == pytest.approx(np.log(3.0))
 
 
-@pytest.mark.parametrize("kind", [None, STEADY, GROWING])
+@pytest.mark.parametrize("kind", [None, STEADY, GROWING, PERFECT])
 def test_jitter_and_bias_are_free_where_sigma_has_two_parts(kind):
     "A sigma without a part that GNSS holds has drift alone, and its four parameters stay"
     adjustment = equations_of(kind)
     free = {NAMES[i] for i in position_prior(adjustment).free}
     is_split = bool(np.any(adjustment.errors.epochs.gnss))
     assert (set(SPLIT) <= free) == is_split and (not set(SPLIT) & free) == (not is_split)
-    assert is_split == (kind == GROWING)
+    assert is_split == (kind != PERFECT)
 
 
 def test_scales_are_ten_and_times_two_or_three():
