@@ -6,17 +6,21 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from mlscorr.collocation import Noise, collocate_rows_dense
 from mlscorr.estimate import (
     TARGET,
+    Factor,
+    Objective,
     estimate_correction,
     position_adjustment,
     position_prior,
     target_factor,
 )
+from mlscorr.estimate._prediction import pose_rows, predict_under
 from mlscorr.estimate.adjustment import mounting_adjustment, with_reacquisitions
 from mlscorr.estimate.factors import PRIOR, REACQUISITION
 from mlscorr.estimate.posterior import mounting_prior
-from mlscorr.frames import georeference, to_scanner
+from mlscorr.frames import georeference, pose_partials, to_scanner
 from mlscorr.pos import PosErrors, Steps
 from mlscorr.survey import SEARCH_RADIUS, Matched, Mounting, Pos
 from tests.beds.pos_errors import CONSTANT, EPOCHS, NOISE, START, SURVEYED, Case, smooth_case
@@ -186,3 +190,92 @@ def test_what_was_observed_stays_as_it_was():
     np.testing.assert_array_equal(own[others], covariance[others])
     np.testing.assert_array_equal(case.matched.observations.covariance, covariance)
     np.testing.assert_array_equal(case.adjustment().targets.noise.own, covariance)
+
+
+def spot_heights(case, times, sigma=0.01):
+    """Another kind of control: spots of known height on a sloping road below the vehicle.
+
+    A row each along the normal n of the road: n^T (surveyed - observed), partials n^T [I, -[G]x].
+    """
+    rng = np.random.default_rng(17)
+    gps_time = START + times
+    n = len(times)
+    pose = case.recorded.at(gps_time)
+    true = case.true.at(gps_time)
+    arm = pose.attitude.apply([3.0, 1.0, -2.0])  # m, G
+    error = true.position - pose.position
+    error += true.attitude.apply([3.0, 1.0, -2.0]) - arm
+    normal = np.array([0.02, -0.03, 1.0]) / np.linalg.norm([0.02, -0.03, 1.0])
+    errors = PosErrors.stated(case.recorded)
+    partials = pose_partials(case.recorded, pose.position + arm, gps_time)
+    return Factor(
+        kind="height",
+        name=np.array([f"H{i}" for i in range(n)]),
+        gps_time=gps_time[:, None],
+        misclosure=(error @ normal + sigma * rng.standard_normal(n))[:, None],
+        noise=Noise(np.full((n, 1, 1), sigma**2)),
+        partials=(normal @ partials)[:, None, None],
+        stated=errors.at(gps_time),
+    )
+
+
+@pytest.fixture(scope="module")
+def with_heights():
+    "Six targets and a re-acquisition, the same with 40 spot heights, and parameters"
+    case = smooth_case(8, n=6)
+    alone = with_reacquisitions(case.adjustment(order=1), steps_at(120.0, size=0.001))
+    heights = spot_heights(case, np.linspace(2.5, 197.5, 40))
+    objective = Objective.of(alone)
+    parameters = objective.parameters("matern32", objective.initial)
+    return case, alone, alone.with_factor(heights), parameters
+
+
+def test_another_kind_of_control_is_solved_with_the_others(with_heights):
+    """Rows of its own kind behind the others, and the dense solution to 1e-5 m in trend and signal;
+    to a tenth of a sigma with knots as far apart as they are by default.
+    """
+    _, alone, coarse, parameters = with_heights
+    both = replace(coarse, tolerance=0.0)
+    size = alone.solve(parameters).misclosure.size
+    assert both.rows_of("height").tolist() == list(range(size, size + 40))
+    assert np.array_equal(both.rows_of(TARGET), alone.rows_of(TARGET))
+    solved = both.solve(parameters)
+    expected = collocate_rows_dense(both.rows(parameters), both.believed(parameters))
+    asked = pose_rows(both, parameters, np.arange(5, len(both.trajectory), 50))
+    pose, spread = solved.predict(*asked)
+    dense, dense_spread = expected.predict(*asked)
+    assert np.abs(pose - dense)[:, :3].max() < 1e-5  # m
+    np.testing.assert_allclose(_sigma(spread), _sigma(dense_spread), rtol=0.01)
+    by_default = coarse.solve(parameters).predict_mean(*asked)
+    assert np.abs((by_default - dense)[:, :3] / _sigma(dense_spread)).max() < 0.1
+    residual, covariance = solved.leave_out(both.rows_of("height")[[7]])
+    dense_residual, dense_covariance = expected.leave_out(both.rows_of("height")[[7]])
+    assert residual == pytest.approx(dense_residual, abs=1e-5)  # m
+    assert covariance == pytest.approx(dense_covariance, rel=0.01)
+
+
+def test_spot_heights_lower_the_sigma_of_the_height_between_targets(with_heights):
+    "At the median epoch to less than half, honestly; easting and northing gain next to nothing"
+    case, alone, both, parameters = with_heights
+    rows = np.arange(0, len(alone.trajectory), 10)
+    (_, before), (pose, after) = (predict_under(each, parameters, rows) for each in (alone, both))
+    ratio = np.median(_sigma(after) / _sigma(before), axis=0)
+    assert ratio[2] < 0.5 and (ratio[:2] > 0.9).all()
+    left = (case.true.position - case.recorded.position)[rows, 2] - pose[:, 2]
+    assert np.mean(np.abs(left) < 2 * _sigma(after)[:, 2]) > 0.88
+
+
+def test_a_likelihood_changes_smoothly_with_any_kind_of_control(with_heights):
+    "Differences over 1e-3 of a logarithm, with knots used again, are those of the dense formula"
+    _, _, both, parameters = with_heights
+    near = [replace(parameters, drift_scale=(1.0 + h) * parameters.drift_scale) for h in (1e-3, 0)]
+    fast = both.likelihoods(near, parameters, both.weigh(parameters))
+    dense = [
+        collocate_rows_dense(both.rows(each), both.believed(each)).log_likelihood for each in near
+    ]
+    assert fast[0] - fast[1] == pytest.approx(dense[0] - dense[1], rel=0.01)
+
+
+def _sigma(covariance):
+    "One sigma (k, 3) of the position"
+    return np.sqrt(np.einsum("qii->qi", covariance)[:, :3])
