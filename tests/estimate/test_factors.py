@@ -19,7 +19,7 @@ from mlscorr.estimate import (
 from mlscorr.estimate._prediction import pose_rows, predict_under
 from mlscorr.estimate.adjustment import mounting_adjustment, with_reacquisitions
 from mlscorr.estimate.factors import PRIOR, REACQUISITION
-from mlscorr.estimate.posterior import mounting_prior
+from mlscorr.estimate.posterior import choose_parameters, mounting_prior
 from mlscorr.frames import georeference, pose_partials, to_scanner
 from mlscorr.pos import PosErrors, Steps
 from mlscorr.survey import SEARCH_RADIUS, Matched, Mounting, Pos
@@ -274,6 +274,21 @@ def test_a_likelihood_changes_smoothly_with_any_kind_of_control(with_heights):
         collocate_rows_dense(both.rows(each), both.believed(each)).log_likelihood for each in near
     ]
     assert fast[0] - fast[1] == pytest.approx(dense[0] - dense[1], rel=0.01)
+
+
+def test_any_kind_of_control_counts_once_where_parameters_are_chosen():
+    "One target and 40 heights choose them; 150 targets with heights are not cut into two blocks"
+    case = smooth_case(8, n=150)
+    many = case.adjustment()
+    heights = spot_heights(case, np.linspace(2.5, 197.5, 40))
+    assert len(Objective.of(many).blocks) == 2
+    assert len(Objective.of(many.with_factor(heights)).blocks) == 1
+    one = many.select([75])
+    stated = Objective.of(one)
+    for adjustment, is_chosen in ((one, False), (one.with_factor(heights), True)):
+        (best, _), *_ = choose_parameters(adjustment, points=2).modes
+        start = stated.parameters(best.family, stated.initial)
+        assert (best != start) == is_chosen
 
 
 def _sigma(covariance):
