@@ -6,15 +6,11 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import minimize
 
-from mlscorr.estimate import (
-    SignalParameters,
-    estimate_correction,
-    position_adjustment,
-    position_prior,
-)
+from mlscorr.estimate import estimate_correction, position_adjustment, position_prior
 from mlscorr.estimate._prediction import predict_under
 from mlscorr.frames import attitude_from_angles
 from mlscorr.io.trajectories import read_pos_error_series
+from mlscorr.pos import SignalParameters
 from mlscorr.survey import ControlPoints, Matched, Pos, TargetObservations, Trajectory
 
 # s: the windows' length; where a shared survey took its own
@@ -141,8 +137,20 @@ def _stationary(trajectory, matched):
 
     def parameters(x):
         scale, time = np.exp(x)
-        any_size = 1e3  # m, of the trend
-        return SignalParameters("exponential", scale, time, *[1.0] * 6, time, any_size)
+        return SignalParameters(
+            family="exponential",
+            drift_scale=scale,
+            drift_time=time,
+            walk_scale=1.0,
+            jitter_scale=1.0,
+            jitter_time=1.0,
+            bias_scale=1.0,
+            bias_time=1.0,
+            level_scale=1.0,
+            attitude_scale=1.0,
+            attitude_time=time,
+            trend_sigma=1e3,  # m: any size
+        )
 
     def negative(x):
         return -adjustment.solve(parameters(x)).log_likelihood

@@ -55,7 +55,7 @@ def walls(calibration):
     ties = calibration.ties.ties[calibration.ties.used]
     segment = calibration.trajectory.segment(ties.gps_time.ravel()).reshape(-1, 2)
     is_both = (np.diff(ties.scanner, axis=1) != 0).ravel() & (segment[:, 0] == segment[:, 1])
-    rows = calibration.adjustment.ties.mounting[is_both]
+    rows = calibration.adjustment.ties.columns[is_both, 0]
     return rows.T @ rows / len(rows)
 
 

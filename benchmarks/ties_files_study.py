@@ -23,11 +23,9 @@ from pathlib import Path
 
 import numpy as np
 from feature_surveys import FOLDER
-from scipy.spatial.transform import Rotation
 
 import mlscorr
-from mlscorr.estimate import believed_correction, estimate_correction
-from mlscorr.estimate._tied_adjustment import TieEquations
+from mlscorr.estimate import believed_correction, estimate_correction, tie_factor
 from mlscorr.io.clouds import read_chunks
 from mlscorr.pipeline.finding import find_control
 from mlscorr.simulate import read_scenario, simulate
@@ -150,7 +148,6 @@ def _sigma_apart(estimate, there, back):
     """
     adjustment = estimate.adjustment
     trajectory = adjustment.trajectory
-    ties = adjustment.ties
     number = 3 * len(there)
     rows = np.repeat(np.column_stack([there, back]), 3, axis=0)
     probes = Ties(
@@ -164,24 +161,10 @@ def _sigma_apart(estimate, there, back):
         scanner=np.zeros((number, 2), int),
         feature=np.arange(2 * number).reshape(-1, 2),
     )
-    probes = TieEquations.of(trajectory, adjustment.pos, probes, ties.stated)
-    if ties.mounting is not None:  # which moves no pose
-        probes = replace(probes, mounting=np.zeros((number, ties.mounting.shape[1])))
-
-    def joined(of, probe, *names):
-        columns = (np.concatenate([getattr(of, n), getattr(probe, n)]) for n in names)
-        return dict(zip(names, columns, strict=True))
-
-    stated = replace(
-        ties.stated,
-        rotation=Rotation.concatenate([ties.stated.rotation, probes.stated.rotation]),
-        **joined(ties.stated, probes.stated, "gps_time", "position", "angles"),
-    )
-    names = ["gps_time", "misclosure", "variance", "partials", "weight"]
-    names += [] if ties.mounting is None else ["mounting"]
-    asked = replace(adjustment, ties=replace(ties, stated=stated, **joined(ties, probes, *names)))
+    factor = replace(tie_factor(adjustment.errors, probes), kind="probe")
+    asked = adjustment.with_factor(factor)
     solved = asked.solve(estimate.parameters)
-    _, covariance = solved.leave_out(len(solved.misclosure) - number + np.arange(number))
+    _, covariance = solved.leave_out(asked.rows_of("probe"))
     return np.sqrt(np.maximum(np.diag(covariance) - PROBE**2, 0.0)).reshape(-1, 3)
 
 

@@ -136,11 +136,12 @@ def _view(part, side):
 
 
 def _free(part):
-    """Sigma (n, r) of the places, far above all that is seen there."""
-    size = np.abs(part.misclosure).max(axis=1)
+    """Sigma (n, r) of the places, far above all that is seen there, and above its noise."""
+    noise = np.sqrt(np.einsum("nii->ni", part.noise.own).max(axis=1))
+    size = np.hypot(noise, np.abs(part.misclosure).max(axis=1))
     for signal in part.signals:
-        seen = np.linalg.norm(signal.mixing, axis=(1, 2)).reshape(part.gps_time.shape)
-        size = np.hypot(size, np.linalg.norm(seen, axis=1))
+        amplitude = np.linalg.norm(signal.mixing, axis=(1, 2)).reshape(part.gps_time.shape)
+        size = np.hypot(size, np.linalg.norm(amplitude, axis=1))
     return np.tile(FREE * size[:, None], (1, part.misclosure.shape[1]))
 
 

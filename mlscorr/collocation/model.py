@@ -155,42 +155,6 @@ class Noise:
         group = None if self.group is None else self.group[epochs]
         return Noise(self.own[epochs], group, self.shared)
 
-    def insert(self, at: int, own: np.ndarray) -> Noise:
-        """The same with epochs that share no error with others, before the one of a number.
-
-        Parameters
-        ----------
-        at : int
-        own : (k, r, r) array
-            Units: m^2.
-        """
-        both = np.insert(self.own, at, own, axis=0)
-        if self.group is None:
-            return Noise(both)
-        nothing = np.zeros((len(own), self.shared.shape[1]))
-        group = np.insert(self.group, at, len(self.shared) + np.arange(len(own)))
-        return Noise(both, group, np.vstack([self.shared, nothing]))
-
-    def share(self, epochs: np.ndarray, number: np.ndarray, sigma: np.ndarray) -> Noise:
-        """The same with errors that some epochs, which share none so far, have in common.
-
-        Parameters
-        ----------
-        epochs : (k,) int array
-        number : (k,) int array
-            Of the error that each has, from 0.
-        sigma : (r,) array
-            Of each error. Units: m.
-        """
-        n, r = self.own.shape[:2]
-        shared = np.zeros((n, r)) if self.group is None else self.shared
-        if self.group is None:
-            group = np.arange(n)
-        else:
-            group = self.group.copy()
-        group[epochs] = len(shared) + number
-        return Noise(self.own, group, np.vstack([shared, np.tile(sigma, (max(number) + 1, 1))]))
-
 
 @dataclass(frozen=True)
 class Collocation:

@@ -49,7 +49,7 @@ class Adjustment(Summary):
     errors : PosErrors
         Whose signals are s.
     factors : tuple of Factor
-        Targets first, of each further kind one at most.
+        Targets first, of each further kind one at most; only priors may be several.
     order : int
         Of the polynomial trend of the position (Eq. 11); NO_TREND for none.
     prior : function of an Adjustment
@@ -115,6 +115,18 @@ class Adjustment(Summary):
         """
         return replace(self, factors=tuple(f for f in self.factors if f.kind != kind))
 
+    def with_some(self, kind: str, rows: np.ndarray) -> Adjustment:
+        """The same with some observations of a kind, or without the kind where it has none left.
+
+        Parameters
+        ----------
+        kind : str
+        rows : (n,) bool array
+        """
+        if rows.any():
+            return self.with_factor(self.of_kind(kind).select(rows))
+        return self.without_kind(kind)
+
     def with_starts(self, starts: np.ndarray) -> Adjustment:
         """The same with drift that grows from other times on.
 
@@ -151,7 +163,8 @@ class Adjustment(Summary):
             return wider
         prior = prior_factor(mean[is_known], sigma[is_known])
         unit = np.eye(self.unknowns + len(sigma))[self.unknowns :][is_known]
-        return wider.with_factor(replace(prior, columns=unit[:, None]))
+        prior = replace(prior, columns=unit[:, None])
+        return replace(wider, factors=(*wider.factors, prior))
 
     @property
     def unknowns(self) -> int:
@@ -196,9 +209,7 @@ class Adjustment(Summary):
             return self
         first, last = self.span
         is_inside = (steps.gps_time[:, 0] >= first) & (steps.gps_time[:, 1] <= last)
-        if not is_inside.any():
-            return self.without_kind(REACQUISITION)
-        return self.with_factor(steps.select(is_inside))
+        return self.with_some(REACQUISITION, is_inside)
 
     @property
     def span(self) -> tuple[float, float]:
@@ -288,7 +299,7 @@ class Adjustment(Summary):
         parameters : SignalParameters or None
             Without any it is least squares.
         like : Collocation, optional
-            Of the same factors under parameters near by; with ties its knots are used again.
+            Of the same factors under parameters near by; its knots are used again, if it has any.
         """
         known = None
         if like is not None:
@@ -323,10 +334,7 @@ class Adjustment(Summary):
             By weigh, under these.
         """
         if not self._is_dense:
-            like = None
-            if self.ties is not None:
-                like = solved
-            return np.array([self.weigh(each, like).log_likelihood for each in near])
+            return np.array([self.weigh(each, solved).log_likelihood for each in near])
         rows = self.rows(parameters)
         changed = [self.rows(each) for each in near]
         believed = [self.believed(each) for each in near]
@@ -381,8 +389,7 @@ class Adjustment(Summary):
         """
         width = self.unknowns + 3 * (self.order + 1)
         parts = [np.zeros((0, width + 1))]
-        prior = self.of_kind(PRIOR)
-        if prior is not None:
+        for prior in (factor for factor in self.factors if factor.kind == PRIOR):
             rows = np.zeros((len(prior), width + 1))
             rows[:, : prior.columns.shape[2]] = prior.columns[:, 0]
             rows[:, -1] = prior.misclosure[:, 0]

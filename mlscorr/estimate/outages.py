@@ -25,13 +25,15 @@ def with_drift_history(adjustment: Adjustment) -> Adjustment:
     adjustment : Adjustment
         Of control points alone.
     """
-    steps = adjustment.errors.history.steps
+    adjustment = with_reacquisitions(adjustment, adjustment.errors.history.steps)
     while True:
-        complete, parameters = with_likely_starts(with_reacquisitions(adjustment, steps))
+        complete, parameters = with_likely_starts(adjustment)
         contradicted = _contradicted(complete, parameters)
         if contradicted is None:
             return complete
-        steps = steps[np.arange(len(steps)) != contradicted]
+        steps = adjustment.of_kind(REACQUISITION)
+        others = np.arange(len(steps)) != contradicted
+        adjustment = adjustment.with_some(REACQUISITION, others)
 
 
 def with_likely_starts(adjustment: Adjustment) -> tuple[Adjustment, SignalParameters]:
@@ -83,10 +85,7 @@ def _about(adjustment, first, last):
     ties = adjustment.ties
     if ties is not None and len(ties) > SETTINGS.tie_sample:
         inside = ((ties.gps_time >= first) & (ties.gps_time <= last)).any(axis=1)
-        if inside.any():
-            adjustment = adjustment.with_factor(ties.select(inside))
-        else:
-            adjustment = adjustment.without_kind(TIE)
+        adjustment = adjustment.with_some(TIE, inside)
     if len(adjustment.names) <= SETTINGS.block:
         return adjustment
     times = adjustment.observed

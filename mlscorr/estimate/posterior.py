@@ -16,6 +16,7 @@ from scipy.special import ndtri
 
 from mlscorr.collocation import FAMILIES, INTEGRATED
 from mlscorr.estimate.adjustment import NO_TREND, Adjustment
+from mlscorr.estimate.factors import REACQUISITION, TARGET
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.pos import SignalParameters
 
@@ -340,7 +341,8 @@ def choose_parameters(
     ties = 0
     if adjustment.ties is not None:
         ties = len(adjustment.ties)  # a row each, targets have three
-    if ties + 3 * len(adjustment.names) <= adjustment.believed(None).shape[1] - 1:
+    others = [f for f in adjustment.observing if f.kind != REACQUISITION]
+    if sum(f.misclosure.size for f in others) <= adjustment.believed(None).shape[1] - 1:
         families = (*FAMILIES, INTEGRATED)
         stated = [objective.parameters(family, objective.initial) for family in families]
         believed = tuple((parameters, 1 / len(families)) for parameters in stated)
@@ -385,7 +387,8 @@ def _blocks(adjustment):
     they were first seen, so that a block is a stretch of the street.
     """
     number = -(-len(adjustment.names) // SETTINGS.block)
-    if number <= 1 or adjustment.ties is not None:  # which may link any two blocks
+    kinds = {factor.kind for factor in adjustment.observing}
+    if number <= 1 or kinds - {TARGET, REACQUISITION}:  # others may link any two blocks
         return (adjustment,)
     order = np.argsort(adjustment.observed, kind="stable")
     _, first, target, counts = np.unique(adjustment.names[order], True, True, True)

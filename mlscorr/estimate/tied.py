@@ -215,11 +215,14 @@ class WeighedTies:
     parameters : SignalParameters
     solved : Collocation
         By both.
+    first : (n,) array
+        Weights with which it was solved first, to which others are relative.
     """
 
     adjustment: Adjustment
     parameters: SignalParameters
     solved: Collocation
+    first: np.ndarray
 
     @property
     def ties(self) -> Factor:
@@ -231,9 +234,7 @@ class WeighedTies:
     @property
     def weight(self) -> np.ndarray:
         """Weights (n,) of the ties."""
-        if self.ties.weight is None:
-            return np.ones(len(self.ties))
-        return self.ties.weight
+        return _weight_of(self.ties)
 
     @property
     def ratio(self) -> np.ndarray:
@@ -255,7 +256,7 @@ class WeighedTies:
             weight = np.maximum(function(weighed.ratio), SETTINGS.resolution)
             tied = weighed.adjustment.with_factor(replace(weighed.ties, weight=weight))
             relative = [
-                weight / self.weight if factor.kind == TIE else np.ones(len(factor))
+                weight / self.first if factor.kind == TIE else np.ones(len(factor))
                 for factor in tied.observing
             ]
             weighed = replace(weighed, adjustment=tied, solved=reweight(weighed.solved, relative))
@@ -317,7 +318,14 @@ def solved_ties(tied: Adjustment, parameters: SignalParameters) -> WeighedTies:
     parameters : SignalParameters
     """
     assert tied.ties is not None
-    return WeighedTies(tied, parameters, tied.solve(parameters))
+    return WeighedTies(tied, parameters, tied.solve(parameters), _weight_of(tied.ties))
+
+
+def _weight_of(ties):
+    """Weights (n,) of ties, ones where they have none."""
+    if ties.weight is None:
+        return np.ones(len(ties))
+    return ties.weight
 
 
 def _geman_mcclure(scale: float) -> Callable:

@@ -56,16 +56,3 @@ def test_noise_of_some_epochs_is_that_part_of_all():
         np.testing.assert_allclose(part.matrix, noise.matrix[np.ix_(rows, rows)], atol=1e-18)
     alone = Noise(noise.own).select(kept)
     np.testing.assert_array_equal(alone.own, noise.own[kept])
-
-
-def test_inserted_epochs_share_nothing():
-    "Between two passes of a target they add their own covariance; all else stays what it was"
-    noise = noise_of(9)
-    own = np.tile(0.01 * np.eye(3), (2, 1, 1))
-    for alone in (noise, Noise(noise.own)):
-        total = alone.insert(3, own).matrix.reshape(10, 3, 10, 3)
-        kept = np.delete(np.arange(10), [3, 4])
-        others = total[kept][:, :, kept].reshape(24, 24)
-        np.testing.assert_allclose(others, alone.matrix, atol=1e-18)
-        np.testing.assert_array_equal(total[[3, 4], :, [3, 4]], own)
-        assert not total[3, :, kept].any() and not total[3, :, 4].any()

@@ -254,3 +254,17 @@ def test_each_observation_left_out_in_turn_is_left_out_by_itself(family):
                 left_out.covariance[i], covariance, atol=1e-3 * np.diag(covariance).max()
             )
         first += n * r
+
+
+def test_a_step_of_zero_in_least_squares_is_an_observation():
+    "Without signals, two places and no step between them: the fit of three rows of one noise"
+    design = np.array([[1.0, 0.0], [1.0, 9.0], [0.0, 9.0]])  # of a shift and a slope
+    misclosure = np.array([0.4, 0.8, 0.0])  # m
+    rows = [
+        SparseRows(np.array([times]), np.array([[row]]), Noise(np.full((1, 1, 1), 1e-4)), a, ())
+        for times, row, a in zip(
+            ([0.0], [9.0], [0.0, 9.0]), misclosure, design[:, None, None], strict=True
+        )
+    ]
+    expected = np.linalg.lstsq(design, misclosure)[0]
+    np.testing.assert_allclose(collocate_rows(rows).trend, expected, atol=1e-6)  # m

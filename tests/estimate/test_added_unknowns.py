@@ -1,29 +1,25 @@
 """Further unknowns beside trend and signals: what they are is what the full solution says."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from mlscorr.estimate._tied_adjustment import TieEquations
 
-from mlscorr.estimate import estimate_correction
-from mlscorr.estimate.added_unknowns import AddedUnknowns, with_added
+from mlscorr.estimate import estimate_correction, tie_factor
+from mlscorr.estimate.added_unknowns import AddedUnknowns
 from tests.beds.tied_passes import tied_passes
 
 
 @pytest.fixture(scope="module")
 def tied():
-    "Equations of control and ties, and parameters"
+    "Adjustment of control and ties, and parameters"
     survey = tied_passes(1, number=60)
     alone = estimate_correction(survey.trajectory, survey.matched)
     adjustment = alone.adjustment
-    rows = TieEquations.of(survey.trajectory, adjustment.pos, survey.ties, adjustment.stated)
-    return replace(adjustment, ties=rows), alone.parameters
+    return adjustment.with_factor(tie_factor(adjustment.errors, survey.ties)), alone.parameters
 
 
 def columns_of(adjustment, seed):
     "Two columns at random"
-    rows = adjustment.misclosure.size + len(adjustment.ties)
+    rows = sum(factor.misclosure.size for factor in adjustment.observing)
     return np.random.default_rng(seed).standard_normal((rows, 2))
 
 
@@ -32,7 +28,7 @@ def test_what_was_added_to_the_misclosures_is_found(tied):
     adjustment, parameters = tied
     columns = columns_of(adjustment, 1)
     sizes = np.array([0.03, -0.02])
-    changed = with_added(adjustment, columns @ sizes)
+    changed = adjustment.with_added(columns @ sizes)
     added = AddedUnknowns.of(changed, parameters, columns, np.ones(2))
     assert (np.abs(added.correction - sizes) < 3 * added.sigma).all()
     assert (added.sigma < 0.002).all()  # m
@@ -46,7 +42,7 @@ def test_the_response_is_what_the_trend_takes_of_a_unit(tied):
     columns = columns_of(adjustment, 2)
     sizes = np.array([0.03, -0.02])
     added = AddedUnknowns.of(adjustment, parameters, columns, np.ones(2))
-    changed = with_added(adjustment, columns @ sizes)
+    changed = adjustment.with_added(columns @ sizes)
     before, after = (each.solve(parameters).trend for each in (adjustment, changed))
     assert np.abs(after - before - added.response @ sizes).max() < 1e-9  # m
 

@@ -1,4 +1,4 @@
-"""Parts of the equations are those of the whole, and they solve to the dense formula."""
+"""Parts of an adjustment are those of the whole, and they solve to the dense formula."""
 
 from dataclasses import replace
 
@@ -10,22 +10,22 @@ from hypothesis import strategies as st
 from mlscorr.collocation import (
     FAMILIES,
     INTEGRATED,
-    SparseRows,
     collocate_rows,
     collocate_rows_dense,
     polynomial_design,
 )
-from mlscorr.estimate import Objective, estimate_correction, with_ties
+from mlscorr.estimate import TARGET, Objective, estimate_correction, with_ties
 from mlscorr.estimate.adjustment import with_reacquisitions
+from mlscorr.estimate.factors import REACQUISITION
 from mlscorr.estimate.tied import sample
-from mlscorr.pos import Steps, pose_signals
+from mlscorr.pos import Steps
 from mlscorr.survey import Pos, control_epochs
 from tests.beds.pos_errors import CONSTANT, EPOCHS, LENGTH, START, Case, smooth_case
 from tests.beds.tied_passes import tied_passes
 
 N = 9
 CASE = smooth_case(21, n=N)
-EQUATIONS = CASE.adjustment(order=1)
+ADJUSTMENT = CASE.adjustment(order=1)
 
 
 def steps(*times):
@@ -40,34 +40,58 @@ def test_some_targets_have_their_rows_of_the_whole(kept):
     "By mask or by number: names, times, misclosures, partials, noise and beliefs of those rows"
     kept = np.array(kept)
     rows = np.flatnonzero(np.repeat(kept, 3))
-    for part in (EQUATIONS.select(kept), EQUATIONS.select(np.flatnonzero(kept))):
-        np.testing.assert_array_equal(part.names, EQUATIONS.names[kept])
-        np.testing.assert_array_equal(part.gps_time, EQUATIONS.gps_time[kept])
-        np.testing.assert_array_equal(part.misclosure.ravel(), EQUATIONS.misclosure.ravel()[rows])
-        np.testing.assert_array_equal(part.partials, EQUATIONS.partials[kept])
-        np.testing.assert_array_equal(part.stated.position, EQUATIONS.stated.position[kept])
-        whole = EQUATIONS.noise.matrix[np.ix_(rows, rows)]
-        np.testing.assert_allclose(part.noise.matrix, whole, atol=1e-18)
+    whole = ADJUSTMENT.targets
+    covariance = whole.noise.matrix[np.ix_(rows, rows)]
+    for chosen in (kept, np.flatnonzero(kept)):
+        part = ADJUSTMENT.select(chosen).targets
+        np.testing.assert_array_equal(part.name, whole.name[kept])
+        np.testing.assert_array_equal(part.gps_time, whole.gps_time[kept])
+        np.testing.assert_array_equal(part.misclosure, whole.misclosure[kept])
+        np.testing.assert_array_equal(part.partials, whole.partials[kept])
+        np.testing.assert_array_equal(part.stated.position, whole.stated.position[kept])
+        np.testing.assert_allclose(part.noise.matrix, covariance, atol=1e-18)
 
 
-def test_fall_backs_stay_with_any_choice_of_targets():
-    "Two targets of nine, and both fall-backs still follow them"
-    complete = with_reacquisitions(EQUATIONS, steps(60.0, 120.0))
+def test_steps_stay_with_any_choice_of_targets():
+    "Two targets of nine, and both re-acquisitions still follow them"
+    complete = with_reacquisitions(ADJUSTMENT, steps(60.0, 120.0))
     part = complete.select([4, 1])
-    assert part.names.tolist() == [EQUATIONS.names[4], EQUATIONS.names[1]]
-    assert part.fallbacks == 2 and len(part.gps_time) == 6
-    np.testing.assert_array_equal(part.gps_time[2::2], START + np.array([60.0, 120.0]))
-    np.testing.assert_array_equal(part.observed, EQUATIONS.gps_time[[4, 1]])
+    assert part.names.tolist() == [ADJUSTMENT.names[4], ADJUSTMENT.names[1]]
+    before = part.of_kind(REACQUISITION).gps_time[:, 0]
+    np.testing.assert_array_equal(before, START + np.array([60.0, 120.0]))
+    np.testing.assert_array_equal(part.observed, ADJUSTMENT.observed[[4, 1]])
 
 
-def test_outer_fall_backs_go():
-    "Of fall-backs before, within and after the control span only the one within stays"
-    first, last = (time - START for time in EQUATIONS.span)
-    complete = with_reacquisitions(EQUATIONS, steps(first / 2, 100.0, (last + LENGTH) / 2))
-    inner = complete.without_outer_fallbacks()
-    assert inner.fallbacks == 1 and len(inner.gps_time) == N + 2
-    assert inner.gps_time[-2] == START + 100.0
-    assert EQUATIONS.without_outer_fallbacks().fallbacks == 0
+def test_outer_steps_go():
+    "Of re-acquisitions before, within and after the control span only the one within stays"
+    first, last = (time - START for time in ADJUSTMENT.span)
+    complete = with_reacquisitions(ADJUSTMENT, steps(first / 2, 100.0, (last + LENGTH) / 2))
+    inner = complete.without_outer_steps()
+    (step,) = inner.of_kind(REACQUISITION).gps_time
+    assert step[0] == START + 100.0 and len(inner.names) == N
+    outer = with_reacquisitions(ADJUSTMENT, steps(first / 2))
+    for none in (outer, ADJUSTMENT):
+        assert none.without_outer_steps().of_kind(REACQUISITION) is None
+
+
+def test_rows_of_targets_are_the_first_of_a_solution():
+    "Steps follow, three rows each, and a column of one kind is zero in the rows of the other"
+    complete = with_reacquisitions(ADJUSTMENT, steps(60.0, 120.0))
+    assert complete.rows_of(TARGET).tolist() == list(range(3 * N))
+    assert complete.rows_of(REACQUISITION).tolist() == list(range(3 * N, 3 * N + 6))
+    assert sorted(np.concatenate(list(complete.target_rows.values()))) == list(range(3 * N))
+    column = complete.stacked({REACQUISITION: np.ones((2, 3, 1))})[:, 0]
+    assert np.flatnonzero(column).tolist() == complete.rows_of(REACQUISITION).tolist()
+
+
+def test_what_is_added_to_misclosures_arrives_in_its_row():
+    "A solution's misclosures are those of the factors, one after the other, and what was added"
+    complete = with_reacquisitions(ADJUSTMENT, steps(60.0, 120.0))
+    added = np.random.default_rng(1).standard_normal(3 * N + 6)  # m
+    before, after = (each.solve(None).misclosure for each in (complete, complete.with_added(added)))
+    np.testing.assert_allclose(after - before, added, atol=1e-12)
+    step = complete.of_kind(REACQUISITION).misclosure.ravel()
+    np.testing.assert_array_equal(before[complete.rows_of(REACQUISITION)], step)
 
 
 def test_targets_are_left_out_by_name():
@@ -122,37 +146,36 @@ def test_gaps_of_the_trajectory_are_no_interval():
 
 def test_least_squares_is_the_solution_without_parameters():
     "Without signals the trend is the weighted least squares fit of the misclosures, to 1e-9 m"
-    solved = EQUATIONS.solve(None)
-    design = polynomial_design(EQUATIONS.gps_time, EQUATIONS.span, 1).reshape(3 * N, -1)
-    weight = np.linalg.inv(EQUATIONS.noise.matrix)
+    solved = ADJUSTMENT.solve(None)
+    design = polynomial_design(ADJUSTMENT.observed, ADJUSTMENT.span, 1).reshape(3 * N, -1)
+    weight = np.linalg.inv(ADJUSTMENT.targets.noise.matrix)
     normal = design.T @ weight @ design
-    expected = np.linalg.solve(normal, design.T @ weight @ EQUATIONS.misclosure.ravel())
+    expected = np.linalg.solve(normal, design.T @ weight @ ADJUSTMENT.targets.misclosure.ravel())
     np.testing.assert_allclose(solved.trend, expected, atol=1e-9)
 
 
 def test_a_step_adds_three_to_the_redundancy():
-    "sigma0 of two epochs of a step, whose place nothing tells, is that of one row of differences"
-    complete = with_reacquisitions(EQUATIONS, steps(80.0))
+    "A step is one observation of three rows, whatever the solver makes of its two epochs"
+    complete = with_reacquisitions(ADJUSTMENT, steps(80.0))
     objective = Objective.of(complete)
     solved = complete.solve(objective.parameters("matern32", objective.initial))
     squares = (solved.misclosure - solved.design @ solved.trend) @ solved.weights
+    assert len(solved.misclosure) == 3 * N + 3
+    believed, mean = solved.believed[:, :-1], solved.believed[:, -1]
+    squares += np.sum((believed @ solved.trend - mean) ** 2)
     redundancy = 3 * N + 3 + 6 - solved.design.shape[1]
-    squares += np.sum((solved.believed @ solved.trend) ** 2)
     assert solved.sigma0 == pytest.approx(np.sqrt(squares / redundancy), rel=1e-9)
 
 
 @pytest.mark.parametrize("family", ["exponential", "matern52", "integrated"])
 def test_the_solution_is_the_dense_one(family):
-    "With fall-backs, in any family: trend, likelihood and weights to 1e-7 of their size"
-    complete = with_reacquisitions(EQUATIONS, steps(80.0))
+    "With re-acquisitions, in any family: trend and likelihood to 1e-7, weights to 1e-6"
+    complete = with_reacquisitions(ADJUSTMENT, steps(80.0))
     objective = Objective.of(complete)
     parameters = objective.parameters(family, objective.initial)
     solved = complete.solve(parameters)
-    signals = pose_signals(complete.stated, parameters, complete.partials)
-    rows = SparseRows(
-        complete.gps_time[:, None], complete.misclosure, complete.noise, complete.design, signals
-    )
-    expected = collocate_rows_dense([rows], np.eye(6) / parameters.trend_sigma)
+    believed = complete.believed(parameters)
+    expected = collocate_rows_dense(complete.rows(parameters), believed)
     np.testing.assert_allclose(solved.trend, expected.trend, atol=1e-7)
     np.testing.assert_allclose(solved.weights, expected.weights, rtol=1e-6, atol=1e-4)
     assert solved.log_likelihood == pytest.approx(expected.log_likelihood, abs=1e-6)
@@ -176,15 +199,51 @@ def test_few_rows_with_ties_are_weighed_as_they_are_solved():
 def test_the_trend_moves_positions_only():
     "A of the pose has a polynomial on each axis and nothing on rotations, also past the span"
     times = START + np.array([0.0, 50.0, LENGTH])
-    design = replace(EQUATIONS, order=2).pose_design(times)
+    design = replace(ADJUSTMENT, order=2).pose_design(times)
     assert design.shape == (3, 6, 9) and not design[:, 3:].any()
-    np.testing.assert_array_equal(design[:, :3], polynomial_design(times, EQUATIONS.span, 2))
+    np.testing.assert_array_equal(design[:, :3], polynomial_design(times, ADJUSTMENT.span, 2))
 
 
 def test_other_starts_change_beliefs_and_nothing_else():
-    "Drift that begins later: the same rows, and epochs of the whole drive that know of it"
-    later = EQUATIONS.with_starts(EQUATIONS.stated.starts + 30.0)
-    np.testing.assert_array_equal(later.misclosure, EQUATIONS.misclosure)
-    np.testing.assert_array_equal(later.stated.starts, EQUATIONS.stated.starts + 30.0)
-    np.testing.assert_array_equal(later.stated_epochs.starts, later.stated.starts)
-    assert len(later.stated_epochs.gps_time) == len(EQUATIONS.trajectory)
+    "Drift that begins later: the same rows, and all factors and epochs of the drive have it"
+    complete = with_reacquisitions(ADJUSTMENT, steps(80.0))
+    starts = complete.errors.starts + 30.0
+    later = complete.with_starts(starts)
+    for before, after in zip(complete.factors, later.factors, strict=True):
+        np.testing.assert_array_equal(after.misclosure, before.misclosure)
+        np.testing.assert_array_equal(after.stated.starts, starts)
+    np.testing.assert_array_equal(later.errors.starts, starts)
+    np.testing.assert_array_equal(later.errors.epochs.starts, starts)
+    assert len(later.errors.epochs.gps_time) == len(ADJUSTMENT.trajectory)
+
+
+def test_what_is_known_of_unknowns_is_no_row_but_a_belief():
+    "Each prior is a row of believed: its unknown over its sigma, and the value that is believed"
+    columns = {TARGET: np.random.default_rng(2).standard_normal((N, 3, 2))}
+    mean = np.array([0.3, -0.1])
+    sigma = np.array([0.02, np.inf])  # nothing is known of the second
+    wider = ADJUSTMENT.with_unknowns(columns, mean, sigma)
+    assert wider.unknowns == 2 and len(wider.rows(None)) == 1
+    row = np.append(np.eye(8)[0], 0.3) / 0.02
+    np.testing.assert_allclose(wider.believed(None), row[None])
+    objective = Objective.of(wider)
+    parameters = objective.parameters("matern32", objective.initial)
+    believed = wider.believed(parameters)
+    np.testing.assert_allclose(believed[0], row)
+    np.testing.assert_allclose(believed[1:, 2:8], np.eye(6) / parameters.trend_sigma)
+    assert not believed[1:, :2].any() and not believed[1:, -1].any()
+
+
+def test_unknowns_that_come_later_leave_what_is_believed_of_others():
+    "Two at once or one after the other: the same columns, the same beliefs, the same solution"
+    columns = np.random.default_rng(3).standard_normal((N, 3, 2))
+    mean = np.array([0.3, -0.1])
+    sigma = np.array([0.02, 0.05])
+    at_once = ADJUSTMENT.with_unknowns({TARGET: columns}, mean, sigma)
+    in_turn = ADJUSTMENT
+    for number in range(2):
+        only = slice(number, number + 1)
+        in_turn = in_turn.with_unknowns({TARGET: columns[:, :, only]}, mean[only], sigma[only])
+    np.testing.assert_array_equal(in_turn.believed(None), at_once.believed(None))
+    expected = at_once.solve(None)
+    np.testing.assert_allclose(in_turn.solve(None).trend, expected.trend, atol=1e-9)

@@ -1,4 +1,4 @@
-"""The observation equations are the derivatives of misclosures, and their noise is all of it."""
+"""Factors are the derivatives of misclosures, and their noise is all of it."""
 
 from dataclasses import replace
 
@@ -6,11 +6,22 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mlscorr.estimate import estimate_correction, position_adjustment, position_prior
-from mlscorr.estimate.adjustment import _noise, mounting_adjustment, with_reacquisitions
-from mlscorr.estimate.posterior import mounting_prior
-from mlscorr.frames import georeference, to_scanner
-from mlscorr.pos import Steps
+from mlscorr.collocation import Noise, collocate_rows_dense
+from mlscorr.estimate import (
+    TARGET,
+    Factor,
+    Objective,
+    estimate_correction,
+    position_adjustment,
+    position_prior,
+    target_factor,
+)
+from mlscorr.estimate._prediction import pose_rows, predict_under
+from mlscorr.estimate.adjustment import mounting_adjustment, with_reacquisitions
+from mlscorr.estimate.factors import PRIOR, REACQUISITION
+from mlscorr.estimate.posterior import choose_parameters, mounting_prior
+from mlscorr.frames import georeference, pose_partials, to_scanner
+from mlscorr.pos import PosErrors, Steps
 from mlscorr.survey import SEARCH_RADIUS, Matched, Mounting, Pos
 from tests.beds.pos_errors import CONSTANT, EPOCHS, NOISE, START, SURVEYED, Case, smooth_case
 
@@ -37,16 +48,16 @@ def test_passes_of_one_target_share_its_survey_error():
 def test_partials_are_what_a_pose_moves():
     "Moved by 1 mm and turned by 1e-6 rad, the targets move as B says, to 1e-9 m"
     case = smooth_case(3, n=6)
-    adjustment = case.adjustment()
+    partials = case.adjustment().targets.partials[:, 0]
     times = case.observations.gps_time
     pose = case.recorded.at(times)
     body = pose.attitude.inv().apply(case.observations.position - pose.position)
     for axis in range(3):
         unit = np.eye(3)[axis]
-        assert adjustment.partials[:, :, axis] == pytest.approx(np.tile(unit, (6, 1)))
+        assert partials[:, :, axis] == pytest.approx(np.tile(unit, (6, 1)))
         turned = (Rotation.from_rotvec(1e-6 * unit) * pose.attitude).apply(body)
         moved = (turned - pose.attitude.apply(body)) / 1e-6
-        np.testing.assert_allclose(adjustment.partials[:, :, 3 + axis], moved, atol=1e-4)
+        np.testing.assert_allclose(partials[:, :, 3 + axis], moved, atol=1e-4)
 
 
 def test_misclosures_are_surveyed_less_observed():
@@ -56,9 +67,9 @@ def test_misclosures_are_surveyed_less_observed():
     case.observations = case.observations[shuffled]
     adjustment = case.adjustment()
     expected = (case.control.position - case.observations.position[np.argsort(shuffled)])[shuffled]
-    np.testing.assert_allclose(adjustment.misclosure, expected, atol=1e-9)
+    np.testing.assert_allclose(adjustment.targets.misclosure, expected, atol=1e-9)
     assert adjustment.names.tolist() == [case.control.name[i] for i in shuffled]
-    np.testing.assert_array_equal(adjustment.gps_time, case.observations.gps_time)
+    np.testing.assert_array_equal(adjustment.observed, case.observations.gps_time)
 
 
 def test_two_passes_share_the_survey_alone():
@@ -66,7 +77,8 @@ def test_two_passes_share_the_survey_alone():
     case = Case(EPOCHS, CONSTANT, [50.0, 90.0], np.random.default_rng(2))
     observations = case.observations[np.array([0, 1, 0])]
     matched = Matched.by_name(observations, case.control)
-    noise = position_adjustment(case.recorded, matched, Pos(), 0, position_prior).noise.matrix
+    adjustment = position_adjustment(case.recorded, matched, Pos(), 0, position_prior)
+    noise = adjustment.targets.noise.matrix
     between = SURVEYED**2 * np.eye(3)
     np.testing.assert_allclose(noise[0:3, 6:9], between, atol=1e-15)
     np.testing.assert_allclose(noise[0:3, 0:3], between + NOISE**2 * np.eye(3), atol=1e-15)
@@ -74,41 +86,48 @@ def test_two_passes_share_the_survey_alone():
 
 
 def steps_at(*times, size=0.5):
-    "Fall-backs of the POS at times (s after the start)"
+    "Re-acquisitions of GNSS at times (s after the start)"
     at = START + np.array(times)
     n = len(times)
     return Steps(at, at + 0.1, np.tile([size, 0.0, 0.0], (n, 1)), np.full(n, 0.01))
 
 
-def test_a_fall_back_is_a_place_seen_before_and_after_it():
-    "Of two views of a place that nobody surveyed only the difference counts: step and its sigma"
+def test_a_step_is_seen_by_the_poses_before_and_after_it():
+    "By as much as the path steps its error does: I before, -I after, and the step's variance"
     adjustment = smooth_case(5, n=8).adjustment(order=1)
     steps = steps_at(60.0, 120.0)
     complete = with_reacquisitions(adjustment, steps)
-    assert complete.fallbacks == 2 and len(complete.names) == 8 and len(complete.gps_time) == 12
-    ends = np.column_stack([steps.before, steps.after]).ravel()
-    np.testing.assert_array_equal(complete.gps_time[-4:], ends)
-    before, after = complete.misclosure[-4:].reshape(2, 2, 3).swapaxes(0, 1)
-    np.testing.assert_array_equal(before - after, steps.size)
-    np.testing.assert_array_equal(complete.partials[-1], np.eye(3, 6))
-    covariance = complete.noise.matrix
-    difference = np.hstack([np.eye(3), -np.eye(3)])
-    for first in (-12, -6):
-        rows = slice(first, first + 6 or None)
-        of_both = difference @ covariance[rows, rows] @ difference.T
-        np.testing.assert_allclose(of_both, 0.01**2 * np.eye(3), atol=1e-9)
-        assert np.diag(covariance)[rows].min() > SEARCH_RADIUS**2
-    assert not covariance[:-12, -12:].any() and not covariance[-12:-6, -6:].any()
-    assert not complete.design[-4:].any() and complete.design[:-4].any()
+    assert complete.targets is adjustment.targets
+    factor = complete.of_kind(REACQUISITION)
+    np.testing.assert_array_equal(factor.gps_time, np.column_stack([steps.before, steps.after]))
+    np.testing.assert_array_equal(factor.stated.gps_time, factor.gps_time.ravel())
+    np.testing.assert_array_equal(factor.misclosure, steps.size)
+    for partials in factor.partials:
+        np.testing.assert_array_equal(partials, [np.eye(3, 6), -np.eye(3, 6)])
+    np.testing.assert_allclose(factor.noise.matrix, 0.01**2 * np.eye(6), atol=1e-18)
+    np.testing.assert_allclose(factor.variance, 0.01**2)
+
+
+def test_a_step_tells_what_the_trend_differs_by():
+    "A line that drifts by 1 m in 200 s differs by 0.5 mm over 0.1 s, a shift by nothing"
+    adjustment = smooth_case(5, n=8).adjustment(order=1)
+    complete = with_reacquisitions(adjustment, steps_at(60.0))
+    step = complete.rows(None)[1]
+    ends = complete.pose_design(step.gps_time.ravel())[:, :3]
+    np.testing.assert_allclose(step.design[0], ends[0] - ends[1], atol=1e-12)
+    shift = replace(complete, order=0).rows(None)[1]
+    assert not shift.design.any()
 
 
 def test_no_step_no_row():
-    "Without fall-backs the equations are the same object; a jump of kilometres is none"
+    "Without re-acquisitions there is no factor of them; a jump of kilometres is none"
     adjustment = smooth_case(6, n=5).adjustment()
-    assert with_reacquisitions(adjustment, steps_at()) is adjustment
-    assert with_reacquisitions(adjustment, steps_at(50.0, size=2000.0)) is adjustment
-    gate = SEARCH_RADIUS
-    assert with_reacquisitions(adjustment, steps_at(50.0, size=0.99 * gate)).fallbacks == 1
+    for none in (steps_at(), steps_at(50.0, size=2000.0)):
+        assert with_reacquisitions(adjustment, none).factors == adjustment.factors
+        before = with_reacquisitions(adjustment, steps_at(50.0))
+        assert with_reacquisitions(before, none).factors == adjustment.factors
+    largest = steps_at(50.0, size=0.99 * SEARCH_RADIUS)
+    assert len(with_reacquisitions(adjustment, largest).of_kind(REACQUISITION)) == 1
 
 
 def mounting_case():
@@ -130,19 +149,18 @@ def test_a_mounting_moves_targets_as_its_columns_say():
         turn = Rotation.from_rotvec(small[3:]) * MOUNTING.boresight
         other = Mounting(MOUNTING.lever_arm + small[:3], turn)
         moved = (georeference(case.recorded, other, scanned, times) - before) / 1e-6
-        np.testing.assert_allclose(adjustment.mounting[:6, :, k], moved, atol=2e-3)
+        np.testing.assert_allclose(adjustment.targets.columns[:, :, k], moved, atol=2e-3)
 
 
-def test_two_epochs_hold_the_mounting_weakly():
-    "What was corrected already comes back as a misclosure with the sigmas of no measurement"
+def test_a_mounting_is_weakly_known():
+    "What was corrected already is believed to be needed back, with the sigmas of no measurement"
     case, position = mounting_case()
     corrected = np.array([0.1, -0.2, 0.3, 0.01, 0.02, -0.03])
     adjustment = mounting_adjustment(position, case.matched, [MOUNTING], corrected, WEAK)
-    assert len(adjustment.gps_time) == 8 and adjustment.fallbacks == 0
-    np.testing.assert_array_equal(adjustment.misclosure[-2:].ravel(), -corrected)
-    np.testing.assert_allclose(np.diag(adjustment.noise.matrix)[-6:], WEAK**2)
-    np.testing.assert_array_equal(adjustment.mounting[-2:].reshape(6, 6), np.eye(6))
-    assert not adjustment.partials[-2:].any()
+    assert [factor.kind for factor in adjustment.factors] == [TARGET, PRIOR]
+    expected = np.column_stack([np.eye(6), -corrected]) / WEAK[:, None]
+    np.testing.assert_allclose(adjustment.believed(None), expected, rtol=1e-12)
+    assert len(adjustment.solve(None).misclosure) == 18
     assert not adjustment.pose_design(case.recorded.gps_time[:4]).any()
 
 
@@ -161,11 +179,118 @@ def test_what_was_observed_stays_as_it_was():
     "A target seen inside a step has the step in its noise; the observations' own covariance stays"
     case = smooth_case(5, n=6)
     covariance = case.matched.observations.covariance.copy()
-    time = case.observations.gps_time[2:3]
-    adjustment = case.adjustment()
-    steps = Steps(time - 0.1, time + 0.1, np.array([[0.5, 0.0, 0.0]]), np.array([0.01]))
-    stepped = _noise(case.matched, steps).own
-    assert stepped[2, 0, 0] - covariance[2, 0, 0] == pytest.approx(0.25)  # m^2
-    np.testing.assert_array_equal(np.delete(stepped, 2, axis=0), np.delete(covariance, 2, axis=0))
+    at = int(np.searchsorted(case.recorded.gps_time, case.observations.gps_time[2]))
+    position = case.recorded.position.copy()
+    position[at:] += [0.5, 0.0, 0.0]  # m, between the epochs about the target
+    stepped = replace(case.recorded, position=position)
+    own = target_factor(PosErrors.stated(stepped), case.matched).noise.own
+    added = np.diag([0.25, 0.0, 0.0])  # m^2
+    np.testing.assert_allclose(own[2] - covariance[2], added, atol=0.01)
+    others = np.arange(6) != 2
+    np.testing.assert_array_equal(own[others], covariance[others])
     np.testing.assert_array_equal(case.matched.observations.covariance, covariance)
-    np.testing.assert_array_equal(adjustment.noise.own, covariance)
+    np.testing.assert_array_equal(case.adjustment().targets.noise.own, covariance)
+
+
+def spot_heights(case, times, sigma=0.01):
+    """Another kind of control: spots of known height on a sloping road below the vehicle.
+
+    A row each along the normal n of the road: n^T (surveyed - observed), partials n^T [I, -[G]x].
+    """
+    rng = np.random.default_rng(17)
+    gps_time = START + times
+    n = len(times)
+    pose = case.recorded.at(gps_time)
+    true = case.true.at(gps_time)
+    arm = pose.attitude.apply([3.0, 1.0, -2.0])  # m, G
+    error = true.position - pose.position
+    error += true.attitude.apply([3.0, 1.0, -2.0]) - arm
+    normal = np.array([0.02, -0.03, 1.0]) / np.linalg.norm([0.02, -0.03, 1.0])
+    errors = PosErrors.stated(case.recorded)
+    partials = pose_partials(case.recorded, pose.position + arm, gps_time)
+    return Factor(
+        kind="height",
+        name=np.array([f"H{i}" for i in range(n)]),
+        gps_time=gps_time[:, None],
+        misclosure=(error @ normal + sigma * rng.standard_normal(n))[:, None],
+        noise=Noise(np.full((n, 1, 1), sigma**2)),
+        partials=(normal @ partials)[:, None, None],
+        stated=errors.at(gps_time),
+    )
+
+
+@pytest.fixture(scope="module")
+def with_heights():
+    "Six targets and a re-acquisition, the same with 40 spot heights, and parameters"
+    case = smooth_case(8, n=6)
+    alone = with_reacquisitions(case.adjustment(order=1), steps_at(120.0, size=0.001))
+    heights = spot_heights(case, np.linspace(2.5, 197.5, 40))
+    objective = Objective.of(alone)
+    parameters = objective.parameters("matern32", objective.initial)
+    return case, alone, alone.with_factor(heights), parameters
+
+
+def test_another_kind_of_control_is_solved_with_the_others(with_heights):
+    """Rows of its own kind behind the others, and the dense solution to 1e-5 m in trend and signal;
+    to a tenth of a sigma with knots as far apart as they are by default.
+    """
+    _, alone, coarse, parameters = with_heights
+    both = replace(coarse, tolerance=0.0)
+    size = alone.solve(parameters).misclosure.size
+    assert both.rows_of("height").tolist() == list(range(size, size + 40))
+    assert np.array_equal(both.rows_of(TARGET), alone.rows_of(TARGET))
+    solved = both.solve(parameters)
+    expected = collocate_rows_dense(both.rows(parameters), both.believed(parameters))
+    asked = pose_rows(both, parameters, np.arange(5, len(both.trajectory), 50))
+    pose, spread = solved.predict(*asked)
+    dense, dense_spread = expected.predict(*asked)
+    assert np.abs(pose - dense)[:, :3].max() < 1e-5  # m
+    np.testing.assert_allclose(_sigma(spread), _sigma(dense_spread), rtol=0.01)
+    by_default = coarse.solve(parameters).predict_mean(*asked)
+    assert np.abs((by_default - dense)[:, :3] / _sigma(dense_spread)).max() < 0.1
+    residual, covariance = solved.leave_out(both.rows_of("height")[[7]])
+    dense_residual, dense_covariance = expected.leave_out(both.rows_of("height")[[7]])
+    assert residual == pytest.approx(dense_residual, abs=1e-5)  # m
+    assert covariance == pytest.approx(dense_covariance, rel=0.01)
+
+
+def test_spot_heights_lower_the_sigma_of_the_height_between_targets(with_heights):
+    "At the median epoch to less than half, honestly; easting and northing gain next to nothing"
+    case, alone, both, parameters = with_heights
+    rows = np.arange(0, len(alone.trajectory), 10)
+    (_, before), (pose, after) = (predict_under(each, parameters, rows) for each in (alone, both))
+    ratio = np.median(_sigma(after) / _sigma(before), axis=0)
+    assert ratio[2] < 0.5 and (ratio[:2] > 0.9).all()
+    left = (case.true.position - case.recorded.position)[rows, 2] - pose[:, 2]
+    assert np.mean(np.abs(left) < 2 * _sigma(after)[:, 2]) > 0.88
+
+
+def test_a_likelihood_changes_smoothly_with_any_kind_of_control(with_heights):
+    "Differences over 1e-3 of a logarithm, with knots used again, are those of the dense formula"
+    _, _, both, parameters = with_heights
+    near = [replace(parameters, drift_scale=(1.0 + h) * parameters.drift_scale) for h in (1e-3, 0)]
+    fast = both.likelihoods(near, parameters, both.weigh(parameters))
+    dense = [
+        collocate_rows_dense(both.rows(each), both.believed(each)).log_likelihood for each in near
+    ]
+    assert fast[0] - fast[1] == pytest.approx(dense[0] - dense[1], rel=0.01)
+
+
+def test_any_kind_of_control_counts_once_where_parameters_are_chosen():
+    "One target and 40 heights choose them; 150 targets with heights are not cut into two blocks"
+    case = smooth_case(8, n=150)
+    many = case.adjustment()
+    heights = spot_heights(case, np.linspace(2.5, 197.5, 40))
+    assert len(Objective.of(many).blocks) == 2
+    assert len(Objective.of(many.with_factor(heights)).blocks) == 1
+    one = many.select([75])
+    stated = Objective.of(one)
+    for adjustment, is_chosen in ((one, False), (one.with_factor(heights), True)):
+        (best, _), *_ = choose_parameters(adjustment, points=2).modes
+        start = stated.parameters(best.family, stated.initial)
+        assert (best != start) == is_chosen
+
+
+def _sigma(covariance):
+    "One sigma (k, 3) of the position"
+    return np.sqrt(np.einsum("qii->qi", covariance)[:, :3])

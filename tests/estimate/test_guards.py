@@ -1,6 +1,5 @@
 """What control points can't tell is said, with times and numbers."""
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -135,9 +134,9 @@ def test_understated_sigmas_fail_the_global_test_and_true_ones_do_not():
     "Control points four times as far off as they say are told of, beside drift that is as it says"
     adjustment = smooth_case(13, n=24).adjustment()
     parameters = choose_parameters(adjustment).modes[0][0]
-    noise = np.random.default_rng(3).normal(size=adjustment.misclosure.shape)
-    sigma = np.sqrt(np.einsum("nii->ni", adjustment.noise.separate))
-    spoiled = replace(adjustment, misclosure=adjustment.misclosure + np.sqrt(15.0) * sigma * noise)
+    sigma = np.sqrt(np.einsum("nii->ni", adjustment.targets.noise.separate)).ravel()
+    noise = np.random.default_rng(3).normal(size=sigma.shape)
+    spoiled = adjustment.with_added(np.sqrt(15.0) * sigma * noise)
     assert _global_test(adjustment, parameters).passed
     assert not _global_test(spoiled, parameters).passed
 

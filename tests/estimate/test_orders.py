@@ -36,13 +36,14 @@ def test_left_out_misclosures_are_those_of_an_estimate_without_the_target(number
     alone = np.arange(16) == number
     one = adjustment.select(alone)
     others = adjustment.select(~alone)
-    signals = pose_signals(one.stated, estimate.parameters, one.partials)
+    target = one.targets
+    signals = pose_signals(target.stated, estimate.parameters, target.partials[:, 0])
     mixings = [signal.mixing for signal in signals]
-    design = others.pose_design(one.gps_time)[:, :3]
+    design = others.pose_design(one.observed)[:, :3]
     solved = others.solve(estimate.parameters)
     clocks = [signal.clock for signal in signals]
-    mean, _ = solved.predict(one.gps_time, design, mixings, clocks)
-    assert estimate.left_out[number] == pytest.approx((one.misclosure - mean)[0], abs=1e-9)
+    mean, _ = solved.predict(one.observed, design, mixings, clocks)
+    assert estimate.left_out[number] == pytest.approx((target.misclosure - mean)[0], abs=1e-9)
 
 
 @pytest.mark.long
@@ -110,20 +111,21 @@ def test_probabilities_follow_likelihood_and_prior(adjustment, alternatives):
 def test_the_likelihood_is_that_of_a_trend_with_a_prior(adjustment, alternatives):
     "It is the density of misclosures with coefficients of the trend's sigma, to 1e-6"
     row = next(row for row in alternatives if row.order == 0)
-    signals = pose_signals(adjustment.stated, row.parameters, adjustment.partials)
+    targets = adjustment.targets
+    signals = pose_signals(targets.stated, row.parameters, targets.partials[:, 0])
     n = 3 * len(adjustment.names)
-    total = adjustment.noise.matrix.copy()
+    total = targets.noise.matrix.copy()
     for signal in signals:
         if signal.clock is None:
-            clock = adjustment.gps_time
+            clock = adjustment.observed
         else:
             clock = signal.clock
         time = np.repeat(clock, 3)
         mixing = signal.mixing.reshape(n, -1)
         total += (mixing @ mixing.T) * signal.covariance(time[:, None] - time)
-    design = polynomial_design(adjustment.gps_time, adjustment.span, 0).reshape(n, -1)
+    design = polynomial_design(adjustment.observed, adjustment.span, 0).reshape(n, -1)
     wide = total + row.parameters.trend_sigma**2 * design @ design.T
-    density = multivariate_normal(np.zeros(n), wide).logpdf(adjustment.misclosure.ravel())
+    density = multivariate_normal(np.zeros(n), wide).logpdf(targets.misclosure.ravel())
     assert row.log_likelihood == pytest.approx(density, abs=1e-6)
 
 
@@ -161,4 +163,5 @@ def test_two_targets_test_each_other_under_a_shift_that_may_be_anything():
     case = Case(EPOCHS, CONSTANT, even(2), np.random.default_rng(5))
     shift = case.adjustment(order=0)
     left = leave_targets_out(shift, shift.solve(None))
-    np.testing.assert_allclose(left[0], shift.misclosure[0] - shift.misclosure[1], atol=1e-9)
+    first, second = shift.targets.misclosure
+    np.testing.assert_allclose(left[0], first - second, atol=1e-9)

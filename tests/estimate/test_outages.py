@@ -1,4 +1,4 @@
-"""A POS that doesn't say when it drifts: its fall-backs and the control points do."""
+"""A POS that doesn't state when it drifts: its re-acquisitions and the control points do."""
 
 from dataclasses import replace
 
@@ -14,8 +14,8 @@ from mlscorr.estimate import (
     with_ties,
 )
 from mlscorr.estimate.adjustment import with_reacquisitions
-from mlscorr.pos import Steps
-from mlscorr.survey import Matched, Pos, Ties, Trajectory
+from mlscorr.estimate.factors import REACQUISITION
+from mlscorr.survey import Matched, Pos, Ties
 from tests.beds.lying_pos import START, TIME, survey, walk
 from tests.beds.pos_errors import EPOCHS, Case, outage
 
@@ -94,9 +94,9 @@ def corrected_by_estimate(trajectory, matched):
 def test_the_start_of_an_outage_is_found_between_control_points(outages):
     "Drift begins to grow within 25 s of the truth, and the path tells its end"
     for _, _, estimate in outages:
-        stated = estimate.adjustment.stated
-        assert stated.history.restarts == pytest.approx([START + 139.95], abs=0.3)
-        assert stated.starts[0] == pytest.approx(START + 80.0, abs=25.0)
+        errors = estimate.adjustment.errors
+        assert errors.history.restarts == pytest.approx([START + 139.95], abs=0.3)
+        assert errors.starts[0] == pytest.approx(START + 80.0, abs=25.0)
 
 
 def test_control_in_a_smoothed_outage_leaves_the_rest_alone():
@@ -137,7 +137,7 @@ def test_ties_tell_when_an_outage_began_where_no_control_point_does():
         trajectory, matched = survey(rng, error, EVEN[[0, 1, -2, -1]])
         alone = estimate_correction(trajectory, matched, BELIEVED)
         tied = with_ties(alone, ties_across(rng, error, trajectory, 400))
-        assert tied.adjustment.stated.starts[0] == pytest.approx(START + 80.0, abs=8.0)
+        assert tied.adjustment.errors.starts[0] == pytest.approx(START + 80.0, abs=8.0)
         left = [
             rms(error - (e.correction.corrected.position - trajectory.position))
             for e in (alone, tied)
@@ -168,7 +168,7 @@ def ties_across(rng, error, trajectory, number):
     )
 
 
-def test_a_fall_back_tells_the_end_of_an_outage_without_control():
+def test_a_step_tells_the_end_of_an_outage_without_control():
     "No control point in the last 40 s of an outage: its end is known to 10 cm all the same"
     rng = np.random.default_rng(7)
     error = walk(rng, 80.0, 140.0, 0.01)
@@ -191,38 +191,51 @@ def test_a_step_into_an_error_does_no_harm():
     assert not estimate.outliers
 
 
+def joined(trajectory, matched, after, away):
+    "The same, with map coordinates that are elsewhere from a time on: no error steps with them"
+    moved = (trajectory.gps_time > START + after)[:, None] * np.asarray(away)
+    rows = np.searchsorted(trajectory.gps_time, matched.gps_time)
+    observed = replace(matched.observations, position=matched.observations.position + moved[rows])
+    surveyed = replace(matched.surveyed, position=matched.surveyed.position + moved[rows])
+    return replace(trajectory, position=trajectory.position + moved), Matched(observed, surveyed)
+
+
 def test_steps_that_control_contradicts_are_left_out():
-    "A drift of 3 m just before a step where control saw none: only the restart stays"
+    "The path steps by 3 m where control sees no error on either side: only the restart stays"
     rng = np.random.default_rng(3)
     error = walk(rng, 300.0, 300.0)
     times = np.sort(np.append(EVEN, [119.0, 119.5]))
-    trajectory, matched = survey(rng, error, times)
+    drive = survey(rng, error, times)
+    trajectory, matched = joined(*drive, 119.65, [3.0, 0.0, 0.0])
     adjustment = position_adjustment(trajectory, matched, BELIEVED, 1, position_prior)
-    at = np.array([START + 119.6])
-    step = Steps(at, at + 0.1, np.array([[3.0, 0.0, 0.0]]), np.array([0.01]))
-    history = replace(adjustment.stated.history, steps=step, restarts=step.middle)
-    stated = replace(adjustment.stated, history=history, starts=np.array([START, START + 119.65]))
-    doubted = replace(adjustment, stated=stated)
-    assert with_reacquisitions(doubted, step).fallbacks == 1
-    assert with_drift_history(doubted).fallbacks == 0
+    history = adjustment.errors.history
+    assert len(history.steps) == 1 and len(history.restarts) == 1
+    with_step = with_reacquisitions(adjustment, history.steps)
+    assert len(with_step.of_kind(REACQUISITION)) == 1
+    assert with_drift_history(adjustment).of_kind(REACQUISITION) is None
 
 
-def test_a_drive_joined_of_two_needs_no_fall_back():
+def test_a_step_that_control_confirms_stays_beside_those_that_it_does_not():
+    "A jump of a kilometre, the end of an outage, and a step that control contradicts: one is used"
+    rng = np.random.default_rng(3)
+    error = walk(rng, 80.0, 140.0)
+    drive = survey(rng, error, np.sort(np.append(EVEN, [199.0, 199.5])))
+    drive = joined(*drive, 40.0, [1000.0, 0.0, 0.0])
+    trajectory, matched = joined(*drive, 199.65, [3.0, 0.0, 0.0])
+    adjustment = position_adjustment(trajectory, matched, BELIEVED, 1, position_prior)
+    assert len(adjustment.errors.history.steps) == 3
+    steps = with_drift_history(adjustment).of_kind(REACQUISITION)
+    assert steps.gps_time.mean() - START == pytest.approx(139.95, abs=0.3)  # s
+
+
+def test_a_drive_joined_of_two_needs_no_step():
     "A jump of a kilometre is a restart, and nothing tells that the drift had grown to it"
     rng = np.random.default_rng(5)
     error = walk(rng, 300.0, 300.0)
-    trajectory, matched = survey(rng, error, EVEN)
-    away = np.where(trajectory.gps_time > START + 120.0, 1000.0, 0.0)[:, None] * [1.0, 0.0, 0.0]
-    joined = Trajectory(trajectory.gps_time, trajectory.position + away, trajectory.attitude)
-    rows = np.searchsorted(trajectory.gps_time, matched.gps_time)
-    place = matched.observations.position + away[rows]
-    matched = Matched(
-        replace(matched.observations, position=place),
-        replace(matched.surveyed, position=matched.surveyed.position + away[rows]),
-    )
-    adjustment = position_adjustment(joined, matched, BELIEVED, 1, position_prior)
-    assert len(adjustment.stated.history.steps) == 1
-    assert with_drift_history(adjustment).fallbacks == 0
+    trajectory, matched = joined(*survey(rng, error, EVEN), 120.0, [1000.0, 0.0, 0.0])
+    adjustment = position_adjustment(trajectory, matched, BELIEVED, 1, position_prior)
+    assert len(adjustment.errors.history.steps) == 1
+    assert with_drift_history(adjustment).of_kind(REACQUISITION) is None
 
 
 def test_a_target_in_the_middle_of_a_step_has_it_in_its_noise():
@@ -231,8 +244,8 @@ def test_a_target_in_the_middle_of_a_step_has_it_in_its_noise():
     error = walk(rng, 80.0, 140.0, 0.02)
     trajectory, matched = survey(rng, error, np.sort(np.append(EVEN, 139.95)))
     adjustment = position_adjustment(trajectory, matched, BELIEVED, 1, position_prior)
-    steps = adjustment.stated.history.steps
+    steps = adjustment.errors.history.steps
     inside = (matched.gps_time >= steps.before[0]) & (matched.gps_time <= steps.after[0])
     assert inside.sum() == 1
-    noise = np.einsum("nii->n", adjustment.noise.own)
+    noise = np.einsum("nii->n", adjustment.targets.noise.own)
     assert noise[inside][0] > 100 * noise[~inside].max()

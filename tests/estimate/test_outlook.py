@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from mlscorr.collocation import Noise
 from mlscorr.estimate import estimate_correction, with_ties
@@ -23,57 +22,39 @@ def variance(adjustment, parameters, rows):
 
 @pytest.fixture(scope="module")
 def gapped():
-    "Equations of a drive that has no control from 76 to 164 s, and their first family"
+    "Adjustment of a drive that has no control from 76 to 164 s, and its first family"
     trajectory, matched = survey(np.random.default_rng(5), slow_error(5), GAPPED)
     estimate = estimate_correction(trajectory, matched, BELIEVED)
     return estimate.adjustment, estimate.families[0]
 
 
 def observed_at(adjustment, row):
-    "The equations with a target that is seen at an epoch as the first control point is"
-    n = len(adjustment.names)
-    stated = adjustment.stated
-    at = np.insert(np.arange(len(adjustment.gps_time)), n, 0)
-    own = adjustment.noise.own[[0]]
-    epoch = adjustment.stated_epochs.at(np.array([row]))
-    added = {
-        name: np.insert(getattr(stated, name), n, getattr(epoch, name), axis=0)
-        for name in ("gps_time", "position", "angles", "least", "added", "drift")
-    }
-    turned = Rotation.concatenate([stated.rotation[:n], epoch.rotation, stated.rotation[n:]])
-    noise = adjustment.noise
-    return replace(
-        adjustment,
-        names=np.append(adjustment.names, "new"),
-        gps_time=np.insert(adjustment.gps_time, n, epoch.gps_time),
-        misclosure=np.insert(adjustment.misclosure, n, 0.0, axis=0),
-        partials=adjustment.partials[at],
-        stated=replace(stated, rotation=turned, **added),
-        noise=Noise(
-            np.insert(noise.own, n, own, axis=0),
-            np.insert(noise.group, n, len(noise.shared)),
-            np.vstack([noise.shared, noise.shared[noise.group[0]]]),
-        ),
+    "The adjustment with a target that is seen at an epoch as the first control point is"
+    gps_time = adjustment.trajectory.gps_time[[row]]
+    new = replace(
+        adjustment.targets.select([0]),
+        kind="new",
+        gps_time=gps_time[:, None],
+        stated=adjustment.errors.at(gps_time),
     )
+    return adjustment.with_factor(new)
 
 
 def test_a_target_leaves_what_a_solution_with_it_leaves(gapped):
     "Before and after, at all epochs, to 1e-6 of the variance, where all targets are alike"
     adjustment, family = gapped
-    n = len(adjustment.names)
-    own = np.tile(adjustment.noise.own[0], (len(adjustment.gps_time), 1, 1))
-    own[n:] = adjustment.noise.own[n:]
-    shared = np.tile(
-        adjustment.noise.shared[adjustment.noise.group[0]], (len(adjustment.noise.shared), 1)
-    )
-    partials = adjustment.partials.copy()
-    partials[:n] = partials[0]
-    alike = replace(adjustment, partials=partials, noise=Noise(own, adjustment.noise.group, shared))
-    rows = np.arange(0, len(alike.trajectory), 50)
-    row = int(np.searchsorted(alike.trajectory.gps_time, START + 120.0))
-    outlook = Outlook.of(alike, [family], rows, [[row]])
-    np.testing.assert_allclose(outlook.variance, variance(alike, family[0], rows), rtol=1e-6)
-    expected = variance(observed_at(alike, row), family[0], rows)
+    targets = adjustment.targets
+    noise = targets.noise
+    own = np.tile(noise.own[0], (len(targets), 1, 1))
+    shared = np.tile(noise.shared[noise.group[0]], (len(noise.shared), 1))
+    partials = np.tile(targets.partials[0], (len(targets), 1, 1, 1))
+    alike = replace(targets, partials=partials, noise=Noise(own, noise.group, shared))
+    adjustment = adjustment.with_factor(alike)
+    rows = np.arange(0, len(adjustment.trajectory), 50)
+    row = int(np.searchsorted(adjustment.trajectory.gps_time, START + 120.0))
+    outlook = Outlook.of(adjustment, [family], rows, [[row]])
+    np.testing.assert_allclose(outlook.variance, variance(adjustment, family[0], rows), rtol=1e-6)
+    expected = variance(observed_at(adjustment, row), family[0], rows)
     np.testing.assert_allclose(outlook.with_target(0).variance, expected, rtol=1e-6)
 
 
@@ -88,7 +69,7 @@ def test_the_best_target_is_the_one_that_lowers_the_variance_most(gapped):
 
 
 def sigma_ratio(estimate, fewer, step):
-    "Median, over every so manieth epoch, of the sigma by fewer Equations over that by all"
+    "Median, over every so manieth epoch, of the sigma by fewer rows over that by all"
     rows = np.arange(0, len(fewer.trajectory), step)
     some, complete = (
         np.sqrt(variance(adjustment, estimate.families[0][0], rows))

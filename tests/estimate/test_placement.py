@@ -76,12 +76,13 @@ def test_plates_that_face_three_ways_give_a_usual_target_too(gapped):
     "Medians of their covariances, element by element, are none: a place is found all the same"
     correlations = np.array([[0.9, 0.9, 0.7], [0.9, -0.7, -0.9], [-0.7, 0.9, -0.9]])
     n = len(gapped.adjustment.names)
-    own = gapped.adjustment.noise.own.copy()
+    targets = gapped.adjustment.targets
+    own = targets.noise.own.copy()
     for row, (en, eh, nh) in enumerate(correlations[np.arange(n) % 3]):
         own[row] = 0.004**2 * np.array([[1.0, en, eh], [en, 1.0, nh], [eh, nh, 1.0]])
-    assert np.linalg.eigvalsh(np.median(own[:n], axis=0))[0] < 0.0
-    noise = replace(gapped.adjustment.noise, own=own)
-    first = place_control(replace(gapped, adjustment=replace(gapped.adjustment, noise=noise)))[0]
+    assert np.linalg.eigvalsh(np.median(own, axis=0))[0] < 0.0
+    plates = replace(targets, noise=replace(targets.noise, own=own))
+    first = place_control(replace(gapped, adjustment=gapped.adjustment.with_factor(plates)))[0]
     assert 98.0 < first.gps_time - START < 142.0
 
 

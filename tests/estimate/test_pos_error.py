@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from mlscorr.estimate.pos_error import leave_targets_out
-from mlscorr.pos import pose_signals, stated_sigma
 from mlscorr.survey import Pos, Trajectory
 from tests.beds.pos_errors import (
     CONSTANT,
@@ -93,11 +92,8 @@ def test_beats_a_shift_even_with_the_wrong_correlation_time(factor, outages):
 def _predicted(adjustment, solved, parameters):
     "Position (n, 3) of trend and signals at the trajectory's epochs, and its covariance"
     trajectory = adjustment.trajectory
-    stated = stated_sigma(trajectory, adjustment.pos)
-    partials = np.zeros((len(trajectory), 3, 6))
-    partials[:, :, :3] = np.eye(3)
-    signals = pose_signals(stated, parameters, partials)
-    mixings = [signal.mixing for signal in signals]
+    signals = adjustment.errors.pose_signals(parameters)
+    mixings = [signal.mixing[:, :3] for signal in signals]
     design = adjustment.pose_design(trajectory.gps_time)[:, :3]
     clocks = [signal.clock for signal in signals]
     return solved.predict(trajectory.gps_time, design, mixings, clocks)

@@ -5,7 +5,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from mlscorr.estimate._tied_adjustment import TieEquations
 from scipy.stats import norm
 
 from mlscorr.collocation import FAMILIES, INTEGRATED
@@ -15,6 +14,7 @@ from mlscorr.estimate import (
     estimate_correction,
     position_adjustment,
     position_prior,
+    tie_factor,
 )
 from mlscorr.estimate.posterior import (
     IMPROBABLE,
@@ -219,7 +219,9 @@ def test_looks_of_a_target_keep_their_order_in_a_block():
     "Of 75 targets seen twice, in no order of time: what is said of each look is said of that look"
     times = np.random.default_rng(4).uniform(2.0, 198.0, 150)
     case = Case(EPOCHS, CONSTANT, times, np.random.default_rng(4))
-    adjustment = replace(case.adjustment(), names=np.array(case.control.name[:75] * 2))
+    adjustment = case.adjustment()
+    twice = replace(adjustment.targets, name=np.array(case.control.name[:75] * 2))
+    adjustment = adjustment.with_factor(twice)
     for block in Objective.of(adjustment).blocks:
         for name in block.target_rows:
             looks = (part.observed[part.names == name] for part in (block, adjustment))
@@ -255,9 +257,9 @@ def test_a_search_turns_back_from_scales_that_rounding_spoils():
     "Drift of kilometres beside ties seen twice to a micrometre: improbable, not the end"
     survey = tied_passes(1, number=40)
     control = estimate_correction(survey.trajectory, survey.matched).adjustment
-    ties = TieEquations.of(control.trajectory, control.pos, survey.ties, control.stated)
-    ties = replace(ties, variance=1e-7 * ties.variance).select(np.repeat(np.arange(40), 2))
-    objective = Objective.of(replace(control, ties=ties))
+    ties = tie_factor(control.errors, survey.ties).scaled(1e-7)
+    twice = ties.select(np.repeat(np.arange(40), 2))
+    objective = Objective.of(control.with_factor(twice))
     farthest = objective.initial + SETTINGS.farthest_spreads * objective.spread
     with pytest.raises(np.linalg.LinAlgError, match=r"not positive definite|Rounding leaves"):
         objective.blocks[0].weigh(objective.parameters("matern32", farthest))

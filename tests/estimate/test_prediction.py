@@ -47,11 +47,12 @@ def test_some_epochs_are_those_of_all(adjustment, parameters):
 
 def test_at_a_target_it_is_what_the_target_says(adjustment, parameters):
     "By B at a target's epoch the predicted misclosure is the observed one to its noise, 3 sigma"
-    rows = np.round((adjustment.gps_time - START) / 0.1).astype(int)
+    targets = adjustment.targets
+    rows = np.round((adjustment.observed - START) / 0.1).astype(int)
     pose, _ = predict_under(adjustment, parameters, rows)
-    predicted = np.einsum("nij,nj->ni", adjustment.partials, pose)
-    assert np.abs(predicted - adjustment.misclosure).max() < 0.02  # m
-    assert np.abs(adjustment.misclosure).max() > 0.05  # m
+    predicted = np.einsum("nij,nj->ni", targets.partials[:, 0], pose)
+    assert np.abs(predicted - targets.misclosure).max() < 0.02  # m
+    assert np.abs(targets.misclosure).max() > 0.05  # m
 
 
 def test_one_set_of_parameters_predicts_itself(adjustment, parameters):
@@ -66,7 +67,7 @@ def test_two_sets_are_mixed_by_weight(adjustment, parameters):
     "At control epochs mean and variance are those of a mixture of 30 and 70 %"
     other = replace(parameters, drift_time=parameters.drift_time / 3, drift_scale=2.0)
     mean, covariance = predict_pose_error(adjustment, sure((parameters, 0.3), (other, 0.7)))
-    rows = np.searchsorted(adjustment.trajectory.gps_time, adjustment.gps_time)
+    rows = np.searchsorted(adjustment.trajectory.gps_time, adjustment.observed)
     parts = [predict_under(adjustment, p, rows) for p in (parameters, other)]
     expected = 0.3 * parts[0][0] + 0.7 * parts[1][0]
     square = sum(
@@ -96,7 +97,7 @@ def test_the_last_epoch_of_an_outage_has_its_own_sigma():
     sigma = filtered_outage(rng)[1]
     case = Case(EPOCHS, waves(rng, 0.01), even(8), rng, sigma)
     adjustment = with_drift_history(case.adjustment())
-    history = adjustment.stated.history
+    history = adjustment.errors.history
     assert len(history.steps) == len(history.restarts) == 0 and len(history.returns) == 1
     last = np.searchsorted(case.recorded.gps_time, history.returns) - 1
     posterior = choose_parameters(adjustment, points=8)
@@ -169,7 +170,7 @@ def test_the_sigma_is_least_where_control_is(adjustment, posterior):
     "Of E and N the smallest sigma of the drive is beside a target, the largest far from all"
     _, covariance = predict_pose_error(adjustment, posterior)
     sigma = np.sqrt(np.einsum("qii->qi", covariance)[:, :2]).max(axis=1)
-    control = adjustment.gps_time - START
+    control = adjustment.observed - START
     away = np.abs(EPOCHS[:, None] - control).min(axis=1)
     assert away[np.argmin(sigma)] < 2.0 and away[np.argmax(sigma)] > 5.0  # s
 

@@ -12,16 +12,19 @@ from mlscorr.survey import Pos
 from tests.beds.pos_errors import CONSTANT, EPOCHS, Case, even, outage_case
 
 STEADY = "steady"
+PERFECT = "perfect"
 GROWING = "growing"
 
 
 def equations_of(kind, pos=None, n=5, prior=position_prior):
-    "Of a drive without sigmas, with steady ones, or with those of an outage"
+    "Of a drive without sigmas, with steady ones, all zero, or with those of an outage"
     if kind == GROWING:
         case = outage_case(1, n)
     else:
         if kind == STEADY:
             sigma = np.full((len(EPOCHS), 3), 0.02)
+        elif kind == PERFECT:
+            sigma = np.zeros((len(EPOCHS), 3))
         else:
             sigma = None
         case = Case(EPOCHS, CONSTANT, even(n), np.random.default_rng(1), sigma)
@@ -57,8 +60,8 @@ def test_noise_of_gnss_lasts_seconds_where_sigma_shows_what_grows(interval):
     growing = outage_case(1, 5).recorded.position_sigma
     for sigma, expected in ((growing, min(interval, 3.0)), (np.full_like(growing, 0.02), interval)):
         case = Case(EPOCHS, CONSTANT, times, np.random.default_rng(1), sigma)
-        equations = position_equations(case.recorded, case.matched, Pos(), 0, position_prior)
-        assert start(position_prior(equations), "jitter_time") == pytest.approx(expected)
+        adjustment = position_adjustment(case.recorded, case.matched, Pos(), 0, position_prior)
+        assert start(position_prior(adjustment), "jitter_time") == pytest.approx(expected)
 
 
 def test_without_sigmas_the_believed_time_holds():
@@ -79,16 +82,14 @@ def test_the_attitude_follows_the_drift_in_a_correction_alone():
     assert spread(calibration, "attitude_time") == pytest.approx(np.log(3.0))
 
 
-@pytest.mark.parametrize("kind", [None, STEADY, GROWING])
+@pytest.mark.parametrize("kind", [None, STEADY, GROWING, PERFECT])
 def test_jitter_and_bias_are_free_where_sigma_has_two_parts(kind):
     "A sigma without a part that GNSS holds has drift alone, and its four parameters stay"
     adjustment = equations_of(kind)
     free = {NAMES[i] for i in position_prior(adjustment).free}
-    is_split = bool(np.any(adjustment.stated.gnss))
+    is_split = bool(np.any(adjustment.errors.epochs.gnss))
     assert (set(SPLIT) <= free) == is_split and (not set(SPLIT) & free) == (not is_split)
-    nothing = replace(adjustment.stated, least=np.zeros((5, 3)), added=np.zeros((5, 3)))
-    hidden = replace(adjustment, stated=nothing)
-    assert not set(SPLIT) & {NAMES[i] for i in position_prior(hidden).free}
+    assert is_split == (kind != PERFECT)
 
 
 def test_scales_are_ten_and_times_two_or_three():

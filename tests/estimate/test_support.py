@@ -66,7 +66,7 @@ def test_a_sigma_that_hardly_rises_is_no_outage():
     size = 0.02 + 5.0 * (since / 60.0) ** 1.5 + 0.01 * (TIME > 225.0)
     stated = replace(trajectory, position_sigma=np.tile(size[:, None], 3))
     estimate = estimate_correction(stated, matched)
-    assert np.isfinite(estimate.adjustment.stated.starts[-1])
+    assert np.isfinite(estimate.adjustment.errors.starts[-1])
     ((_, end),) = estimate.support.outages
     assert end - START == pytest.approx(140.0, abs=0.2)
 

@@ -75,10 +75,10 @@ def test_redundancy_is_the_share_that_a_residual_shows(adjustment, known):
     parameters = known.points[0][0]
     solved = adjustment.solve(parameters)
     for number, test in enumerate(all_tests(adjustment, known)):
-        wrong = adjustment.misclosure.copy()
-        wrong[number, 2] += 1.0
-        moved = replace(adjustment, misclosure=wrong).solve(parameters)
-        noise = adjustment.noise.block(np.arange(3 * number, 3 * number + 3))
+        wrong = np.zeros(3 * len(adjustment.names))
+        wrong[3 * number + 2] = 1.0
+        moved = adjustment.with_added(wrong).solve(parameters)
+        noise = adjustment.targets.noise.block(np.arange(3 * number, 3 * number + 3))
         change = (moved.weights - solved.weights).reshape(-1, 3)[number]
         assert (noise @ change)[2] == pytest.approx(test.redundancy[0, 2], abs=1e-6)
 

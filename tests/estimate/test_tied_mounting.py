@@ -1,12 +1,10 @@
 """A mounting by control points and by planes that opposite passes both saw."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from mlscorr.estimate import calibration_with_ties, corrected_mounting, estimate_mounting
-from mlscorr.estimate.mounting import georeferenced_ties, linearized
+from mlscorr.estimate.mounting import georeferenced_ties, linearized, with_shift
 from tests.beds.tied_site import RECORDED, tied_site
 
 
@@ -53,30 +51,29 @@ def test_ties_tell_nothing_of_a_difference_between_coordinates(alone, tied):
 
 def test_partials_are_what_a_changed_mounting_does_to_the_misclosure(site, alone):
     "Differences of georeferenced misclosures by each component agree with a tie's row of A"
-    adjustment = alone.adjustment
+    errors = alone.adjustment.errors
     step = 1e-4
-    about = georeferenced_ties(adjustment, [RECORDED], [RECORDED], site.ties)
+    about = georeferenced_ties(errors, [RECORDED], [RECORDED], site.ties)
     for axis in range(6):
         ends = [
             georeferenced_ties(
-                adjustment,
+                errors,
                 [RECORDED],
                 [corrected_mounting(RECORDED, sign * step * np.eye(6)[axis])],
                 site.ties,
-            ).misclosure
+            ).misclosure[:, 0]
             for sign in (1, -1)
         ]
         slope = (ends[1] - ends[0]) / (2 * step)  # what is missing is the misclosure's opposite
-        assert np.abs(slope - about.mounting[:, axis]).max() < 1e-3
+        assert np.abs(slope - about.columns[:, 0, axis]).max() < 1e-3
 
 
 def test_columns_beyond_the_mounting_are_zero_for_ties(site, alone):
-    "With a difference between coordinates as trend, ties have rows of nine columns, three of zero"
+    "Beside a difference between coordinates ties have rows of nine columns, three of zero"
     adjustment = linearized(alone.adjustment, site.matched, [RECORDED], np.zeros(6))[1]
-    ties = georeferenced_ties(adjustment, [RECORDED], [RECORDED], site.ties)
-    shift = np.tile(np.eye(3), (len(adjustment.gps_time), 1, 1))
-    wider = replace(adjustment, mounting=np.concatenate([adjustment.mounting, shift], axis=2))
-    rows = ties.rows(alone.parameters[0][0], wider.pose_design)
+    ties = georeferenced_ties(adjustment.errors, [RECORDED], [RECORDED], site.ties)
+    wider = with_shift(adjustment.with_factor(ties))
+    rows = wider.rows(alone.parameters[0][0])[-1]
     assert rows.design.shape == (100, 1, 9)
-    assert np.array_equal(rows.design[:, 0, :6], ties.mounting)
+    assert np.array_equal(rows.design[:, :, :6], ties.columns)
     assert not rows.design[:, 0, 6:].any()
