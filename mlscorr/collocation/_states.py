@@ -108,16 +108,34 @@ def carry(layout: Layout, blocks: np.ndarray, x: np.ndarray, transposed: bool) -
     for j in range(layout.first.size):
         a = layout.first[j]
         s = layout.signal[j]
-        d = layout.states[s]
-        for c in range(x.shape[1]):
+        states = layout.states[s]
+        f00 = blocks[s, 0, 0]
+        f01 = blocks[s, 0, 1]
+        f02 = blocks[s, 0, 2]
+        f10 = blocks[s, 1, 0]
+        f11 = blocks[s, 1, 1]
+        f12 = blocks[s, 1, 2]
+        f20 = blocks[s, 2, 0]
+        f21 = blocks[s, 2, 1]
+        f22 = blocks[s, 2, 2]
+        if transposed:
+            f01, f10 = f10, f01
+            f02, f20 = f20, f02
+            f12, f21 = f21, f12
+        for c in range(x.shape[1]):  # written out: twice as fast as loops over the states
             x0 = x[a, c]
-            x1 = x[a + 1, c] if d > 1 else 0.0
-            x2 = x[a + 2, c] if d > 2 else 0.0
-            for p in range(d):
-                if transposed:
-                    x[a + p, c] = blocks[s, 0, p] * x0 + blocks[s, 1, p] * x1 + blocks[s, 2, p] * x2
-                else:
-                    x[a + p, c] = blocks[s, p, 0] * x0 + blocks[s, p, 1] * x1 + blocks[s, p, 2] * x2
+            if states == 1:
+                x[a, c] = f00 * x0
+            elif states == 2:
+                x1 = x[a + 1, c]
+                x[a, c] = f00 * x0 + f01 * x1
+                x[a + 1, c] = f10 * x0 + f11 * x1
+            else:
+                x1 = x[a + 1, c]
+                x2 = x[a + 2, c]
+                x[a, c] = f00 * x0 + f01 * x1 + f02 * x2
+                x[a + 1, c] = f10 * x0 + f11 * x1 + f12 * x2
+                x[a + 2, c] = f20 * x0 + f21 * x1 + f22 * x2
 
 
 def dense_blocks(layout: Layout, blocks: np.ndarray) -> np.ndarray:

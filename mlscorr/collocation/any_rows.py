@@ -20,7 +20,7 @@ from mlscorr.collocation.model import Collocation, Noise, Signal
 from mlscorr.collocation.sparse_rows import SparseRows
 
 FREE = 1e4  # S over the sigma of what is seen there: u takes 1e-8 of the variance
-PLACES = 100  # columns of places: more of them cost more than knots; guard
+PLACES = 600  # columns of places: more of them cost more than knots; guard
 
 
 def collocate_rows(

@@ -205,7 +205,7 @@ class MarkovSolver:
                 return block
             shared = self._shared_weights[rows]
             return block - shared @ shared.T
-        unit = np.zeros((self.order.size * r, rows.size))
+        unit = np.zeros((self.order.size * r - self.second_views.size, rows.size))
         unit[rows, np.arange(rows.size)] = 1.0
         block = self.solve(unit)[rows]
         return 0.5 * (block + block.T)

@@ -304,8 +304,11 @@ class Adjustment(Summary):
         known = None
         if like is not None:
             known = like.solver
+        tolerance = 0.0
+        if self.ties is not None:  # few knots do beside hundreds of them
+            tolerance = self.tolerance
         rows = self.rows(parameters)
-        return collocate_rows(rows, known, self.tolerance, self.believed(parameters))
+        return collocate_rows(rows, known, tolerance, self.believed(parameters))
 
     def weigh(self, parameters: SignalParameters, like: Collocation | None = None) -> Collocation:
         """As solve, for the likelihood alone: few rows with ties by their covariance matrix.

@@ -7,7 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mlscorr.collocation import FAMILIES, INTEGRATED
-from mlscorr.pos import SignalParameters, pose_signals, stated_sigma
+from mlscorr.pos import SignalParameters, pose_signals
+from mlscorr.pos.stated import stated_sigma
 from mlscorr.survey import Pos, Trajectory
 
 TIME = 413200.0 + np.arange(0.0, 100.0, 0.5)  # s
