@@ -160,7 +160,7 @@ def test_covariances_are_covariances(adjustment, posterior):
     "Symmetric and positive at all epochs, of position and rotation together"
     mean, covariance = predict_pose_error(adjustment, posterior)
     assert np.isfinite(mean).all()
-    np.testing.assert_array_equal(covariance, covariance.swapaxes(1, 2))
+    np.testing.assert_allclose(covariance, covariance.swapaxes(1, 2), rtol=1e-9, atol=1e-15)
     sigma = np.sqrt(np.einsum("qii->qi", covariance))
     correlation = covariance / (sigma[:, :, None] * sigma[:, None, :])
     assert np.linalg.eigvalsh(correlation).min() > -1e-9
