@@ -5,7 +5,7 @@ RUN := $(VENV)/bin
 
 .PHONY: demo test test-all docs wheel faults folders bench bench-scale tables assets pages examples clean
 
-demo: $(VENV)/ready
+demo: $(VENV)/package
 	$(RUN)/mlscorr demo -o demo --overwrite
 
 # In about ten minutes on two cores; test-all, in half an hour, runs what is marked long as well
@@ -67,9 +67,14 @@ pages: $(VENV)/ready
 examples: $(VENV)/ready
 	for script in examples/[0-9]*.py; do $(RUN)/python $$script || exit 1; done
 
-$(VENV)/ready: pyproject.toml setup.sh
+# The package alone, for users; with what tests and manual need, for developers
+$(VENV)/package: pyproject.toml setup.sh
 	PYTHON=$(PYTHON) VENV=$(VENV) sh setup.sh
 	touch $@
+
+$(VENV)/ready: pyproject.toml setup.sh
+	PYTHON=$(PYTHON) VENV=$(VENV) EXTRAS='[test,docs]' sh setup.sh
+	touch $(VENV)/package $@
 
 clean:
 	rm -rf $(VENV) build demo

@@ -1,9 +1,11 @@
 #!/bin/sh
-# Make .venv with everything in it, and install the system libraries that Open3D needs.
+# Make .venv with the package and the extras that EXTRAS names, such as "[test]", and install the
+# system libraries that Open3D needs.
 # As root all of it is installed; otherwise the line that installs what is missing is printed.
 set -eu
 PYTHON=${PYTHON:-python3}
 VENV=${VENV:-.venv}
+EXTRAS=${EXTRAS:-}
 
 "$PYTHON" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || {
     echo "mlscorr needs Python 3.11 or newer; $PYTHON is $("$PYTHON" --version 2>&1)." >&2
@@ -36,4 +38,6 @@ if [ -n "$missing" ]; then
 fi
 
 [ -x "$VENV/bin/python" ] || "$PYTHON" -m venv "$VENV"
-"$VENV/bin/python" -m pip install --quiet --disable-pip-version-check -e '.[test,docs]'
+echo "Installing mlscorr$EXTRAS and what it needs into $VENV"
+# Modules are compiled when they are first imported: all of them would take a third of the time here
+"$VENV/bin/python" -m pip install --no-compile --disable-pip-version-check -e ".$EXTRAS"

@@ -11,12 +11,23 @@ from pathlib import Path
 
 from mlscorr.survey import Summary
 
+SYSTEM = platform.system()  # Linux, Windows, Darwin
+OPEN3D = "open3d"
+if SYSTEM == "Linux" and platform.machine() == "x86_64":
+    OPEN3D = "open3d-cpu"  # the same import without CUDA
 PACKAGES = (  # of numbers and points, of maps and texts, of commands and pages
-    *("numpy", "scipy", "laspy", "lazrs", "pye57", "open3d", "threadpoolctl", "numba"),
-    *("pyproj", "tomlkit", "openpyxl"),
+    *("numpy", "scipy", "laspy", "lazrs", OPEN3D, "threadpoolctl", "numba"),
+    *("pyproj", "tomlkit", "scikit-learn"),
     *("typer", "rich", "pydantic", "matplotlib", "pillow", "jinja2"),
 )
-# shared library -> Debian package: what importing Open3D and drawing without a screen need
+EXTRAS = {  # package -> the extra that brings it
+    "pye57": "e57",
+    "openpyxl": "excel",
+    "pandas": "pandas",
+    "distributed": "cluster",
+    "s3fs": "remote",
+}
+# shared library -> Debian package: what importing Open3D and drawing without a screen need on Linux
 LIBRARIES = {
     "libusb-1.0.so.0": "libusb-1.0-0",
     "libGL.so.1": "libgl1",
@@ -96,7 +107,10 @@ class Installation(Summary):
 
 
 def doctor() -> Installation:
-    """Look at packages, system libraries, the off-screen driver and geoid grids.
+    """Look at packages, extras, system libraries, the off-screen driver and geoid grids.
+
+    System libraries and the driver are looked at on Linux alone: elsewhere they come with the
+    system, or with Open3D's wheel.
 
     Returns
     -------
@@ -109,8 +123,11 @@ def doctor() -> Installation:
     """
     findings = [InstalledPart("python", sys.version_info >= (3, 11), platform.python_version())]
     findings += [_package(name) for name in PACKAGES]
-    findings += [_library(name, package) for name, package in LIBRARIES.items()]
-    findings += [_driver(), _rendering(), _geoids()]
+    findings += [_extra(name, extra) for name, extra in EXTRAS.items()]
+    if SYSTEM == "Linux":
+        findings += [_library(name, package) for name, package in LIBRARIES.items()]
+        findings.append(_driver())
+    findings += [_rendering(), _geoids()]
     return Installation(tuple(findings))
 
 
@@ -140,10 +157,21 @@ def remedy(parts: Iterable[InstalledPart]) -> list[str]:
 
 
 def _package(name):
+    for known in (name, name.removesuffix("-cpu")):  # of Open3D either wheel will do
+        try:
+            return InstalledPart(name, True, version(known))
+        except PackageNotFoundError:
+            continue
+    return InstalledPart(name, False, "missing", f"pip install {name}")
+
+
+def _extra(name, extra):
+    """A package that some inputs need: nothing is missing without it."""
+    line = f"pip install 'mlscorr[{extra}]'"
     try:
-        return InstalledPart(name, True, version(name))
+        return InstalledPart(name, True, version(name), needed=False)
     except PackageNotFoundError:
-        return InstalledPart(name, False, "missing", f"pip install {name}")
+        return InstalledPart(name, False, f"not installed: {line}", needed=False)
 
 
 def _library(name, package):

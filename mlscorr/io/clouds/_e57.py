@@ -71,7 +71,13 @@ def open_e57(path: Path) -> CloudSource:
 @contextmanager
 def _opened(path) -> Iterator[Any]:
     """The root of a file; what libE57Format raises becomes a sentence."""
-    from pye57 import libe57
+    try:
+        from pye57 import libe57
+    except ImportError:
+        raise ValueError(
+            f"{path} is an E57 file, and pye57, which reads it, is not installed: "
+            "pip install 'mlscorr[e57]', or export it as LAZ."
+        ) from None
 
     try:
         file = libe57.ImageFile(str(path), "r")

@@ -185,8 +185,14 @@ def read_sheets(path: str | Path) -> list[tuple[str, list[tuple[int, list[str]]]
     import zipfile
     from xml.etree.ElementTree import ParseError
 
-    from openpyxl import load_workbook
-    from openpyxl.utils.exceptions import InvalidFileException
+    try:
+        from openpyxl import load_workbook
+        from openpyxl.utils.exceptions import InvalidFileException
+    except ImportError:
+        raise ValueError(
+            f"{path} is a workbook, and openpyxl, which reads it, is not installed: "
+            "pip install 'mlscorr[excel]', or save it as comma-separated values."
+        ) from None
 
     with warnings.catch_warnings(action="ignore"):  # of styles and rules, which are not read
         try:
