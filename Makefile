@@ -1,4 +1,5 @@
-# Three commands do everything, set-up included: make demo, make docs, make test
+# Three commands do everything, set-up included: make demo, make docs, make test. The first installs
+# the package alone, the others what tests and manual need
 PYTHON ?= python3
 VENV := .venv
 RUN := $(VENV)/bin
@@ -20,7 +21,7 @@ docs: $(VENV)/ready
 	$(RUN)/sphinx-build -q -W --keep-going -c docs -d build/doctrees . build/manual
 
 # The wheel, installed by itself in an environment that knows nothing else, runs the demo
-wheel: $(VENV)/ready
+wheel: $(VENV)/package
 	rm -rf build/lib build/wheel
 	$(RUN)/python -m pip wheel --quiet --no-deps -w build/wheel .
 	$(PYTHON) -m venv build/wheel/venv

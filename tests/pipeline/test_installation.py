@@ -8,7 +8,15 @@ import sys
 
 import pytest
 
-from mlscorr.pipeline.installation import LIBRARIES, PACKAGES, Installation, InstalledPart, remedy
+from mlscorr.pipeline.installation import (
+    EXTRAS,
+    LIBRARIES,
+    PACKAGES,
+    Installation,
+    InstalledPart,
+    _extra,
+    remedy,
+)
 from tests.beds.places import MLSCORR, ROOT
 
 
@@ -29,9 +37,16 @@ def test_a_python_that_cannot_be_started_draws_no_picture():
 
 
 def test_all_that_is_needed_is_looked_at(examined):
-    "Python, every package, the system libraries, off-screen drawing and the geoid grids"
+    "Python, packages, extras, the system libraries, off-screen drawing and the geoid grids"
     others = ("python", "Vulkan drivers", "off-screen picture", "geoid grids")
-    assert list(examined[1]) == [others[0], *PACKAGES, *LIBRARIES, *others[1:]]
+    assert list(examined[1]) == [others[0], *PACKAGES, *EXTRAS, *LIBRARIES, *others[1:]]
+
+
+def test_an_extra_that_is_not_installed_is_nothing_missing():
+    "E57 is read by few: without pye57 the installation is complete, and the line says how to add it"
+    part = _extra("no-such-package", "e57")
+    assert part.mark == "without" and "pip install 'mlscorr[e57]'" in part.state
+    assert Installation((part,)).is_complete and not Installation((part,)).remedies
 
 
 def test_versions_are_told(examined):
