@@ -43,7 +43,7 @@ def test_all_that_is_needed_is_looked_at(examined):
 
 
 def test_an_extra_that_is_not_installed_is_nothing_missing():
-    "E57 is read by few: without pye57 the installation is complete, and the line says how to add it"
+    "Without pye57 the installation is complete, and the line says how to add it"
     part = _extra("no-such-package", "e57")
     assert part.mark == "without" and "pip install 'mlscorr[e57]'" in part.state
     assert Installation((part,)).is_complete and not Installation((part,)).remedies
