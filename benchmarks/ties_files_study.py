@@ -23,11 +23,11 @@ from pathlib import Path
 
 import numpy as np
 from feature_surveys import FOLDER
+from mlscorr.estimate._tied_adjustment import TieEquations
 from scipy.spatial.transform import Rotation
 
 import mlscorr
 from mlscorr.estimate import believed_correction, estimate_correction
-from mlscorr.estimate._tied_adjustment import TieEquations
 from mlscorr.io.clouds import read_chunks
 from mlscorr.pipeline.finding import find_control
 from mlscorr.simulate import read_scenario, simulate

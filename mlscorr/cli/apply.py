@@ -12,6 +12,7 @@ from mlscorr.cli.terminal import (
     Overwrite,
     Quiet,
     SurveyArgument,
+    Verbose,
     exit_code,
     say_results,
 )
@@ -33,6 +34,7 @@ def apply(
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,
+    verbose: Verbose = 0,
 ) -> None:
     """Take a clock offset, datum or mounting that was found out of clouds and trajectory."""
     import numpy as np

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from mlscorr.cli.progress import progress_bars
-from mlscorr.cli.terminal import Effects, Exit, Json, Quiet, exit_code, say
+from mlscorr.cli.terminal import Effects, Exit, Json, Quiet, Verbose, exit_code, say
 from mlscorr.cli.work import print_json
 
 Check = Annotated[Path, typer.Argument(metavar="OUT", help="Folder of the blind check.")]
@@ -29,6 +29,7 @@ def make(
     effects: Effects = None,
     workers: Workers = 2,
     quiet: Quiet = False,
+    verbose: Verbose = 0,
 ) -> None:
     """Make surveys, seal their labels, and put those into key.json. Goes on where it stopped."""
     with exit_code(Exit.BAD_DATA), progress_bars() as progress:
@@ -39,7 +40,13 @@ def make(
 
 
 @blind.command()
-def run(out: Check, effects: Effects = None, workers: Workers = 2, quiet: Quiet = False) -> None:
+def run(
+    out: Check,
+    effects: Effects = None,
+    workers: Workers = 2,
+    quiet: Quiet = False,
+    verbose: Verbose = 0,
+) -> None:
     """Diagnose each survey that has no answer yet, from its folder alone."""
     with exit_code(Exit.BAD_DATA), progress_bars() as progress:
         from mlscorr.pipeline import run_blind
@@ -50,7 +57,11 @@ def run(out: Check, effects: Effects = None, workers: Workers = 2, quiet: Quiet 
 
 @blind.command(name="score")
 def score_(
-    out: Check, effects: Effects = None, as_json: Json = False, quiet: Quiet = False
+    out: Check,
+    effects: Effects = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = 0,
 ) -> None:
     """Verify the seals and compare answers with labels."""
     with exit_code(Exit.BAD_DATA):

@@ -6,7 +6,7 @@ import typer
 
 import mlscorr
 from mlscorr.cli import terminal
-from mlscorr.cli.terminal import Json, Out, Overwrite, Quiet, SurveyArgument, say
+from mlscorr.cli.terminal import Json, Out, Overwrite, Quiet, SurveyArgument, Verbose, say
 from mlscorr.cli.work import print_json, work
 
 
@@ -23,6 +23,7 @@ def calibrate(
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,
+    verbose: Verbose = 0,
 ) -> None:
     """Calibrate lever arm and boresight of a survey's scanners by control points and ties."""
     with work(out, overwrite, survey) as progress:

@@ -5,24 +5,28 @@ from shlex import quote
 
 import typer
 
-import mlscorr
-from mlscorr.cli.terminal import Exit, Quiet, SurveyArgument, exit_code, say, warn
+from mlscorr.cli.progress import progress_bars
+from mlscorr.cli.terminal import Exit, Quiet, SurveyArgument, Verbose, exit_code, say, warn
 from mlscorr.wording import counted, thousands
 
 CODES = {"survey.toml": Exit.USAGE, "data": Exit.BAD_DATA, "system": Exit.READ_OR_WRITE}
 
 
-def check(survey: SurveyArgument, quiet: Quiet = False) -> None:
+def check(survey: SurveyArgument, quiet: Quiet = False, verbose: Verbose = 0) -> None:
     """Tell in seconds all that is wrong with a survey or project, and what correcting it takes."""
-    with exit_code(Exit.BAD_DATA):
+    with exit_code(Exit.BAD_DATA), progress_bars() as progress:
         from mlscorr.io.surveys import is_project
 
         if is_project(survey):
             from mlscorr.pipeline.project import check_project
 
+            progress("Checking the project")
             checked = check_project(survey)
         else:
-            checked = mlscorr.check(survey)
+            from mlscorr.pipeline import check as check_survey
+
+            progress("Checking the survey")
+            checked = check_survey(survey)
     amounts = {"Read": checked.read, "Written": checked.written, "Needed": checked.needed}
     for title, those in amounts.items():
         _list(title, [_amount(amount) for amount in those])

@@ -48,6 +48,7 @@ def compare(
     overwrite: terminal.Overwrite = False,
     as_json: terminal.Json = False,
     quiet: terminal.Quiet = False,
+    verbose: terminal.Verbose = 0,
 ) -> None:
     """Correct a survey by every method, and score them by the same check points.
 

@@ -79,6 +79,7 @@ def correct(
     overwrite: terminal.Overwrite = False,
     as_json: terminal.Json = False,
     quiet: terminal.Quiet = False,
+    verbose: terminal.Verbose = 0,
 ) -> None:
     """Correct the cloud of a survey, or all drives of a project.toml, and report on it.
 

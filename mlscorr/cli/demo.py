@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from mlscorr.cli.correct import tell
-from mlscorr.cli.terminal import Json, Out, Overwrite, Quiet, say
+from mlscorr.cli.terminal import Json, Out, Overwrite, Quiet, Verbose, say
 from mlscorr.cli.work import work
 
 
@@ -16,6 +16,7 @@ def demo(
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,
+    verbose: Verbose = 0,
 ) -> None:
     """Make a small simulated survey, correct it, and show the report."""
     with work(out, overwrite) as progress:

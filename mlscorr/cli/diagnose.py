@@ -47,6 +47,7 @@ def diagnose(
     overwrite: terminal.Overwrite = False,
     as_json: terminal.Json = False,
     quiet: terminal.Quiet = False,
+    verbose: terminal.Verbose = 0,
 ) -> None:
     """Find where reality and simulation differ, why, and how far the gap can be closed."""
     with terminal.exit_code(terminal.Exit.USAGE):

@@ -7,6 +7,7 @@ from mlscorr.cli.terminal import (
     Overwrite,
     Quiet,
     SurveyArgument,
+    Verbose,
     say,
     say_results,
 )
@@ -20,6 +21,7 @@ def extract(
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,
+    verbose: Verbose = 0,
 ) -> None:
     """List all target-like objects in the cloud of a survey, with or without control points."""
     with work(out, overwrite, survey) as progress:

@@ -8,6 +8,7 @@ from mlscorr.cli.terminal import (
     Overwrite,
     Quiet,
     SurveyArgument,
+    Verbose,
     say,
     say_results,
 )
@@ -21,10 +22,14 @@ def plan(
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,
+    verbose: Verbose = 0,
 ) -> None:
     """Tell which effects a planned survey can show and tell apart; it needs no cloud."""
-    with work(out, overwrite, survey, planned=True):
-        content = mlscorr.plan(mlscorr.read_survey(survey, planned=True)).write(out, overwrite)
+    with work(out, overwrite, survey, planned=True) as progress:
+        recorded = mlscorr.read_survey(survey, planned=True)
+        progress("Predicting what each effect would show")
+        planned = mlscorr.plan(recorded)
+        content = planned.write(out, overwrite)
     from mlscorr.effects import lowered, parameter_title, titles
     from mlscorr.report.gap import accuracy_sentence
 

@@ -86,6 +86,7 @@ def status(
     ],
     as_json: terminal.Json = False,
     quiet: terminal.Quiet = False,
+    verbose: terminal.Verbose = 0,
 ) -> None:
     """Tell how far the correction of a project has come, while it runs or afterwards."""
     with terminal.exit_code(terminal.Exit.USAGE):

@@ -7,7 +7,17 @@ from typing import Annotated
 import typer
 
 import mlscorr
-from mlscorr.cli.terminal import Exit, Json, Out, Overwrite, Quiet, SurveyArgument, exit_code, say
+from mlscorr.cli.terminal import (
+    Exit,
+    Json,
+    Out,
+    Overwrite,
+    Quiet,
+    SurveyArgument,
+    Verbose,
+    exit_code,
+    say,
+)
 from mlscorr.cli.work import print_json, work
 
 View = StrEnum("View", ("overview", "targets", "section"))
@@ -43,6 +53,7 @@ def render(
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,
+    verbose: Verbose = 0,
 ) -> None:
     """Draw a survey before and after its correction; neither a display nor a GPU is needed."""
     with exit_code(Exit.USAGE):

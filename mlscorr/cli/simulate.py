@@ -12,6 +12,7 @@ from mlscorr.cli.terminal import (
     Out,
     Overwrite,
     Quiet,
+    Verbose,
     exit_code,
     say,
     say_results,
@@ -28,6 +29,7 @@ def simulate(
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,
+    verbose: Verbose = 0,
 ) -> None:
     """Simulate a survey from a scenario: a survey folder, and the truth beside it."""
     with exit_code(Exit.USAGE):

@@ -7,6 +7,7 @@ from mlscorr.cli.terminal import (
     Overwrite,
     Quiet,
     SurveyArgument,
+    Verbose,
     say,
     say_results,
 )
@@ -20,6 +21,7 @@ def ties(
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,
+    verbose: Verbose = 0,
 ) -> None:
     """Find walls, roads, poles and paint that two passes both saw, and how far apart they lie."""
     with work(out, overwrite, survey) as progress:

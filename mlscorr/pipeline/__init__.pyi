@@ -31,6 +31,7 @@ from .finding import match_targets as match_targets
 from .found_effects import read_effects as read_effects
 from .installation import Installation as Installation
 from .installation import doctor as doctor
+from .logs import recorded_log as recorded_log
 from .methods import method_named as method_named
 from .planning import PlannedSurvey as PlannedSurvey
 from .planning import plan as plan

@@ -11,7 +11,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
-from mlscorr.io.store import document, output_folder, write_json
+from mlscorr.io.store import document, output_folder, progress_of, write_json
+from mlscorr.pipeline.logs import write_log
 from mlscorr.survey import InputFile, Summary
 
 Table = Callable[[Path], object]  # writes the file of this path
@@ -137,12 +138,18 @@ class ResultFiles:
         clouds : object
             What the document says of the clouds.
         """
-        tables = {name: write(folder / name) for name, write in self.tables.items()}
+        tables = {}
+        for name, write in self.tables.items():
+            progress_of(f"Writing {name}")
+            tables[name] = write(folder / name)
+        progress_of(f"Writing {self.name}.json")
         content, pages = self.report(WrittenFiles(folder, clouds, tables))
         content = document(self.name, content)
         write_json(folder / f"{self.name}.json", content)
         for name, write in pages.items():
+            progress_of(f"Drawing {name}")
             write(folder / name, content)
+        write_log(folder)
         return content
 
 

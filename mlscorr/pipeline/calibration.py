@@ -22,10 +22,12 @@ from mlscorr.matching import Refusal
 from mlscorr.pipeline.calibrated_survey import CalibratedSurvey, CalibrationResult, estimate_section
 from mlscorr.pipeline.control_checks import remounting_fault, reuse_warnings
 from mlscorr.pipeline.finding import (
+    COLLECTING,
     MatchedTargets,
     find_control,
     find_or_compare_surfaces,
     read_into,
+    silent,
 )
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.survey import Matched, Survey, SurveyFileError, TieFeatures, check_survey
@@ -100,15 +102,18 @@ def calibrate(
     if ties is None:
         ties = survey.use_ties
 
+    stage = progress or silent
     if ties:
         collector = TieCollector(survey)
         read = read_into(collector.add)
         finding, notes = find_or_compare_surfaces(survey, read, None, progress, rng)
+        stage(COLLECTING)
         features = collector.features()
     else:
         finding = find_control(survey, rng, progress)
         features = None
         notes = ()
+    stage("Calibrating the mounting")
     control, check = _numbered(survey, finding)
     calibration = calibrate_together(survey, control, features, notes)
 

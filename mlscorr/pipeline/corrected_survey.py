@@ -322,12 +322,15 @@ class CorrectedSurvey(Summary):
             "weak.csv": lambda path: write_weak(path.parent, weak, self.trajectory, survey.crs),
         }
 
+        stage = progress or silent
+
         def report(written):
+            stage("Hashing inputs and results")
             paths = [name for export in trajectories for name in written.tables[export]]
             report = self._report(
                 written.folder, written.clouds, paths, targets, written.tables["weak.csv"]
             )
-            pages = self._pages(report, progress or silent) if page else {}
+            pages = self._pages(report, stage) if page else {}
             return Reported(first_screen(report) | report.document(), pages)
 
         return ResultFiles("report", survey.inputs, report, tables)
@@ -341,9 +344,11 @@ class CorrectedSurvey(Summary):
 
         def write_page(path, _):
             views = view_cloud(self.survey, correction, report.targets, progress, ties)
+            progress("Drawing report.html")
             write_report(path, self.survey, correction, report, views, self.fitted, ties)
 
         def draw(path, _):
+            progress("Drawing pictures")
             path.mkdir()
             write_pictures(path, correction, report, ties)
 

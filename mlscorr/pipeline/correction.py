@@ -22,11 +22,13 @@ from mlscorr.pipeline.control_checks import check_control, reuse_warnings
 from mlscorr.pipeline.corrected_survey import CorrectedSurvey
 from mlscorr.pipeline.estimation import estimate_pos_error
 from mlscorr.pipeline.finding import (
+    MATCHING,
     MatchedTargets,
     check_found_control,
     find_targets,
     match_if_any,
     match_targets,
+    silent,
 )
 from mlscorr.survey import Matched, Survey, TieFeatures, check_survey
 
@@ -94,7 +96,7 @@ def correct(
         survey = without_control(survey)
 
     matches, features = observe_survey(survey, ties, rng, progress)
-    estimate = estimate_pos_error(survey, matches, features, order)
+    estimate = estimate_pos_error(survey, matches, features, order, progress)
     if ties == "only" and estimate.ties is None:
         raise ValueError(f"{NOTHING_TIED.format(survey.path)} {estimate.untied}")
 
@@ -175,6 +177,7 @@ def observe_survey(
     if ties != "only":
         check_control(survey)
     targets = find_targets(survey, rng, progress, with_ties=ties != "off")
+    (progress or silent)(MATCHING)
     if ties == "only":
         matches, _ = match_if_any(targets, survey)
     else:

@@ -15,6 +15,7 @@ from mlscorr.io.tables import write_extracted_csv
 from mlscorr.pipeline._result import KnownResult, ResultFiles
 from mlscorr.pipeline.beams import with_beam_origin
 from mlscorr.pipeline.finding import (
+    MATCHING,
     MatchedTargets,
     fit_while_reading,
     match_fitted,
@@ -100,6 +101,7 @@ def extract(
         for file, targets in objects.items()
         for target in distinct(targets)
     ]
+    (progress or silent)(MATCHING)
     result = _without_doubles(list(near_control.targets), everywhere)
     sentences = _sentences(survey, np.flatnonzero(present), result)
     for sentence in sentences:

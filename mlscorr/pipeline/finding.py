@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import logging
 import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
@@ -55,6 +56,10 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
+READING = "Reading the cloud and finding targets"  # stages
+MATCHING = "Matching targets with surveyed points"
+COLLECTING = "Collecting planes, poles and paint"
+LOG = logging.getLogger(__name__)
 SHOWN = 5  # refusals that an overview names: it fits a screen
 
 
@@ -403,8 +408,11 @@ def find_control(
         As match_targets does, and when no control point was surveyed or found.
     """
     check_control(survey)
-    reading = (progress or silent)("Reading the cloud", survey.points)
-    matches = match_targets(fit_while_reading(survey, read, rng, reading), survey)
+    stage = progress or silent
+    reading = stage(READING, survey.points)
+    targets = fit_while_reading(survey, read, rng, reading)
+    stage(MATCHING)
+    matches = match_targets(targets, survey)
     check_found_control(matches)
     return matches
 
@@ -475,11 +483,13 @@ def find_targets(
     5
     """
     check_survey(survey)
-    reading = (progress or silent)("Reading the cloud", survey.points)
+    stage = progress or silent
+    reading = stage(READING, survey.points)
     if not with_ties:
         return fit_while_reading(survey, read_chunks, rng, reading)
     collector = TieCollector(survey)
     targets = fit_while_reading(survey, read_into(collector.add), rng, reading)
+    stage(COLLECTING)
     return replace(targets, features=collector.features())
 
 
@@ -506,8 +516,11 @@ def find_or_compare_surfaces(
     notes : tuple of str
         The sentence that says so.
     """
-    reading = (progress or silent)("Reading the cloud", survey.points)
-    return match_if_any(fit_while_reading(survey, read, rng, reading, settle), survey)
+    stage = progress or silent
+    reading = stage(READING, survey.points)
+    targets = fit_while_reading(survey, read, rng, reading, settle)
+    stage(MATCHING)
+    return match_if_any(targets, survey)
 
 
 def match_if_any(targets: FoundTargets, survey: Survey) -> tuple[MatchedTargets, tuple[str, ...]]:
@@ -583,6 +596,16 @@ def fit_while_reading(
     for _, key, target in sorted(fits, key=itemgetter(0)):  # not in the order of their points
         of_pass[candidates.passes[key]].append(target)
     targets = tuple((number, t) for number, some in of_pass.items() for t in distinct(some))
+    LOG.info(
+        "%d targets found in %d passes, of %d fits near %d surveyed points; %d points looked at",
+        len(targets),
+        len(of_pass),
+        len(fits),
+        len(survey.surveyed),
+        near.points,
+    )
+    for number, target in targets:
+        LOG.debug("target of pass %d at %.3f s: score %.2f", number, target.gps_time, target.score)
     return FoundTargets(survey, targets, candidates, near)
 
 
@@ -725,10 +748,38 @@ def match_fitted(
         survey.pos,
         survey.search_radius,
     )
+    _log_matches(matches, survey)
     numbers = np.repeat([n for n, _ in targets], [len(t.cloud) for _, t in targets]).astype(int)
     cloud = PointCloud.concatenate([NO_POINTS, *(t.cloud for _, t in targets)])
     on_targets = replace(candidates, cloud=cloud, pass_number=numbers)
     return MatchedTargets(survey, matches, on_targets, _by_pass_and_time(targets))
+
+
+def _log_matches(matches, survey):
+    """Log which surveyed points were matched, and why others were not."""
+    matched = Matched.by_name(matches.matched, survey.surveyed)
+    found = set(matched.name)
+    LOG.info(
+        "%d of %d control and %d of %d check points matched, by %d observations",
+        len(found & set(survey.control.name)),
+        len(survey.control),
+        len(found & set(survey.check.name)),
+        len(survey.check),
+        len(matched),
+    )
+    for row in matches.refusals:
+        LOG.info("not matched: %s: %s", row.name, row.reason)
+    observations = matched.observations
+    for name, time, misclosure, probability in zip(
+        matched.name, observations.gps_time, matched.misclosure, matches.probability, strict=True
+    ):
+        LOG.debug(
+            "%s at %.3f s: misclosure E %+.3f, N %+.3f, H %+.3f m, probability %.4f",
+            name,
+            time,
+            *misclosure,
+            probability,
+        )
 
 
 def unmatched(
@@ -773,6 +824,6 @@ def read_into(*adds: Callable) -> Callable:
     return read
 
 
-def silent(_title: str, _total: int) -> Callable:
+def silent(_title: str, _total: int | None = None) -> Callable:
     """Progress that is shown nowhere."""
     return lambda _points: None

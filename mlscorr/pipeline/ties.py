@@ -13,7 +13,7 @@ from mlscorr.evaluate import misfit
 from mlscorr.io.clouds import read_chunks
 from mlscorr.io.tables import write_ties_csv
 from mlscorr.pipeline._result import KnownResult, ResultFiles
-from mlscorr.pipeline.finding import silent
+from mlscorr.pipeline.finding import COLLECTING, silent
 from mlscorr.survey import TIE_KINDS, Survey, TieFeatures, check_survey
 from mlscorr.ties import (
     SETTINGS,
@@ -67,6 +67,7 @@ def find_ties(
     check_survey(survey)
     if features is None:
         features = _read_features(survey, progress)
+    (progress or silent)("Pairing what two passes both saw")
     tied = TiedSurvey(survey, features, search_ties(survey, features))
     for sentence in tied.warnings:
         warnings.warn(sentence, stacklevel=2)
@@ -75,12 +76,14 @@ def find_ties(
 
 def _read_features(survey, progress):
     """Planes, poles and paint of all clouds."""
-    done = (progress or silent)("Searching the cloud", survey.points)
+    stage = progress or silent
+    done = stage("Searching the cloud", survey.points)
     collector = TieCollector(survey)
     for file in survey.clouds:
         for chunk in read_chunks(file):
             collector.add(file, chunk)
             done(len(chunk))
+    stage(COLLECTING)
     return collector.features()
 
 
