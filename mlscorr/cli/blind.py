@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from mlscorr.cli.progress import progress_bars
-from mlscorr.cli.terminal import Effects, Exit, Json, Quiet, Verbose, exit_code, say
+from mlscorr.cli.terminal import Effects, Exit, Json, Quiet, Verbose, as_epilog, exit_code, say
 from mlscorr.cli.work import print_json
 
 Check = Annotated[Path, typer.Argument(metavar="OUT", help="Folder of the blind check.")]
@@ -17,7 +17,7 @@ blind = typer.Typer(
 )
 
 
-@blind.command()
+@blind.command(epilog=as_epilog(["mlscorr blind make blind --cases 50 --workers 2"]))
 def make(
     out: Check,
     cases: Annotated[int, typer.Option(min=1, help="Number of surveys.")] = 300,
@@ -39,7 +39,7 @@ def make(
     say(f"{made} surveys are in {out / 'cases'}, their seals in {out / 'seals.json'}.")
 
 
-@blind.command()
+@blind.command(epilog=as_epilog(["mlscorr blind run blind --workers 2"]))
 def run(
     out: Check,
     effects: Effects = None,
@@ -55,7 +55,10 @@ def run(
     say(f"{answered} surveys are diagnosed ({failed} could not be): {out / 'answers'}.")
 
 
-@blind.command(name="score")
+@blind.command(
+    name="score",
+    epilog=as_epilog(["mlscorr blind score blind", "mlscorr blind score blind --json"]),
+)
 def score_(
     out: Check,
     effects: Effects = None,

@@ -7,9 +7,16 @@ import typer
 
 import mlscorr
 from mlscorr.cli import terminal
+from mlscorr.cli.folders import chosen_out
 from mlscorr.cli.work import print_json, work
 
 RESULT_FILES = ("report.json", "trajectory.csv")  # that are read of a result
+
+EXAMPLES = (
+    "mlscorr compare survey.toml",
+    "mlscorr compare survey.toml -o compared --clouds affine",
+    "mlscorr compare corrected-1 corrected-2 -o compared",
+)
 
 
 def compare(
@@ -33,7 +40,8 @@ def compare(
         typer.Option(
             "-o",
             "--out",
-            help="Folder for the results; of two results the screen alone without it.",
+            help="Folder for the results; FOLDER-compare beside the survey's FOLDER if none, and "
+            "nothing but the screen for two results.",
             parser=terminal.path_or_url,
         ),
     ] = None,
@@ -56,10 +64,11 @@ def compare(
     mlscorr compare corrected-1 corrected-2 -o compared
     """
     with terminal.exit_code(terminal.Exit.USAGE):
-        _check_arguments(survey, second, out, clouds)
+        _check_arguments(survey, second, clouds)
     if second is not None:
         _compare_results(survey, second, out, overwrite, as_json)
         return
+    out = chosen_out(out, survey, "compare")
     with terminal.exit_code(terminal.Exit.USAGE):
         from mlscorr.pipeline import method_named
 
@@ -79,7 +88,7 @@ def compare(
         raise typer.Exit(terminal.Exit.IN_PART)
 
 
-def _check_arguments(survey, second, out, clouds):
+def _check_arguments(survey, second, clouds):
     """Refuse what is neither one survey nor two results."""
     from mlscorr.pipeline import is_result
 
@@ -88,11 +97,6 @@ def _check_arguments(survey, second, out, clouds):
             raise ValueError(
                 f"{survey} is a result of mlscorr correct, and one alone has nothing to be "
                 f"compared with. Name a second one: mlscorr compare {survey} OTHER -o compared."
-            )
-        if out is None:
-            raise ValueError(
-                "The option -o is missing, the folder for the results: "
-                f"mlscorr compare {survey} -o compared."
             )
         return
     for path in (survey, second):

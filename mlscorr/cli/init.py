@@ -15,6 +15,11 @@ from mlscorr.wording import counted
 
 NAMES = {"none": "not used", "table": "not used", "reference": "mesh"}
 
+EXAMPLES = (
+    "mlscorr init street",
+    "mlscorr init street --set 'control.size = 0.6' --set 'crs = \"EPSG:32650\"'",
+)
+
 
 def init(
     folder: Annotated[Path, typer.Argument(help="Folder with clouds, trajectory and control.")],

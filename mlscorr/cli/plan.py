@@ -1,6 +1,7 @@
 """The command that says what a survey will show before it is driven."""
 
 import mlscorr
+from mlscorr.cli.folders import chosen_out
 from mlscorr.cli.terminal import (
     Effects,
     Json,
@@ -14,10 +15,15 @@ from mlscorr.cli.terminal import (
 )
 from mlscorr.cli.work import print_json, work
 
+EXAMPLES = (
+    "mlscorr plan survey.toml",
+    "mlscorr plan survey.toml -o plan --json",
+)
+
 
 def plan(
     survey: SurveyArgument,
-    out: Out,
+    out: Out = None,
     effects: Effects = None,
     overwrite: Overwrite = False,
     as_json: Json = False,
@@ -25,6 +31,7 @@ def plan(
     verbose: Verbose = 0,
 ) -> None:
     """Tell which effects a planned survey can show and tell apart; it needs no cloud."""
+    out = chosen_out(out, survey, "plan")
     with work(out, overwrite, survey, planned=True) as progress:
         recorded = mlscorr.read_survey(survey, planned=True)
         progress("Predicting what each effect would show")

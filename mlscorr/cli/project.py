@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from mlscorr.pipeline.project import Options
     from mlscorr.survey import Statement
 
+STATUS_EXAMPLES = ("mlscorr status city", "mlscorr status city --json")
 RESUMPTION = "what was done stays, and the same command with --resume goes on"
 
 

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from mlscorr.cli.folders import chosen_out
 from mlscorr.cli.terminal import (
     Effects,
     Exit,
@@ -20,10 +21,15 @@ from mlscorr.cli.terminal import (
 from mlscorr.cli.work import print_json, work
 from mlscorr.wording import counted
 
+EXAMPLES = (
+    "mlscorr simulate examples/scenarios/car.toml",
+    "mlscorr simulate car.toml -o car --seed 2",
+)
+
 
 def simulate(
     scenario: Annotated[Path, typer.Argument(help="TOML file, as those in examples/scenarios.")],
-    out: Out,
+    out: Out = None,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same bytes.")] = 1,
     effects: Effects = None,
     overwrite: Overwrite = False,
@@ -32,6 +38,7 @@ def simulate(
     verbose: Verbose = 0,
 ) -> None:
     """Simulate a survey from a scenario: a survey folder, and the truth beside it."""
+    out = chosen_out(out, scenario, "simulate", is_by_name=True)
     with exit_code(Exit.USAGE):
         from mlscorr.simulate import read_scenario, scenario_files
 

@@ -159,8 +159,25 @@ SurveyArgument = Annotated[
     ),
 ]
 Out = Annotated[
-    Path, typer.Option("-o", "--out", help="Folder for the results.", parser=path_or_url)
+    Path | None,
+    typer.Option(
+        "-o",
+        "--out",
+        help="Folder for the results; FOLDER-COMMAND beside the input's FOLDER if none.",
+        parser=path_or_url,
+        show_default=False,
+    ),
 ]
+
+
+def as_epilog(examples: Iterable[str]) -> str:
+    """Examples of a command, as they stand at the end of its --help, a line each.
+
+    Parameters
+    ----------
+    examples : iterable of str
+    """
+    return "\n\n".join(["Examples:", *examples])
 
 
 class Exit(IntEnum):

@@ -14,6 +14,7 @@ from .compared_results import is_result as is_result
 from .comparison import ComparedSurvey as ComparedSurvey
 from .comparison import compare as compare
 from .corrected_survey import CorrectedSurvey as CorrectedSurvey
+from .correction import TieUse as TieUse
 from .correction import correct as correct
 from .diagnosis import DiagnosedSurvey as DiagnosedSurvey
 from .diagnosis import diagnose as diagnose

@@ -21,6 +21,7 @@ from mlscorr.evaluate import datum_differences, unseen_rows
 from mlscorr.pipeline.control_checks import check_control, reuse_warnings
 from mlscorr.pipeline.corrected_survey import CorrectedSurvey
 from mlscorr.pipeline.estimation import estimate_pos_error
+from mlscorr.pipeline.exclusion import inclusion_warnings, weighed_exclusions
 from mlscorr.pipeline.finding import (
     MATCHING,
     MatchedTargets,
@@ -103,11 +104,13 @@ def correct(
     result = CorrectedSurvey(
         **corrected_fields(
             matches.as_scanned(survey), matches.control, matches.check, matches, estimate
-        )
+        ),
+        exclusions=weighed_exclusions(survey, matches, features, order, estimate, progress),
     )
     datum = (difference.sentence for difference in result.datum)
     # those of the targets were given when they were matched
-    for sentence in (*control_warnings(survey, matches), *datum, *estimate.warnings):
+    own = (*control_warnings(survey, matches), *inclusion_warnings(survey, estimate))
+    for sentence in (*own, *datum, *estimate.warnings):
         warnings.warn(sentence, stacklevel=2)
     return result
 
@@ -143,7 +146,8 @@ def without_control(survey: Survey) -> Survey:
     ----------
     survey : Survey
     """
-    return replace(survey, control=survey.control[[]], check=survey.surveyed)
+    nothing = survey.control[[]]
+    return replace(survey, control=nothing, check=survey.surveyed, excluded=nothing, included=())
 
 
 def observe_survey(
@@ -210,8 +214,13 @@ def corrected_fields(
             survey, matches.matches.refusals, matches.candidates, matches.scanned
         ),
         "fitted": matches.fitted,
-        "warnings": (*matches.warnings, *control_warnings(survey, matches)),
+        "warnings": (
+            *matches.warnings,
+            *control_warnings(survey, matches),
+            *inclusion_warnings(survey, estimate),
+        ),
         "datum": datum_differences(used, survey.trajectory, survey.pos, survey.crs),
+        "excluded": matches.kept_out,
     }
 
 

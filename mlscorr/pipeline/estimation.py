@@ -207,7 +207,9 @@ def estimate_together(
     stage = progress or silent
     stage("Estimating the POS error")
     if len(control):
-        estimate = estimate_correction(survey.trajectory, control, survey.pos, order)
+        estimate = estimate_correction(
+            survey.trajectory, control, survey.pos, order, survey.included
+        )
     else:
         estimate = believed_correction(survey.trajectory, survey.pos)
     _log_estimate(estimate)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -107,7 +107,10 @@ def extract(
     for sentence in sentences:
         warnings.warn(sentence, stacklevel=2)
     if result and len(surveyed):
-        finding = match_fitted(survey, result, near_control.candidates)
+        everything = replace(  # what is excluded from an estimate is a target all the same
+            survey, control=survey.control + survey.excluded, excluded=survey.control[[]]
+        )
+        finding = match_fitted(everything, result, near_control.candidates)
     else:
         finding = unmatched(survey, result, near_control.candidates, NO_CONTROL)
     return ExtractedSurvey(survey, finding, sentences)

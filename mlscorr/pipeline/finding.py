@@ -96,6 +96,8 @@ class MatchedTargets(Summary):
         On cloud files whose beams can't have been measured so.
     uncovered : tuple of str
         On cloud files with points outside the trajectory.
+    excluded : TargetObservations, optional
+        Of control points that the user keeps out of the estimate.
     """
 
     survey: Survey
@@ -105,6 +107,7 @@ class MatchedTargets(Summary):
     scanned: frozenset[str] = frozenset()
     warnings: tuple[str, ...] = ()
     uncovered: tuple[str, ...] = ()
+    excluded: TargetObservations | None = None
 
     def __len__(self) -> int:
         return len(self.matches.matched)
@@ -123,6 +126,13 @@ class MatchedTargets(Summary):
     def check(self) -> Matched:
         """Observed check points, which take part in no estimate."""
         return self.matches.by_role(self.survey)[1]
+
+    @property
+    def kept_out(self) -> Matched:
+        """Observed control points that the user keeps out of the estimate."""
+        if self.excluded is None:
+            return Matched.none()
+        return Matched.by_name(self.excluded, self.survey.excluded)
 
     @property
     def refused(self) -> tuple[RefusedTarget, ...]:
@@ -679,7 +689,7 @@ def match_silently(targets: FoundTargets, survey: Survey) -> MatchedTargets:
     return replace(
         matches,
         scanned=near.scanned,
-        warnings=tuple(near.warnings()),
+        warnings=(*near.warnings(), *matches.warnings),
         uncovered=tuple(near.beams.outside()),
     )
 
@@ -748,11 +758,78 @@ def match_fitted(
         survey.pos,
         survey.search_radius,
     )
+    matches, doubts = with_included(matches, survey.included)
+    matches, excluded = without_excluded(matches, survey)
     _log_matches(matches, survey)
     numbers = np.repeat([n for n, _ in targets], [len(t.cloud) for _, t in targets]).astype(int)
     cloud = PointCloud.concatenate([NO_POINTS, *(t.cloud for _, t in targets)])
     on_targets = replace(candidates, cloud=cloud, pass_number=numbers)
-    return MatchedTargets(survey, matches, on_targets, _by_pass_and_time(targets))
+    by_time = _by_pass_and_time(targets)
+    return MatchedTargets(survey, matches, on_targets, by_time, warnings=doubts, excluded=excluded)
+
+
+def with_included(matches: Matches, names: Sequence[str]) -> tuple[Matches, tuple[str, ...]]:
+    """Matches in which some points have the observations that were refused as theirs.
+
+    Parameters
+    ----------
+    matches : Matches
+    names : sequence of str
+        Of the points that are used in any case.
+
+    Returns
+    -------
+    matches : Matches
+    warnings : tuple of str
+        Why each observation that is used now was refused.
+    """
+    left = matches.unmatched
+    taken = {}
+    warned = []
+    for refusal in matches.refusals:
+        if refusal.name not in names or refusal.gps_time is None:
+            continue
+        is_its = left.gps_time == refusal.gps_time
+        if refusal.pass_number is not None:
+            is_its &= left.pass_number == refusal.pass_number
+        for row in np.flatnonzero(is_its):
+            taken[int(row)] = refusal.name
+        warned.append(
+            f"{refusal.name} is used because include names it. Matching refused it: "
+            f"{refusal.reason}"
+        )
+    if not taken:
+        return matches, tuple(warned)
+    rows = list(taken)
+    free = np.setdiff1d(np.arange(len(left)), rows)
+    named = replace(left[rows], name=tuple(taken.values()))
+    moved = matches.moved
+    if moved is not None:
+        moved = moved[~np.isin(np.array(moved.name, dtype=str), list(taken.values()))]
+    changed = replace(
+        matches,
+        matched=TargetObservations.concatenate([matches.matched, named]),
+        unmatched=left[free],
+        refusals=tuple(row for row in matches.refusals if row.name not in taken.values()),
+        probability=np.append(matches.probability, np.zeros(len(rows))),
+        why=tuple(matches.why[row] for row in free),
+        moved=moved,
+    )
+    return changed, tuple(warned)
+
+
+def without_excluded(matches: Matches, survey: Survey) -> tuple[Matches, TargetObservations]:
+    """Matches without the points that are kept out of the estimate, and the observations of those.
+
+    Parameters
+    ----------
+    matches : Matches
+    survey : Survey
+    """
+    matched = matches.matched
+    is_out = np.isin(np.array(matched.name, dtype=str), survey.excluded.name)
+    kept = replace(matches, matched=matched[~is_out], probability=matches.probability[~is_out])
+    return kept, matched[is_out]
 
 
 def _log_matches(matches, survey):
