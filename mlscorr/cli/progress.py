@@ -112,7 +112,7 @@ class Lines(Stages):
         if seconds >= PATIENCE:
             say(f"{self.title}: {seconds:.1f} s")
 
-    def compile(self, is_begun, seconds=0.0):
+    def compile(self, is_begun: bool, seconds: float = 0.0) -> None:
         """Say once that loops are compiled."""
         if is_begun and not self.compiled and self.compiling == 0.0:
             say(f"{COMPILING.capitalize()} ...")
@@ -142,9 +142,15 @@ class Bars(Stages):
             if total is None or done < total:
                 self.bars.update(task, completed=done)
             else:  # work goes on, and nobody knows for how long
-                self.bars.update(task, total=None)
+                self._pulse(task)
 
         return advance
+
+    def _pulse(self, task):
+        """Make a spinner of a bar; rich takes no total of None for a change."""
+        for row in self.bars.tasks:
+            if row.id == task:
+                row.total = None
 
     def _ended(self, seconds):
         if seconds < PATIENCE:
@@ -152,7 +158,7 @@ class Bars(Stages):
         else:
             self.bars.update(self.task, description=self.title, total=1, completed=1)
 
-    def compile(self, is_begun, seconds=0.0):
+    def compile(self, is_begun: bool, seconds: float = 0.0) -> None:
         """Name it beside the stage, as long as it takes."""
         super().compile(is_begun, seconds)
         if self.title:

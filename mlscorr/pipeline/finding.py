@@ -654,10 +654,14 @@ def match_targets(targets: FoundTargets, survey: Survey) -> MatchedTargets:
     >>> len(matches.control), len(matches.check), matches.refused
     (4, 1, ())
     """
-    near = targets.near
-    for sentence in near.warnings():
+    on_beams = tuple(targets.near.warnings())
+    for sentence in on_beams:
         warnings.warn(sentence, stacklevel=2)
-    return match_silently(targets, survey)
+    matches = match_silently(targets, survey)
+    for sentence in matches.warnings:
+        if sentence not in on_beams:
+            warnings.warn(sentence, stacklevel=2)
+    return matches
 
 
 def match_silently(targets: FoundTargets, survey: Survey) -> MatchedTargets:
@@ -835,12 +839,12 @@ def without_excluded(matches: Matches, survey: Survey) -> tuple[Matches, TargetO
 def _log_matches(matches, survey):
     """Log which surveyed points were matched, and why others were not."""
     matched = Matched.by_name(matches.matched, survey.surveyed)
-    found = set(matched.name)
+    names = set(matched.name)
     LOG.info(
         "%d of %d control and %d of %d check points matched, by %d observations",
-        len(found & set(survey.control.name)),
+        len(names & set(survey.control.name)),
         len(survey.control),
-        len(found & set(survey.check.name)),
+        len(names & set(survey.check.name)),
         len(survey.check),
         len(matched),
     )

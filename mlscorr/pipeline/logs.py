@@ -49,7 +49,7 @@ def without_secrets(text: str) -> str:
     >>> without_secrets("mlscorr check s3://me:key@host/a.laz https://host/b.laz?token=1")
     'mlscorr check s3://...@host/a.laz https://host/b.laz?...'
     """
-    return SECRETS.sub(lambda found: "...@" if found[0].endswith("@") else "...", text)
+    return SECRETS.sub(lambda match: "...@" if match[0].endswith("@") else "...", text)
 
 
 @contextmanager
