@@ -26,6 +26,7 @@ def calibrate(
     clouds: Annotated[
         bool, typer.Option("--clouds", help="Write the clouds as the calibration puts them.")
     ] = False,
+    exclude: terminal.Exclude = (),
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -34,7 +35,7 @@ def calibrate(
     """Calibrate lever arm and boresight of a survey's scanners by control points and ties."""
     out = chosen_out(out, survey, "calibrate")
     with work(out, overwrite, survey) as progress:
-        recorded = mlscorr.read_survey(survey)
+        recorded = mlscorr.read_survey(survey).choosing(exclude)
         result = mlscorr.calibrate(recorded, progress=progress, ties=False if no_ties else None)
         content = result.write(out, with_drift, clouds, overwrite, progress)
     print_json(content, as_json)

@@ -53,6 +53,7 @@ def compare(
             "given several times.",
         ),
     ] = (),
+    exclude: terminal.Exclude = (),
     overwrite: terminal.Overwrite = False,
     as_json: terminal.Json = False,
     quiet: terminal.Quiet = False,
@@ -64,7 +65,7 @@ def compare(
     mlscorr compare corrected-1 corrected-2 -o compared
     """
     with terminal.exit_code(terminal.Exit.USAGE):
-        _check_arguments(survey, second, clouds)
+        _check_arguments(survey, second, clouds, exclude)
     if second is not None:
         _compare_results(survey, second, out, overwrite, as_json)
         return
@@ -74,7 +75,8 @@ def compare(
 
         clouds = list(dict.fromkeys(method_named(name).name for name in clouds))
     with work(out, overwrite, survey) as progress:
-        result = mlscorr.compare(mlscorr.read_survey(survey), progress=progress)
+        recorded = mlscorr.read_survey(survey).choosing(exclude)
+        result = mlscorr.compare(recorded, progress=progress)
         report = result.write(out, clouds, overwrite, progress)
     print_json(report, as_json)
     _tell(report, out)
@@ -88,7 +90,7 @@ def compare(
         raise typer.Exit(terminal.Exit.IN_PART)
 
 
-def _check_arguments(survey, second, clouds):
+def _check_arguments(survey, second, clouds, exclude):
     """Refuse what is neither one survey nor two results."""
     from mlscorr.pipeline import is_result
 
@@ -105,6 +107,8 @@ def _check_arguments(survey, second, clouds):
                 f"{path} is no result of mlscorr correct: it holds no report.json. Give two "
                 "folders that mlscorr correct -o wrote, or one survey.toml."
             )
+    if exclude:
+        raise ValueError("--exclude is of one survey; two results have their points already.")
     if clouds:
         raise ValueError("--clouds is of the methods on one survey; two results have no methods.")
 

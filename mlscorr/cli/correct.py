@@ -68,13 +68,7 @@ def correct(
         bool,
         typer.Option("--displacement", help="Add to each point by how much its E, N, H moved."),
     ] = False,
-    exclude: Annotated[
-        list[str],
-        typer.Option(
-            metavar="NAME",
-            help="A control point that takes no part; its residual is reported. May be repeated.",
-        ),
-    ] = (),
+    exclude: terminal.Exclude = (),
     include: Annotated[
         list[str],
         typer.Option(

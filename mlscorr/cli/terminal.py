@@ -131,6 +131,10 @@ Verbose = Annotated[
         help="Print what is found and decided, and why; -vv prints details, too.",
     ),
 ]
+Exclude = Annotated[
+    list[str],
+    typer.Option(metavar="NAME", help="A control point that takes no part. May be repeated."),
+]
 NoTies = Annotated[bool, typer.Option("--no-ties", help="Don't use what two passes both saw.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")]
 

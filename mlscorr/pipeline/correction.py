@@ -21,7 +21,11 @@ from mlscorr.evaluate import datum_differences, unseen_rows
 from mlscorr.pipeline.control_checks import check_control, reuse_warnings
 from mlscorr.pipeline.corrected_survey import CorrectedSurvey
 from mlscorr.pipeline.estimation import estimate_pos_error
-from mlscorr.pipeline.exclusion import inclusion_warnings, weighed_exclusions
+from mlscorr.pipeline.exclusion import (
+    inclusion_warnings,
+    marked_excluded,
+    weighed_exclusions,
+)
 from mlscorr.pipeline.finding import (
     MATCHING,
     MatchedTargets,
@@ -210,8 +214,9 @@ def corrected_fields(
         "estimate": estimate,
         "matched_control": control,
         "matched_check": check,
-        "missing": unseen_rows(
-            survey, matches.matches.refusals, matches.candidates, matches.scanned
+        "missing": marked_excluded(
+            unseen_rows(survey, matches.matches.refusals, matches.candidates, matches.scanned),
+            survey,
         ),
         "fitted": matches.fitted,
         "warnings": (

@@ -72,6 +72,20 @@ def excluded_rows(excluded: Matched, correction: Correction) -> list[TargetRow]:
     return target_rows(excluded, correction, "control", reasons, left_out)
 
 
+def marked_excluded(rows: list[TargetRow], survey: Survey) -> list[TargetRow]:
+    """Rows of points without an observation; of those that are kept out nobody misses one.
+
+    Parameters
+    ----------
+    rows : list of TargetRow
+    survey : Survey
+    """
+    return [
+        replace(row, why=EXCLUDED, scanned=False) if row.name in survey.excluded.name else row
+        for row in rows
+    ]
+
+
 def weighed_exclusions(
     survey: Survey,
     matches: MatchedTargets,

@@ -762,7 +762,9 @@ def match_fitted(
         survey.pos,
         survey.search_radius,
     )
-    matches, doubts = with_included(matches, survey.included)
+    # an excluded point has a residual, too, whatever matching says of it
+    matches, doubts = with_included(matches, (*survey.included, *survey.excluded.name))
+    doubts = tuple(text for name, text in doubts if name in survey.included)
     matches, excluded = without_excluded(matches, survey)
     _log_matches(matches, survey)
     numbers = np.repeat([n for n, _ in targets], [len(t.cloud) for _, t in targets]).astype(int)
@@ -772,20 +774,22 @@ def match_fitted(
     return MatchedTargets(survey, matches, on_targets, by_time, warnings=doubts, excluded=excluded)
 
 
-def with_included(matches: Matches, names: Sequence[str]) -> tuple[Matches, tuple[str, ...]]:
+def with_included(
+    matches: Matches, names: Sequence[str]
+) -> tuple[Matches, tuple[tuple[str, str], ...]]:
     """Matches in which some points have the observations that were refused as theirs.
 
     Parameters
     ----------
     matches : Matches
     names : sequence of str
-        Of the points that are used in any case.
+        Of the points that have an observation in any case.
 
     Returns
     -------
     matches : Matches
-    warnings : tuple of str
-        Why each observation that is used now was refused.
+    warnings : tuple of (str, str)
+        Name of each point that has one now, and a sentence on why it was refused.
     """
     left = matches.unmatched
     taken = {}
@@ -798,10 +802,11 @@ def with_included(matches: Matches, names: Sequence[str]) -> tuple[Matches, tupl
             is_its &= left.pass_number == refusal.pass_number
         for row in np.flatnonzero(is_its):
             taken[int(row)] = refusal.name
-        warned.append(
+        sentence = (
             f"{refusal.name} is used because include names it. Matching refused it: "
             f"{refusal.reason}"
         )
+        warned.append((refusal.name, sentence))
     if not taken:
         return matches, tuple(warned)
     rows = list(taken)
