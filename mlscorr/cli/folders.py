@@ -10,8 +10,6 @@ from typing import NamedTuple
 
 from mlscorr.cli.terminal import Exit, exit_code, say
 
-NAMES = ("survey.toml", "project.toml")
-
 
 def chosen_out(out: Path | None, source: Path, command: str, is_by_name: bool = False) -> Path:
     """The folder for the results; by default FOLDER-COMMAND beside the FOLDER of the input.
@@ -50,7 +48,7 @@ def chosen_out(out: Path | None, source: Path, command: str, is_by_name: bool = 
 
 
 def has_toml(folder: Path) -> bool:
-    """Return True for a file, a URL, or a folder with a survey.toml or project.toml.
+    """Return True for a file, a URL, or a folder with any TOML file: nothing is inferred then.
 
     Parameters
     ----------
@@ -60,7 +58,7 @@ def has_toml(folder: Path) -> bool:
 
     if is_remote(folder) or not folder.is_dir():
         return True
-    return any((folder / name).exists() for name in NAMES)
+    return any(folder.glob("*.toml"))
 
 
 class InferredSurvey(NamedTuple):

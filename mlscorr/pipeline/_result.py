@@ -5,6 +5,7 @@ A command's result says what it has as ``ResultFiles``; how that is written stan
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -15,6 +16,7 @@ from mlscorr.io.store import document, output_folder, progress_of, write_json
 from mlscorr.pipeline.logs import write_log
 from mlscorr.survey import InputFile, Summary
 
+LOG = logging.getLogger(__name__)
 Table = Callable[[Path], object]  # writes the file of this path
 Page = Callable[[Path, dict], object]  # likewise, of the document
 
@@ -149,6 +151,8 @@ class ResultFiles:
         for name, write in pages.items():
             progress_of(f"Drawing {name}")
             write(folder / name, content)
+        for row in content.get("statements", ()):
+            LOG.info("%s: %s", row["what"], row["sentence"])
         write_log(folder)
         return content
 

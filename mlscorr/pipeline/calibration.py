@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -39,6 +40,8 @@ NOTHING_CALIBRATES = (
     "shows everything once, as its mounting puts it. Drive the way back as well, or survey control "
     "points on both sides of the way, near and far."
 )
+
+LOG = logging.getLogger(__name__)
 
 
 def calibrate(
@@ -116,6 +119,15 @@ def calibrate(
     stage("Calibrating the mounting")
     control, check = _numbered(survey, finding)
     calibration = calibrate_together(survey, control, features, notes)
+    LOG.info(
+        "mounting calibrated by %d of %d control observations, %d of %d components determined",
+        int(calibration.used.sum()),
+        len(calibration.used),
+        int(calibration.determined.sum()),
+        len(calibration.determined),
+    )
+    for test in calibration.screening.outliers:
+        LOG.info("%s not used: the others contradict it", test.name)
 
     parts = _parts(survey, control, check, finding, calibration)
     for name, part in parts.items():

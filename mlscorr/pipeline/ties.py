@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 AXES = ("across", "along", "up")  # of the way of the earlier view
+
+LOG = logging.getLogger(__name__)
 
 
 def find_ties(
@@ -69,6 +72,7 @@ def find_ties(
         features = _read_features(survey, progress)
     (progress or silent)("Pairing what two passes both saw")
     tied = TiedSurvey(survey, features, search_ties(survey, features))
+    LOG.info("%d ties between %d planes, poles and markings", len(tied.search.ties), len(features))
     for sentence in tied.warnings:
         warnings.warn(sentence, stacklevel=2)
     return tied
