@@ -10,8 +10,8 @@ from typing import Annotated
 import typer
 
 from mlscorr.cli.blind import blind
-from mlscorr.cli.project import status
-from mlscorr.cli.terminal import deafen, listen, warn
+from mlscorr.cli.project import STATUS_EXAMPLES, status
+from mlscorr.cli.terminal import as_epilog, deafen, listen, warn
 
 COMMANDS = (  # a module each, in the order of the overview
     *("init", "check", "correct", "extract", "ties", "calibrate", "compare", "render", "demo"),
@@ -24,8 +24,9 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 for name in COMMANDS:
-    app.command()(getattr(import_module(f"mlscorr.cli.{name}"), name))
-app.command()(status)
+    module = import_module(f"mlscorr.cli.{name}")
+    app.command(epilog=as_epilog(module.EXAMPLES))(getattr(module, name))
+app.command(epilog=as_epilog(STATUS_EXAMPLES))(status)
 app.add_typer(blind, name="blind")
 
 

@@ -5,6 +5,7 @@ from typing import Annotated
 import typer
 
 import mlscorr
+from mlscorr.cli.folders import chosen_out
 from mlscorr.cli.terminal import (
     Exit,
     Json,
@@ -12,10 +13,16 @@ from mlscorr.cli.terminal import (
     Overwrite,
     Quiet,
     SurveyArgument,
+    Verbose,
     exit_code,
     say_results,
 )
 from mlscorr.cli.work import print_json, work
+
+EXAMPLES = (
+    "mlscorr apply survey.toml gap/gap.json",
+    "mlscorr apply survey.toml time_offset=0.005 -o moved",
+)
 
 
 def apply(
@@ -29,12 +36,14 @@ def apply(
             "horizontal_datum=0.2,-0.1 (m: E,N), vertical_datum=15.3 (m).",
         ),
     ],
-    out: Out,
+    out: Out = None,
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,
+    verbose: Verbose = 0,
 ) -> None:
     """Take a clock offset, datum or mounting that was found out of clouds and trajectory."""
+    out = chosen_out(out, survey, "apply")
     import numpy as np
 
     from mlscorr.pipeline import read_effects

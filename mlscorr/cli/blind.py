@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from mlscorr.cli.progress import progress_bars
-from mlscorr.cli.terminal import Effects, Exit, Json, Quiet, exit_code, say
+from mlscorr.cli.terminal import Effects, Exit, Json, Quiet, Verbose, as_epilog, exit_code, say
 from mlscorr.cli.work import print_json
 
 Check = Annotated[Path, typer.Argument(metavar="OUT", help="Folder of the blind check.")]
@@ -17,7 +17,7 @@ blind = typer.Typer(
 )
 
 
-@blind.command()
+@blind.command(epilog=as_epilog(["mlscorr blind make blind --cases 50 --workers 2"]))
 def make(
     out: Check,
     cases: Annotated[int, typer.Option(min=1, help="Number of surveys.")] = 300,
@@ -29,6 +29,7 @@ def make(
     effects: Effects = None,
     workers: Workers = 2,
     quiet: Quiet = False,
+    verbose: Verbose = 0,
 ) -> None:
     """Make surveys, seal their labels, and put those into key.json. Goes on where it stopped."""
     with exit_code(Exit.BAD_DATA), progress_bars() as progress:
@@ -38,8 +39,14 @@ def make(
     say(f"{made} surveys are in {out / 'cases'}, their seals in {out / 'seals.json'}.")
 
 
-@blind.command()
-def run(out: Check, effects: Effects = None, workers: Workers = 2, quiet: Quiet = False) -> None:
+@blind.command(epilog=as_epilog(["mlscorr blind run blind --workers 2"]))
+def run(
+    out: Check,
+    effects: Effects = None,
+    workers: Workers = 2,
+    quiet: Quiet = False,
+    verbose: Verbose = 0,
+) -> None:
     """Diagnose each survey that has no answer yet, from its folder alone."""
     with exit_code(Exit.BAD_DATA), progress_bars() as progress:
         from mlscorr.pipeline import run_blind
@@ -48,9 +55,16 @@ def run(out: Check, effects: Effects = None, workers: Workers = 2, quiet: Quiet 
     say(f"{answered} surveys are diagnosed ({failed} could not be): {out / 'answers'}.")
 
 
-@blind.command(name="score")
+@blind.command(
+    name="score",
+    epilog=as_epilog(["mlscorr blind score blind", "mlscorr blind score blind --json"]),
+)
 def score_(
-    out: Check, effects: Effects = None, as_json: Json = False, quiet: Quiet = False
+    out: Check,
+    effects: Effects = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = 0,
 ) -> None:
     """Verify the seals and compare answers with labels."""
     with exit_code(Exit.BAD_DATA):

@@ -6,13 +6,19 @@ import typer
 
 import mlscorr
 from mlscorr.cli import terminal
-from mlscorr.cli.terminal import Json, Out, Overwrite, Quiet, SurveyArgument, say
+from mlscorr.cli.folders import chosen_out
+from mlscorr.cli.terminal import Json, Out, Overwrite, Quiet, SurveyArgument, Verbose, say
 from mlscorr.cli.work import print_json, work
+
+EXAMPLES = (
+    "mlscorr calibrate survey.toml",
+    "mlscorr calibrate survey.toml -o calibrated --with-drift --clouds",
+)
 
 
 def calibrate(
     survey: SurveyArgument,
-    out: Out,
+    out: Out = None,
     with_drift: Annotated[
         bool, typer.Option("--with-drift", help="Estimate the POS error too; write trajectory.csv.")
     ] = False,
@@ -20,13 +26,16 @@ def calibrate(
     clouds: Annotated[
         bool, typer.Option("--clouds", help="Write the clouds as the calibration puts them.")
     ] = False,
+    exclude: terminal.Exclude = (),
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,
+    verbose: Verbose = 0,
 ) -> None:
     """Calibrate lever arm and boresight of a survey's scanners by control points and ties."""
+    out = chosen_out(out, survey, "calibrate")
     with work(out, overwrite, survey) as progress:
-        recorded = mlscorr.read_survey(survey)
+        recorded = mlscorr.read_survey(survey).choosing(exclude)
         result = mlscorr.calibrate(recorded, progress=progress, ties=False if no_ties else None)
         content = result.write(out, with_drift, clouds, overwrite, progress)
     print_json(content, as_json)

@@ -1,33 +1,73 @@
 """The command that tells what is wrong with a survey before it is corrected."""
 
-from collections.abc import Sequence
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
 from shlex import quote
+from typing import TYPE_CHECKING
 
 import typer
 
 import mlscorr
-from mlscorr.cli.terminal import Exit, Quiet, SurveyArgument, exit_code, say, warn
+from mlscorr.cli.progress import progress_bars
+from mlscorr.cli.terminal import Exit, Quiet, SurveyArgument, Verbose, exit_code, say, warn
 from mlscorr.wording import counted, thousands
+
+if TYPE_CHECKING:
+    from mlscorr.pipeline import CheckedSurvey
 
 CODES = {"survey.toml": Exit.USAGE, "data": Exit.BAD_DATA, "system": Exit.READ_OR_WRITE}
 
+EXAMPLES = (
+    "mlscorr check street",
+    "mlscorr check project.toml",
+)
 
-def check(survey: SurveyArgument, quiet: Quiet = False) -> None:
+
+def check(survey: SurveyArgument, quiet: Quiet = False, verbose: Verbose = 0) -> None:
     """Tell in seconds all that is wrong with a survey or project, and what correcting it takes."""
-    with exit_code(Exit.BAD_DATA):
-        from mlscorr.io.surveys import is_project
+    checked = _checked(survey)
+    say_checked(checked)
+    following = f"mlscorr correct {quote(str(survey))}"
+    number = counted(len(checked.warnings), "warning")
+    if checked.is_searched:
+        say(f"No fault, {number}. Next: {following}")
+    else:
+        say(f"No fault in what was checked, {number}; no control point was found, see Not checked.")
 
-        if is_project(survey):
-            from mlscorr.pipeline.project import check_project
 
-            checked = check_project(survey)
-        else:
-            checked = mlscorr.check(survey)
+def say_checked(checked: CheckedSurvey) -> None:
+    """Say what a check found, and end with its exit code where there is a fault.
+
+    Parameters
+    ----------
+    checked : CheckedSurvey
+
+    Raises
+    ------
+    typer.Exit
+        With the code of the first fault.
+    """
     amounts = {"Read": checked.read, "Written": checked.written, "Needed": checked.needed}
     for title, those in amounts.items():
         _list(title, [_amount(amount) for amount in those])
     _list("Worked out", checked.notes)
     _list("Not checked", checked.unchecked)
+    say_problems(checked)
+
+
+def say_problems(checked: CheckedSurvey) -> None:
+    """Say warnings and faults alone, and end with the exit code of the first fault.
+
+    Parameters
+    ----------
+    checked : CheckedSurvey
+
+    Raises
+    ------
+    typer.Exit
+    """
     for sentence in checked.warnings:
         warn(f"Warning: {sentence}")
     for fault in checked.faults:
@@ -35,12 +75,6 @@ def check(survey: SurveyArgument, quiet: Quiet = False) -> None:
     if checked.faults:
         warn(counted(sum(fault.number for fault in checked.faults), "fault"))
         raise typer.Exit(CODES[checked.faults[0].where])
-    following = f"mlscorr correct {quote(str(survey))} -o OUT"
-    number = counted(len(checked.warnings), "warning")
-    if checked.is_searched:
-        say(f"No fault, {number}. Next: {following}")
-    else:
-        say(f"No fault in what was checked, {number}; no control point was found, see Not checked.")
 
 
 def _list(title: str, lines: Sequence[str]) -> None:
@@ -57,3 +91,89 @@ def _amount(amount):
         digits = 1
     number = thousands(amount.number, digits)
     return f"{amount.what}: {number}{' ' * bool(amount.unit)}{amount.unit} ({amount.source})"
+
+
+def check_first(survey: Path) -> None:
+    """Check a survey before the work, and end with what was found where there is a fault.
+
+    Parameters
+    ----------
+    survey : Path
+        survey.toml.
+
+    Raises
+    ------
+    typer.Exit
+        As say_checked.
+    """
+    checked = _checked(survey)
+    say_problems(checked)
+    say(f"Checked: no fault, {counted(len(checked.warnings), 'warning')}.")
+
+
+def _checked(survey):
+    """What a check says of a survey or project."""
+    with exit_code(Exit.BAD_DATA), progress_bars() as progress:
+        from mlscorr.io.surveys import is_project
+
+        if is_project(survey):
+            from mlscorr.pipeline.project import check_project
+
+            progress("Checking the project")
+            return check_project(survey)
+        from mlscorr.pipeline import check as check_survey
+
+        progress("Checking the survey")
+        return check_survey(survey)
+
+
+def say_dry_run(
+    survey: Path,
+    out: Path,
+    written: Sequence[str],
+    chosen: Mapping[str, Collection[str]] | None = None,
+    overwrite: bool = False,
+) -> None:
+    """Say what a correction would read and write, and what is wrong with its inputs.
+
+    Parameters
+    ----------
+    survey : Path
+        survey.toml or project.toml.
+    out : Path
+        Folder of the results.
+    written : sequence of str
+        Names of the files in it; none of a project.
+    chosen : mapping, optional
+        Names that are to be excluded and included.
+    overwrite : bool
+
+    Raises
+    ------
+    typer.Exit
+        As say_checked.
+    """
+    with exit_code(Exit.USAGE):
+        from mlscorr.io.store import check_output
+        from mlscorr.io.surveys import input_files, is_project
+
+        if not is_project(survey):
+            files = input_files(survey)
+            check_output(out, files, overwrite)
+            _list("Would be read", [_with_size(file) for file in files])
+    _list(f"Would be written into {out}", written)
+    checked = _checked(survey)
+    if not checked.faults and chosen:
+        with exit_code(Exit.USAGE):
+            mlscorr.read_survey(survey).choosing(**chosen)
+    say_checked(checked)
+    say(f"No fault, {counted(len(checked.warnings), 'warning')}. Nothing was written.")
+
+
+def _with_size(file):
+    """A file with its size, unless it is a URL."""
+    from mlscorr.io.store import is_remote
+
+    if is_remote(file):
+        return str(file)
+    return f"{file.resolve()} ({thousands(file.stat().st_size / 1e6, 1)} MB)"

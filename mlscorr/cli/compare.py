@@ -7,9 +7,16 @@ import typer
 
 import mlscorr
 from mlscorr.cli import terminal
+from mlscorr.cli.folders import chosen_out
 from mlscorr.cli.work import print_json, work
 
 RESULT_FILES = ("report.json", "trajectory.csv")  # that are read of a result
+
+EXAMPLES = (
+    "mlscorr compare survey.toml",
+    "mlscorr compare survey.toml -o compared --clouds affine",
+    "mlscorr compare corrected-1 corrected-2 -o compared",
+)
 
 
 def compare(
@@ -33,7 +40,8 @@ def compare(
         typer.Option(
             "-o",
             "--out",
-            help="Folder for the results; of two results the screen alone without it.",
+            help="Folder for the results; FOLDER-compare beside the survey's FOLDER if none, and "
+            "nothing but the screen for two results.",
             parser=terminal.path_or_url,
         ),
     ] = None,
@@ -45,9 +53,11 @@ def compare(
             "given several times.",
         ),
     ] = (),
+    exclude: terminal.Exclude = (),
     overwrite: terminal.Overwrite = False,
     as_json: terminal.Json = False,
     quiet: terminal.Quiet = False,
+    verbose: terminal.Verbose = 0,
 ) -> None:
     """Correct a survey by every method, and score them by the same check points.
 
@@ -55,16 +65,18 @@ def compare(
     mlscorr compare corrected-1 corrected-2 -o compared
     """
     with terminal.exit_code(terminal.Exit.USAGE):
-        _check_arguments(survey, second, out, clouds)
+        _check_arguments(survey, second, clouds, exclude)
     if second is not None:
         _compare_results(survey, second, out, overwrite, as_json)
         return
+    out = chosen_out(out, survey, "compare")
     with terminal.exit_code(terminal.Exit.USAGE):
         from mlscorr.pipeline import method_named
 
         clouds = list(dict.fromkeys(method_named(name).name for name in clouds))
     with work(out, overwrite, survey) as progress:
-        result = mlscorr.compare(mlscorr.read_survey(survey), progress=progress)
+        recorded = mlscorr.read_survey(survey).choosing(exclude)
+        result = mlscorr.compare(recorded, progress=progress)
         report = result.write(out, clouds, overwrite, progress)
     print_json(report, as_json)
     _tell(report, out)
@@ -78,7 +90,7 @@ def compare(
         raise typer.Exit(terminal.Exit.IN_PART)
 
 
-def _check_arguments(survey, second, out, clouds):
+def _check_arguments(survey, second, clouds, exclude):
     """Refuse what is neither one survey nor two results."""
     from mlscorr.pipeline import is_result
 
@@ -88,11 +100,6 @@ def _check_arguments(survey, second, out, clouds):
                 f"{survey} is a result of mlscorr correct, and one alone has nothing to be "
                 f"compared with. Name a second one: mlscorr compare {survey} OTHER -o compared."
             )
-        if out is None:
-            raise ValueError(
-                "The option -o is missing, the folder for the results: "
-                f"mlscorr compare {survey} -o compared."
-            )
         return
     for path in (survey, second):
         if not is_result(path):
@@ -100,6 +107,8 @@ def _check_arguments(survey, second, out, clouds):
                 f"{path} is no result of mlscorr correct: it holds no report.json. Give two "
                 "folders that mlscorr correct -o wrote, or one survey.toml."
             )
+    if exclude:
+        raise ValueError("--exclude is of one survey; two results have their points already.")
     if clouds:
         raise ValueError("--clouds is of the methods on one survey; two results have no methods.")
 

@@ -1,25 +1,42 @@
 """The command that corrects a survey."""
 
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 import mlscorr
 from mlscorr.cli import terminal
+from mlscorr.cli.check import check_first, say_dry_run
+from mlscorr.cli.folders import chosen_out, has_toml, inferred_survey
+from mlscorr.cli.progress import progress_bars
 from mlscorr.cli.project import correct_drives
 from mlscorr.cli.work import print_json, work
+
+if TYPE_CHECKING:
+    from mlscorr.pipeline import TieUse
+
+EXAMPLES = (
+    "mlscorr correct street",
+    "mlscorr correct survey.toml -o corrected --exclude T07 --worst-first",
+    "mlscorr correct project.toml -o city --workers 8",
+)
 
 
 def correct(
     survey: Annotated[
         Path,
         typer.Argument(
-            help="survey.toml or project.toml, or the folder that holds it; a path or a URL.",
+            help="survey.toml or project.toml, or the folder that holds it; a path or a URL. For a "
+            "folder with neither, a survey.toml is inferred and written beside the results.",
             parser=terminal.path_or_url,
         ),
     ],
-    out: terminal.Out,
+    out: terminal.Out = None,
     order: Annotated[
         int, typer.Option(min=0, max=9, help="Order of the polynomial trend of the position.")
     ] = 0,
@@ -51,6 +68,26 @@ def correct(
         bool,
         typer.Option("--displacement", help="Add to each point by how much its E, N, H moved."),
     ] = False,
+    exclude: terminal.Exclude = (),
+    include: Annotated[
+        list[str],
+        typer.Option(
+            metavar="NAME",
+            help="A control point that is used though it would be refused. May be repeated.",
+        ),
+    ] = (),
+    worst_first: Annotated[
+        bool,
+        typer.Option("--worst-first", help="Print the residual of each point, the largest first."),
+    ] = False,
+    dry_run: Annotated[
+        bool,
+        typer.Option(
+            "--dry-run",
+            help="Check the inputs, and say what would be read and written; write nothing. Exit "
+            "codes are those of mlscorr check.",
+        ),
+    ] = False,
     provenance: Annotated[
         bool,
         typer.Option(
@@ -79,14 +116,12 @@ def correct(
     overwrite: terminal.Overwrite = False,
     as_json: terminal.Json = False,
     quiet: terminal.Quiet = False,
+    verbose: terminal.Verbose = 0,
 ) -> None:
-    """Correct the cloud of a survey, or all drives of a project.toml, and report on it.
-
-    mlscorr correct survey.toml -o corrected --targets targets.gpkg --trajectory drive.sbet
-    """
-    with terminal.exit_code(terminal.Exit.USAGE):
+    """Correct the cloud of a survey, or all drives of a project.toml, and report on it."""
+    out = chosen_out(out, survey, "correct")
+    with terminal.exit_code(terminal.Exit.USAGE), progress_bars():
         from mlscorr.evaluate import failures, read_gate
-        from mlscorr.io.clouds import Additions, read_layout, with_additions
         from mlscorr.io.surveys import is_project
         from mlscorr.io.trajectories import check_distinct, check_exports, check_target_exports
 
@@ -96,9 +131,14 @@ def correct(
         gates = [read_gate(text) for text in fail_if]
         if no_ties and ties_only:
             raise ValueError("--no-ties and --ties-only leave nothing to correct with: give one.")
-        ties: Literal["off", "only"] | None = "off" if no_ties else "only" if ties_only else None
+        ties: TieUse | None = None
+        if no_ties:
+            ties = "off"
+        elif ties_only:
+            ties = "only"
         shared = workers, scheduler, resume
-        if is_project(survey):
+        is_of_drives = is_project(survey)
+        if is_of_drives:
             from mlscorr.pipeline.project import Options
 
             if provenance:
@@ -106,41 +146,96 @@ def correct(
                     "--provenance is of one survey, and a cloud of a project may belong to several "
                     "drives. The report.json of each drive names its inputs and their SHA-256."
                 )
+            if exclude or include:
+                raise ValueError(
+                    "--exclude and --include are of one survey: correct the drive by its "
+                    "survey.toml, or take the points out of the project's control list."
+                )
             exports = tuple(trajectory), tuple(targets)
             given = order, ties, sigma, not no_report, *exports, displacement, *shared, overwrite
-            correct_drives(survey, out, Options(*given), gates, as_json)
-            return
-        if shared != (1, None, False):
+            options = Options(*given)
+        elif shared != (1, None, False):
             raise ValueError(
                 f"--workers, --scheduler and --resume are of a project.toml, and {survey} is one "
                 'survey. Two lines make a project of it: [[drive]] and survey = "survey.toml".'
             )
-    with work(out, overwrite, survey) as progress:
-        recorded = mlscorr.read_survey(survey)
-        for sentence in recorded.layouts:
-            terminal.say(sentence)
-        check_exports(trajectory, recorded.crs, is_read=True)
-        check_target_exports(targets, recorded.crs, is_read=True)
-        added = Additions(sigma, displacement)
-        for cloud in recorded.cloud_paths if added.has_fields else ():
-            with_additions(read_layout(cloud), added)  # refuses one that has them, before the work
-        result = mlscorr.correct(recorded, order, progress=progress, ties=ties)
-        report = result.write(
-            out,
-            overwrite,
-            progress,
-            sigma,
-            page=not no_report,
-            trajectories=trajectory,
-            targets=targets,
-            displacement=displacement,
-            provenance=provenance,
-        )
-    tell(report, out, as_json, not no_report)
+    if is_of_drives:
+        if dry_run:
+            say_dry_run(survey, out, ())
+        else:
+            correct_drives(survey, out, options, gates, as_json)
+        return
+    settings = {
+        "sigma": sigma,
+        "page": not no_report,
+        "trajectories": trajectory,
+        "targets": targets,
+        "displacement": displacement,
+        "provenance": provenance,
+    }
+    chosen = {"exclude": exclude, "include": include}
+    with ExitStack() as ends:
+        path = survey
+        if not has_toml(survey):
+            with terminal.exit_code(terminal.Exit.USAGE), progress_bars() as progress:
+                from mlscorr.io.store import check_output
+
+                check_output(out, (), overwrite)
+                progress("Sorting the files of the folder")
+                place = None if dry_run else out
+                inferred = ends.enter_context(inferred_survey(survey, place))
+            path = inferred.path
+            settings["survey_toml"] = inferred.text
+        if dry_run:
+            say_dry_run(path, out, _written(path, settings), chosen, overwrite)
+            return
+        if path != survey:
+            check_first(path)
+        report = _corrected(path, out, overwrite, order, ties, chosen, settings)
+    tell(report, out, as_json, not no_report, worst_first)
     terminal.end(failures(gates, report), not report["coverage"]["points_untouched"])
 
 
-def tell(report: dict, out: Path, as_json: bool, page: bool = True) -> None:
+def _corrected(survey, out, overwrite, order, ties, chosen, settings):
+    """The report of a survey that was corrected, once all results are written."""
+    from mlscorr.io.clouds import Additions, read_layout, with_additions
+    from mlscorr.io.trajectories import check_exports, check_target_exports
+
+    with work(out, overwrite, survey) as progress:
+        recorded = mlscorr.read_survey(survey).choosing(**chosen)
+        if "survey_toml" in settings:  # which is the name that stays
+            recorded = replace(recorded, path=out / survey.name)
+        for sentence in recorded.layouts:
+            terminal.say(sentence)
+        check_exports(settings["trajectories"], recorded.crs, is_read=True)
+        check_target_exports(settings["targets"], recorded.crs, is_read=True)
+        added = Additions(settings["sigma"], settings["displacement"])
+        for cloud in recorded.cloud_paths if added.has_fields else ():
+            with_additions(read_layout(cloud), added)  # refuses one that has them, before the work
+        result = mlscorr.correct(recorded, order, progress=progress, ties=ties)
+        return result.write(out, overwrite, progress, **settings)
+
+
+def _written(survey, settings):
+    """Names of all files that a correction writes."""
+    from mlscorr.io.clouds import written_name
+    from mlscorr.io.surveys import files_of, read_survey_file, survey_toml
+
+    with terminal.exit_code(terminal.Exit.USAGE):
+        clouds = files_of(survey_toml(survey), read_survey_file(survey)).clouds
+    names = [written_name(path) for path in clouds]
+    names += ["trajectory.csv", *settings["trajectories"], "targets.csv", *settings["targets"]]
+    names += ["weak.csv", "report.json", "log.txt"]
+    if settings["page"]:
+        names += ["report.html", "pictures"]
+    if "survey_toml" in settings:
+        names.append("survey.toml")
+    return names
+
+
+def tell(
+    report: dict, out: Path, as_json: bool, page: bool = True, worst_first: bool = False
+) -> None:
     """Say what stands first in the report, the RMSE of misclosures, and where the results lie.
 
     Parameters
@@ -153,6 +248,8 @@ def tell(report: dict, out: Path, as_json: bool, page: bool = True) -> None:
         Whether to print the report on stdout.
     page : bool
         Whether report.html was written.
+    worst_first : bool
+        Whether to print the residual of each point, too.
     """
     from mlscorr.report import tie_sentences
 
@@ -160,6 +257,10 @@ def tell(report: dict, out: Path, as_json: bool, page: bool = True) -> None:
     terminal.say_statements(report["statements"])
     for sentence in tie_sentences(report["ties"], report["control"]["n_scored"]):
         terminal.say(sentence)
+    for row in report.get("exclusions", ()):
+        terminal.say(row["sentence"])
+    if worst_first:
+        say_residuals(report["targets"])
     rows = [
         ("control points", report["control"], "after"),
         ("  each left out in turn", report["control"], "leave_one_out"),
@@ -171,3 +272,33 @@ def tell(report: dict, out: Path, as_json: bool, page: bool = True) -> None:
         results += [("Report", out / "report.html"), ("Pictures", out / "pictures")]
     clouds = ", ".join(str(out / file["name"]) for file in report["files"])
     terminal.say_results([*results, ("Corrected", clouds)])
+
+
+def say_residuals(targets: list[dict]) -> None:
+    """Print the residual of each observation, the largest first, and points without one at last.
+
+    Parameters
+    ----------
+    targets : list of dict
+        Of report.json. That of a control point is leave-one-out, as its own fit is no test.
+    """
+    rows = []
+    for row in targets:
+        residual = row["left_out"] or row["after"]
+        length = 0.0
+        if residual is not None:
+            length = sum(value**2 for value in residual) ** 0.5
+        rows.append((length, residual, row))
+    width = max([len(row["name"]) for row in targets], default=0) + 2
+    head = f"{'residual (m)':{max(width, 13)}s}{'pass':>5s}  {'role':8s}"
+    terminal.say(f"{head}{'E':>8s}{'N':>8s}{'H':>8s}{'3D':>8s}")
+    for length, residual, row in sorted(rows, key=lambda each: -each[0]):
+        numbers = "".join(f"{value:8.3f}" for value in [*(residual or ()), length][:4])
+        if residual is None:
+            numbers = " " * 32
+        number = row["pass"] or ""
+        words = f"{row['name']:{max(width, 13)}s}{number:>5}  {row['role']:8s}{numbers}"
+        reason = ""
+        if row["reason"] and row["role"] == "control":
+            reason = f"  not used: {row['reason']}"
+        terminal.say(f"{words}{reason}")

@@ -6,16 +6,24 @@ from typing import Annotated
 import typer
 
 from mlscorr.cli.correct import tell
-from mlscorr.cli.terminal import Json, Out, Overwrite, Quiet, say
+from mlscorr.cli.terminal import Json, Overwrite, Quiet, Verbose, path_or_url, say
 from mlscorr.cli.work import work
+
+EXAMPLES = (
+    "mlscorr demo",
+    "mlscorr demo -o demo-2 --seed 2",
+)
 
 
 def demo(
-    out: Out = Path("demo"),
+    out: Annotated[
+        Path, typer.Option("-o", "--out", help="Folder for the results.", parser=path_or_url)
+    ] = Path("demo"),
     seed: Annotated[int, typer.Option(min=0, help="Of the simulated survey.")] = 1,
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,
+    verbose: Verbose = 0,
 ) -> None:
     """Make a small simulated survey, correct it, and show the report."""
     with work(out, overwrite) as progress:

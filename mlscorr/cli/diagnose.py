@@ -7,13 +7,19 @@ import typer
 
 import mlscorr
 from mlscorr.cli import terminal
+from mlscorr.cli.folders import chosen_out
 from mlscorr.cli.work import print_json, work
 from mlscorr.wording import signed
+
+EXAMPLES = (
+    "mlscorr diagnose survey.toml",
+    "mlscorr diagnose survey.toml -o gap --simulated my-clouds",
+)
 
 
 def diagnose(
     survey: terminal.SurveyArgument,
-    out: terminal.Out,
+    out: terminal.Out = None,
     simulator: Annotated[
         Path | None,
         typer.Option(
@@ -47,8 +53,10 @@ def diagnose(
     overwrite: terminal.Overwrite = False,
     as_json: terminal.Json = False,
     quiet: terminal.Quiet = False,
+    verbose: terminal.Verbose = 0,
 ) -> None:
     """Find where reality and simulation differ, why, and how far the gap can be closed."""
+    out = chosen_out(out, survey, "diagnose")
     with terminal.exit_code(terminal.Exit.USAGE):
         from mlscorr.simulate import read_simulator
 

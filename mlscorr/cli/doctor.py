@@ -6,6 +6,11 @@ import mlscorr
 from mlscorr.cli.terminal import Exit, Json, say
 from mlscorr.cli.work import print_json
 
+EXAMPLES = (
+    "mlscorr doctor",
+    "mlscorr doctor --json",
+)
+
 
 def doctor(as_json: Json = False) -> None:
     """Tell what is installed, what is missing, and the line that installs it."""

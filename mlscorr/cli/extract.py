@@ -1,27 +1,36 @@
 """The command that lists target-like objects."""
 
 import mlscorr
+from mlscorr.cli.folders import chosen_out
 from mlscorr.cli.terminal import (
     Json,
     Out,
     Overwrite,
     Quiet,
     SurveyArgument,
+    Verbose,
     say,
     say_results,
 )
 from mlscorr.cli.work import print_json, work
 from mlscorr.wording import counted
 
+EXAMPLES = (
+    "mlscorr extract survey.toml",
+    "mlscorr extract survey.toml -o targets --json",
+)
+
 
 def extract(
     survey: SurveyArgument,
-    out: Out,
+    out: Out = None,
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,
+    verbose: Verbose = 0,
 ) -> None:
     """List all target-like objects in the cloud of a survey, with or without control points."""
+    out = chosen_out(out, survey, "extract")
     with work(out, overwrite, survey) as progress:
         recorded = mlscorr.read_survey(survey)
         content = mlscorr.extract(recorded, progress=progress).write(out, overwrite)

@@ -9,10 +9,16 @@ from typing import Annotated
 import typer
 
 import mlscorr
-from mlscorr.cli.terminal import Exit, Quiet, exit_code, say, warn
+from mlscorr.cli.progress import progress_bars
+from mlscorr.cli.terminal import Exit, Quiet, Verbose, exit_code, say, warn
 from mlscorr.wording import counted
 
 NAMES = {"none": "not used", "table": "not used", "reference": "mesh"}
+
+EXAMPLES = (
+    "mlscorr init street",
+    "mlscorr init street --set 'control.size = 0.6' --set 'crs = \"EPSG:32650\"'",
+)
 
 
 def init(
@@ -25,12 +31,14 @@ def init(
         typer.Option("--set", help="What survey.toml shall say, as 'control.size = 0.6'."),
     ] = (),
     quiet: Quiet = False,
+    verbose: Verbose = 0,
 ) -> None:
     """Write a survey.toml for the files in a folder, and say which is which and why.
 
     What only you know is marked in it, all at once, and the exit code is 4.
     """
-    with exit_code(Exit.USAGE):
+    with exit_code(Exit.USAGE), progress_bars() as progress:
+        progress("Sorting the files of the folder")
         started = mlscorr.init(folder, out, _document(given))
         started.write()
     for role in started.roles:

@@ -1,6 +1,7 @@
 """The command that says what a survey will show before it is driven."""
 
 import mlscorr
+from mlscorr.cli.folders import chosen_out
 from mlscorr.cli.terminal import (
     Effects,
     Json,
@@ -8,23 +9,34 @@ from mlscorr.cli.terminal import (
     Overwrite,
     Quiet,
     SurveyArgument,
+    Verbose,
     say,
     say_results,
 )
 from mlscorr.cli.work import print_json, work
 
+EXAMPLES = (
+    "mlscorr plan survey.toml",
+    "mlscorr plan survey.toml -o plan --json",
+)
+
 
 def plan(
     survey: SurveyArgument,
-    out: Out,
+    out: Out = None,
     effects: Effects = None,
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,
+    verbose: Verbose = 0,
 ) -> None:
     """Tell which effects a planned survey can show and tell apart; it needs no cloud."""
-    with work(out, overwrite, survey, planned=True):
-        content = mlscorr.plan(mlscorr.read_survey(survey, planned=True)).write(out, overwrite)
+    out = chosen_out(out, survey, "plan")
+    with work(out, overwrite, survey, planned=True) as progress:
+        recorded = mlscorr.read_survey(survey, planned=True)
+        progress("Predicting what each effect would show")
+        planned = mlscorr.plan(recorded)
+        content = planned.write(out, overwrite)
     from mlscorr.effects import lowered, parameter_title, titles
     from mlscorr.report.gap import accuracy_sentence
 

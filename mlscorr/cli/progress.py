@@ -1,18 +1,169 @@
-"""Bars or lines on stderr, for work that takes longer than a person likes to wait unsure."""
+"""Stages of a command on stderr: bars and spinners on a terminal, a line each elsewhere.
 
+A stage runs until the next one begins. One whose end is known has a bar and the time left; any
+other has a spinner and the time passed. A bar that is full before its stage ends becomes a spinner.
+"""
+
+import logging
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from time import monotonic
+from typing import Any
 
 from mlscorr.cli.terminal import is_quiet, say
-from mlscorr.wording import percent
+from mlscorr.wording import counted, percent
 
-COMPILING = "Compiling loops: the first run of an installation takes minutes longer; they are kept."
-PATIENCE = 2.0  # s; quicker work shows nothing
-INTERVAL = 10.0  # s between the lines where stderr is no terminal
+COMPILING = "compiling loops, once on this machine"
+LOADING = "Loading libraries"
+PATIENCE = 1.0  # s; guard: quicker stages are not shown, as nobody could read them
+INTERVAL = 60.0  # s between lines on one stage where stderr is no terminal; guard
 
-Progress = Callable[[str, int], Callable[[int], object]]
+Progress = Callable[..., Callable[[int], object]]
+LOG = logging.getLogger(__name__)
+
+
+class Stages:
+    """Stages of a command, which take their turns; these say nothing and are logged alone.
+
+    Parameters
+    ----------
+    title : str
+        Of the stage that runs; empty before the first and after the last.
+    start : float
+        Of this stage, on the monotonic clock. Units: s.
+    compiled : int
+        Number of loops that were compiled.
+    compiling : float
+        Time that took. Units: s.
+    """
+
+    def __init__(self) -> None:
+        self.title = ""
+        self.start = monotonic()
+        self.compiled = 0
+        self.compiling = 0.0
+
+    def begin(self, title: str, total: int | None = None) -> Callable[[int], object]:
+        """End the stage that runs, and begin another.
+
+        Parameters
+        ----------
+        title : str
+        total : int, optional
+            Number of points, or of what else is counted; None where the end is not known.
+
+        Returns
+        -------
+        function of the number just done
+        """
+        self.end()
+        self.title = title
+        self.start = monotonic()
+        return self._shown(title, total)
+
+    def end(self) -> None:
+        """End the stage that runs."""
+        if self.title:
+            seconds = monotonic() - self.start
+            LOG.info("%s: %.1f s", self.title, seconds)
+            self._ended(seconds)
+        self.title = ""
+
+    def compile(self, is_begun: bool, seconds: float = 0.0) -> None:
+        """Count a loop that is compiled.
+
+        Parameters
+        ----------
+        is_begun : bool
+            Or ended.
+        seconds : float
+            That it took.
+        """
+        if not is_begun:
+            self.compiled += 1
+            self.compiling += seconds
+
+    def _shown(self, _title: str, _total: int | None) -> Callable[[int], object]:
+        """Show that a stage has begun."""
+        return lambda _done: None
+
+    def _ended(self, _seconds: float) -> None:
+        """Show that the stage has ended."""
+
+
+class Lines(Stages):
+    """A line for each stage, at its end; a long one has a line every minute, too."""
+
+    def _shown(self, title, total):
+        done = 0
+        due = monotonic() + INTERVAL
+
+        def advance(number):
+            nonlocal done, due
+            done += number
+            if total and monotonic() > due:
+                due = monotonic() + INTERVAL
+                say(f"{title}: {percent(min(done / total, 1.0))} so far")
+
+        return advance
+
+    def _ended(self, seconds):
+        if seconds >= PATIENCE:
+            say(f"{self.title}: {seconds:.1f} s")
+
+    def compile(self, is_begun: bool, seconds: float = 0.0) -> None:
+        """Say once that loops are compiled."""
+        if is_begun and not self.compiled and self.compiling == 0.0:
+            say(f"{COMPILING.capitalize()} ...")
+        super().compile(is_begun, seconds)
+
+
+class Bars(Stages):
+    """A bar or spinner for each stage on a terminal, redrawn several times a second.
+
+    Parameters
+    ----------
+    bars : rich.progress.Progress
+    """
+
+    def __init__(self, bars: Any) -> None:
+        super().__init__()
+        self.bars = bars
+        self.task: Any = None
+
+    def _shown(self, title, total):
+        task = self.task = self.bars.add_task(title, total=total)
+        done = 0
+
+        def advance(number):
+            nonlocal done
+            done += number
+            if total is None or done < total:
+                self.bars.update(task, completed=done)
+            else:  # work goes on, and nobody knows for how long
+                self._pulse(task)
+
+        return advance
+
+    def _pulse(self, task):
+        """Make a spinner of a bar; rich takes no total of None for a change."""
+        for row in self.bars.tasks:
+            if row.id == task:
+                row.total = None
+
+    def _ended(self, seconds):
+        if seconds < PATIENCE:
+            self.bars.remove_task(self.task)
+        else:
+            self.bars.update(self.task, description=self.title, total=1, completed=1)
+
+    def compile(self, is_begun: bool, seconds: float = 0.0) -> None:
+        """Name it beside the stage, as long as it takes."""
+        super().compile(is_begun, seconds)
+        if self.title:
+            words = f"{self.title}, {COMPILING}" if is_begun else self.title
+            self.bars.update(self.task, description=words)
 
 
 @contextmanager
@@ -22,66 +173,89 @@ def progress_bars() -> Iterator[Progress]:
     Yields
     ------
     progress : function
-        progress(title, total) gives a function of the number of points just done.
+        progress(title, total) begins a stage, and gives a function of the number of points, or of
+        what else is counted, just done. Without a total the end is not known.
     """
-    with _compilation_said():
-        if is_quiet():
-            yield lambda *_: lambda _: None
-        elif sys.stderr.isatty():
-            with _bars() as progress:
-                yield progress
-        else:
-            yield _lines
+    with _stages() as stages:
+        start = monotonic()
+        stages.begin(LOADING)  # which takes seconds, before anything else can begin
+        try:
+            with _compilations(stages):
+                yield stages.begin
+        finally:
+            stages.end()
+        seconds = monotonic() - start
+    if stages.compiling >= PATIENCE:
+        loops = counted(stages.compiled, "loop")
+        share = percent(min(stages.compiling / max(seconds, PATIENCE), 1.0))
+        say(
+            f"{loops} compiled in {stages.compiling:.0f} s, {share} of the time; the next run on "
+            "this machine saves it."
+        )
 
 
 @contextmanager
-def _compilation_said():
-    """Say once why work takes longer, when loops have been compiled for a while."""
+def _stages() -> Iterator[Stages]:
+    """Stages as stderr can show them."""
+    if is_quiet():
+        yield Stages()
+    elif sys.stderr.isatty():
+        with _rich_bars() as bars:
+            yield Bars(bars)
+    else:
+        yield Lines()
+
+
+@contextmanager
+def _compilations(stages: Stages) -> Iterator[None]:
+    """Tell stages of each loop that is compiled; loops within loops count once."""
     from numba.core.event import Listener, install_listener
 
     class Compilation(Listener):
-        due = float("inf")
-        is_said = False
+        depth = 0
+        begun = 0.0
 
         def on_start(self, _event):
-            self.due = min(self.due, monotonic() + PATIENCE)
-            if monotonic() >= self.due and not self.is_said:
-                self.is_said = True
-                say(COMPILING)
+            if self.depth == 0:
+                self.begun = monotonic()
+                stages.compile(True)
+            self.depth += 1
 
         def on_end(self, _event):
-            pass
+            self.depth -= 1
+            if self.depth == 0:
+                stages.compile(False, monotonic() - self.begun)
 
     with install_listener("numba:compile", Compilation()):
         yield
 
 
-@contextmanager
-def _bars():
+def _rich_bars() -> Any:
+    """Bars of rich: what is done, how far, for how long, how long still."""
+    from rich import progress
     from rich.console import Console
-    from rich.progress import Progress
 
-    with Progress(console=Console(stderr=True)) as bars:
+    class Remaining(progress.ProgressColumn):
+        """The time left where it can be known."""
 
-        def progress(title, total):
-            task = bars.add_task(title, total=total, visible=False)
-            start = monotonic()
-            return lambda points: bars.update(
-                task, advance=points, visible=monotonic() - start > PATIENCE
-            )
+        def render(self, task):
+            seconds = task.time_remaining
+            if task.total is None or task.finished or seconds is None:
+                return ""
+            return f"{int(seconds) // 60}:{int(seconds) % 60:02d} left"
 
-        yield progress
+    class Shown(progress.Progress):
+        """Those that take long enough to be read."""
 
+        def get_renderables(self):
+            yield self.make_tasks_table([t for t in self.tasks if (t.elapsed or 0.0) >= PATIENCE])
 
-def _lines(title, total):
-    done = 0
-    due = monotonic() + PATIENCE
-
-    def advance(points):
-        nonlocal done, due
-        done += points
-        if monotonic() > due:
-            due = monotonic() + INTERVAL
-            say(f"{title}: {percent(done / max(total, 1))}")
-
-    return advance
+    return Shown(
+        progress.SpinnerColumn(finished_text=" "),
+        progress.TextColumn("{task.description}", markup=False),
+        progress.BarColumn(bar_width=20),
+        progress.TaskProgressColumn(),
+        progress.TimeElapsedColumn(),
+        Remaining(),
+        console=Console(stderr=True),
+    )

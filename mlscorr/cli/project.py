@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from mlscorr.pipeline.project import Options
     from mlscorr.survey import Statement
 
+STATUS_EXAMPLES = ("mlscorr status city", "mlscorr status city --json")
 RESUMPTION = "what was done stays, and the same command with --resume goes on"
 
 
@@ -86,6 +87,7 @@ def status(
     ],
     as_json: terminal.Json = False,
     quiet: terminal.Quiet = False,
+    verbose: terminal.Verbose = 0,
 ) -> None:
     """Tell how far the correction of a project has come, while it runs or afterwards."""
     with terminal.exit_code(terminal.Exit.USAGE):

@@ -7,17 +7,33 @@ from typing import Annotated
 import typer
 
 import mlscorr
-from mlscorr.cli.terminal import Exit, Json, Out, Overwrite, Quiet, SurveyArgument, exit_code, say
+from mlscorr.cli.folders import chosen_out
+from mlscorr.cli.terminal import (
+    Exit,
+    Json,
+    Out,
+    Overwrite,
+    Quiet,
+    SurveyArgument,
+    Verbose,
+    exit_code,
+    say,
+)
 from mlscorr.cli.work import print_json, work
 
 View = StrEnum("View", ("overview", "targets", "section"))
 Colour = StrEnum("Colour", ("intensity", "height", "correction", "sigma"))
 Engine = StrEnum("Engine", ("zbuffer", "open3d"))
 
+EXAMPLES = (
+    "mlscorr render survey.toml --corrected survey-correct",
+    "mlscorr render survey.toml -o pictures --view section --size 1280x720",
+)
+
 
 def render(
     survey: SurveyArgument,
-    out: Out,
+    out: Out = None,
     corrected: Annotated[
         Path | None,
         typer.Option(help="Results of mlscorr correct; without them it is estimated anew."),
@@ -43,8 +59,10 @@ def render(
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,
+    verbose: Verbose = 0,
 ) -> None:
     """Draw a survey before and after its correction; neither a display nor a GPU is needed."""
+    out = chosen_out(out, survey, "render")
     with exit_code(Exit.USAGE):
         pixels = _read_size(size)
     with work(out, overwrite, survey) as progress:

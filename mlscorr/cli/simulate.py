@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from mlscorr.cli.folders import chosen_out
 from mlscorr.cli.terminal import (
     Effects,
     Exit,
@@ -12,6 +13,7 @@ from mlscorr.cli.terminal import (
     Out,
     Overwrite,
     Quiet,
+    Verbose,
     exit_code,
     say,
     say_results,
@@ -19,17 +21,24 @@ from mlscorr.cli.terminal import (
 from mlscorr.cli.work import print_json, work
 from mlscorr.wording import counted
 
+EXAMPLES = (
+    "mlscorr simulate examples/scenarios/car.toml",
+    "mlscorr simulate car.toml -o car --seed 2",
+)
+
 
 def simulate(
     scenario: Annotated[Path, typer.Argument(help="TOML file, as those in examples/scenarios.")],
-    out: Out,
+    out: Out = None,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same bytes.")] = 1,
     effects: Effects = None,
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,
+    verbose: Verbose = 0,
 ) -> None:
     """Simulate a survey from a scenario: a survey folder, and the truth beside it."""
+    out = chosen_out(out, scenario, "simulate", is_by_name=True)
     with exit_code(Exit.USAGE):
         from mlscorr.simulate import read_scenario, scenario_files
 

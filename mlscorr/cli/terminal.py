@@ -1,5 +1,6 @@
 """What all commands share: options, exit codes, and sentences on stderr."""
 
+import logging
 import os
 import signal
 import sys
@@ -8,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from enum import IntEnum
 from pathlib import Path
+from time import monotonic
 from typing import Annotated
 
 import typer
@@ -44,6 +46,54 @@ def is_quiet() -> bool:
     return _voice["quiet"]
 
 
+class _Voice(logging.Handler):
+    """Lines of the log on stderr, each with the time since the command began.
+
+    Parameters
+    ----------
+    level : int
+    """
+
+    def __init__(self, level: int) -> None:
+        super().__init__(level)
+        self.start = monotonic()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print a record, unless the screen shows it in any case: warnings, times of stages."""
+        if record.levelno < logging.WARNING and record.name != "mlscorr.cli.progress":
+            say(f"[{monotonic() - self.start:6.1f} s] {record.getMessage()}")
+
+
+def be_verbose(context: typer.Context, verbose: int) -> int:
+    """Print the log on stderr until the command ends, if so.
+
+    Parameters
+    ----------
+    context : typer.Context
+        Of the command.
+    verbose : int
+        0: not; 1: what is found and decided, with the reasons; 2: details, too.
+
+    Returns
+    -------
+    int
+        The same.
+    """
+    if verbose:
+        logger = logging.getLogger("mlscorr")
+        before = logger.level
+        voice = _Voice(logging.INFO if verbose == 1 else logging.DEBUG)
+        logger.addHandler(voice)
+        logger.setLevel(voice.level)
+
+        def end():
+            logger.removeHandler(voice)
+            logger.setLevel(before)
+
+        context.call_on_close(end)
+    return verbose
+
+
 def know_effects(path: Path | None) -> Path | None:
     """Register the effects of a user's file, as soon as the option is read.
 
@@ -70,6 +120,20 @@ Effects = Annotated[
 Overwrite = Annotated[bool, typer.Option(help="Replace files of the same name in the folder.")]
 Quiet = Annotated[
     bool, typer.Option("--quiet", "-q", callback=be_quiet, help="Print errors and warnings only.")
+]
+Verbose = Annotated[
+    int,
+    typer.Option(
+        "--verbose",
+        "-v",
+        count=True,
+        callback=be_verbose,
+        help="Print what is found and decided, and why; -vv prints details, too.",
+    ),
+]
+Exclude = Annotated[
+    list[str],
+    typer.Option(metavar="NAME", help="A control point that takes no part. May be repeated."),
 ]
 NoTies = Annotated[bool, typer.Option("--no-ties", help="Don't use what two passes both saw.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")]
@@ -99,8 +163,25 @@ SurveyArgument = Annotated[
     ),
 ]
 Out = Annotated[
-    Path, typer.Option("-o", "--out", help="Folder for the results.", parser=path_or_url)
+    Path | None,
+    typer.Option(
+        "-o",
+        "--out",
+        help="Folder for the results; FOLDER-COMMAND beside the input's FOLDER if none.",
+        parser=path_or_url,
+        show_default=False,
+    ),
 ]
+
+
+def as_epilog(examples: Iterable[str]) -> str:
+    """Examples of a command, as they stand at the end of its --help, a line each.
+
+    Parameters
+    ----------
+    examples : iterable of str
+    """
+    return "\n\n".join(["Examples:", *examples])
 
 
 class Exit(IntEnum):

@@ -1,27 +1,36 @@
 """The command that finds what two passes both saw."""
 
 import mlscorr
+from mlscorr.cli.folders import chosen_out
 from mlscorr.cli.terminal import (
     Json,
     Out,
     Overwrite,
     Quiet,
     SurveyArgument,
+    Verbose,
     say,
     say_results,
 )
 from mlscorr.cli.work import print_json, work
 from mlscorr.wording import counted
 
+EXAMPLES = (
+    "mlscorr ties survey.toml",
+    "mlscorr ties survey.toml -o ties --json",
+)
+
 
 def ties(
     survey: SurveyArgument,
-    out: Out,
+    out: Out = None,
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,
+    verbose: Verbose = 0,
 ) -> None:
     """Find walls, roads, poles and paint that two passes both saw, and how far apart they lie."""
+    out = chosen_out(out, survey, "ties")
     with work(out, overwrite, survey) as progress:
         recorded = mlscorr.read_survey(survey)
         content = mlscorr.find_ties(recorded, progress=progress).write(out, overwrite)

@@ -2,6 +2,7 @@
 
 import json
 import os
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -42,9 +43,10 @@ def work(
     progress : function
         See progress_bars.
     """
-    with exit_code(Exit.USAGE):
+    with exit_code(Exit.USAGE), progress_bars():
         from mlscorr.io.store import announced, check_output, check_unchanged, input_file
         from mlscorr.io.surveys import input_files
+        from mlscorr.pipeline import recorded_log
 
         if survey is not None:
             files = input_files(survey, planned)
@@ -56,9 +58,11 @@ def work(
     with (
         exit_code(Exit.BAD_DATA, lambda: _entries(out) != before),
         _noise_said(),
+        recorded_log(sys.argv[1:]),
         progress_bars() as progress,
         announced(progress),
     ):
+        progress("Reading the survey")
         try:
             yield progress
         except ValueError:

@@ -3,7 +3,7 @@
 Control points alone come first, then ties; other orders of the trend stand beside the one in use.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -176,7 +176,11 @@ class Estimate(Summary):
 # The matrices are small: on a busy machine threads would wait longer than they work
 @threadpool_limits.wrap(limits=1, user_api="blas")
 def estimate_correction(
-    trajectory: Trajectory, matched: Matched, pos: Pos | None = None, order: int = SETTINGS.order
+    trajectory: Trajectory,
+    matched: Matched,
+    pos: Pos | None = None,
+    order: int = SETTINGS.order,
+    kept_in: Collection[str] = (),
 ) -> Estimate:
     """Estimate the POS error from matched targets  (Mao et al. 2015, section 2.4.2).
 
@@ -190,6 +194,8 @@ def estimate_correction(
         Beliefs, used where the trajectory has no sigmas.
     order : int
         Of the polynomial trend; lowered where there are too few control points.
+    kept_in : collection of str
+        Names of control points that are used whatever the others say of them.
 
     Raises
     ------
@@ -198,7 +204,7 @@ def estimate_correction(
     """
     pos = pos or Pos()
     filled, notes = checked_inputs(trajectory, matched, pos, order)
-    adjustment, screening, windows = _screened(filled, matched, pos, order)
+    adjustment, screening, windows = _screened(filled, matched, pos, order, kept_in)
     kept = adjustment.without({outlier.name for outlier in screening.outliers})
     notes = (
         *notes,
@@ -209,7 +215,7 @@ def estimate_correction(
     return _estimate(trajectory, matched.name, GridPredictions(kept), screening, notes, doubt)
 
 
-def _screened(trajectory, matched, pos, order):
+def _screened(trajectory, matched, pos, order, kept_in):
     """Equations, their Screening, and the windows of drift that runs of rejected targets show."""
     windows = ()
     more = ()
@@ -224,7 +230,7 @@ def _screened(trajectory, matched, pos, order):
         adjustment = replace(adjustment, order=affordable_order(order, adjustment))
         adjustment = with_drift_history(adjustment)
         plain = plain or adjustment
-        screening = screen(adjustment)
+        screening = screen(adjustment, kept_in)
         more = find_windows(adjustment, screening)
         if not more:
             break
@@ -261,7 +267,12 @@ def believed_correction(trajectory: Trajectory, pos: Pos | None = None) -> Estim
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
-def with_ties(estimate: Estimate, ties: Ties, mountings: Sequence[Mounting] = ()) -> Estimate:
+def with_ties(
+    estimate: Estimate,
+    ties: Ties,
+    mountings: Sequence[Mounting] = (),
+    kept_in: Collection[str] = (),
+) -> Estimate:
     """The estimate by control points and by what two passes, or two scanners, both saw.
 
     Parameters
@@ -273,9 +284,11 @@ def with_ties(estimate: Estimate, ties: Ties, mountings: Sequence[Mounting] = ()
         Of all scanners where ties between two of them are among these: what each lacks beside the
         first is estimated with the drift, so that it doesn't pass for drift. Of the one scanner
         where it saw things again at one visit: likewise what that lacks.
+    kept_in : collection of str
+        As of estimate_correction.
     """
     tied = _tied_adjustment(estimate.adjustment, ties, mountings)
-    predictions, screening, is_used = screen_with_ties(tied, estimate.screening)
+    predictions, screening, is_used = screen_with_ties(tied, estimate.screening, kept_in)
     names = np.full(len(estimate.used), "", dtype=object)
     names[estimate.used] = tied.names
     trajectory = estimate.correction.recorded

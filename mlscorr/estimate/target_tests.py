@@ -195,14 +195,16 @@ class Screening:
         return cls(Posterior(mode, mode), (), (), ())
 
 
-def screen(adjustment: Adjustment) -> Screening:
+def screen(adjustment: Adjustment, kept_in: Collection[str] = ()) -> Screening:
     """Find gross errors among targets, and what the others say of them.
 
     Parameters
     ----------
     adjustment : Adjustment
+    kept_in : collection of str
+        Names of targets that are used whatever the others say of them.
     """
-    out, start = _search(adjustment)
+    out, start = _search(adjustment, kept_in)
     tried = []
     while True:
         kept = adjustment.without(out)
@@ -211,10 +213,15 @@ def screen(adjustment: Adjustment) -> Screening:
         tests = all_tests(kept, posterior)
         rejected = [single_test(adjustment.without(out - {name}), name, posterior) for name in out]
         back = {test.name for test in rejected if test.excess <= 1.0}
-        worst = max(tests, key=lambda test: test.excess)
+        worst = _worst(tests, kept_in)
         tried.append(out)
         changed = out - back
-        if not back and worst.excess > 1.0 and may_go(adjustment, out | {worst.name}):
+        if (
+            not back
+            and worst is not None
+            and worst.excess > 1.0
+            and may_go(adjustment, out | {worst.name})
+        ):
             changed = out | {worst.name}
         if changed in tried:
             break
@@ -225,6 +232,12 @@ def screen(adjustment: Adjustment) -> Screening:
         tuple(tests),
         (*_rejected_groups(adjustment, rejected), *_doubtful_pairs(kept, posterior)),
     )
+
+
+def _worst(tests, kept_in):
+    """The test of the target that the others contradict most, of those that may go."""
+    free = [test for test in tests if test.name not in kept_in]
+    return max(free, key=lambda test: test.excess, default=None)
 
 
 def may_go(adjustment: Adjustment, names: Collection[str]) -> bool:
@@ -242,7 +255,7 @@ def may_go(adjustment: Adjustment, names: Collection[str]) -> bool:
     )
 
 
-def _search(adjustment):
+def _search(adjustment, kept_in):
     """Names of the most probable set of wrong targets, and each family's SignalParameters.
 
     Large surveys are searched in blocks.
@@ -253,7 +266,7 @@ def _search(adjustment):
         modes = [chosen for chosen, _ in most_probable(adjustment.without(best), modes)]
         names = frozenset()
         for block in Objective.of(adjustment).blocks:
-            scores = _scores(block, modes)
+            scores = _scores(block, modes, kept_in)
             names |= max(scores, key=scores.get)
         if names == best:
             break
@@ -261,12 +274,12 @@ def _search(adjustment):
     return best, modes
 
 
-def _scores(adjustment, modes):
+def _scores(adjustment, modes, kept_in):
     """Log posterior of sets of wrong targets, each under the parameters that suit it best."""
     objective = Objective.of(adjustment)
     scores = {}
     for parameters in _shrunk(modes):
-        for names, score in _eliminate(adjustment, parameters, objective):
+        for names, score in _eliminate(adjustment, parameters, objective, kept_in):
             scores[names] = max(score, scores.get(names, -np.inf))
     return scores
 
@@ -279,7 +292,7 @@ def _shrunk(modes):
             yield replace(mode, **{name: factor * getattr(mode, name) for name in scales})
 
 
-def _eliminate(adjustment, parameters, objective):
+def _eliminate(adjustment, parameters, objective, kept_in):
     """Sets of wrong targets, growing by the most unlikely one, with their log posteriors."""
     names = frozenset()
     score = objective(parameters.family, objective.logarithms(parameters))
@@ -287,8 +300,9 @@ def _eliminate(adjustment, parameters, objective):
     while may_go(adjustment, names | {""}):
         kept = adjustment.without(names)
         gains = _gains(kept.solve(parameters), kept.target_rows)
-        worst = max(gains, key=gains.get)
-        if gains[worst] < -np.log(SETTINGS.strong_evidence):
+        gains = {name: gain for name, gain in gains.items() if name not in kept_in}
+        worst = max(gains, key=gains.get, default=None)
+        if worst is None or gains[worst] < -np.log(SETTINGS.strong_evidence):
             return
         names = names | {worst}
         score = score + gains[worst]

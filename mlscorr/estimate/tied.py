@@ -8,7 +8,7 @@ Black and Rangarajan 1996), then Student's t in turn with the restricted likelih
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -132,7 +132,7 @@ def add_ties(tied: Adjustment, parameters: SignalParameters) -> Tied:
 
 
 def screen_with_ties(
-    adjustment: Adjustment, screening: Screening
+    adjustment: Adjustment, screening: Screening, kept_in: Collection[str] = ()
 ) -> tuple[GridPredictions, Screening, np.ndarray]:
     """Equations with ties and what they predict, what both say of control, which ties hold (n,).
 
@@ -144,6 +144,8 @@ def screen_with_ties(
         Of the control points that the others don't contradict, with all ties.
     screening : Screening
         Of these points.
+    kept_in : collection of str
+        Names of control points that are used whatever the others say of them.
     """
     parameters = screening.posterior.modes[0][0]
     kept = adjustment
@@ -156,7 +158,8 @@ def screen_with_ties(
             return untied
         predictions = GridPredictions(tied.adjustment, mode=tied.posterior.modes[0][0])
         tests = all_tests(tied.adjustment, tied.posterior, predictions.add)
-        doubtful = sorted((t for t in tests if t.excess > 1.0), key=lambda t: -t.excess)
+        free = (t for t in tests if t.name not in kept_in)
+        doubtful = sorted((t for t in free if t.excess > 1.0), key=lambda t: -t.excess)
         if not doubtful or not may_go(adjustment, {t.name for t in (*rejected, doubtful[0])}):
             break
         rejected.append(doubtful[0])

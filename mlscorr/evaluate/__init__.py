@@ -14,5 +14,12 @@ from mlscorr.evaluate.datum import DatumDifference, datum_differences
 from mlscorr.evaluate.model import largest_sigma, misfit, misfit_section, model_section, tie_section
 from mlscorr.evaluate.quality import Gate, failures, read_gate
 from mlscorr.evaluate.rows import SEEN_BY_OTHERS, PointCounts, Score, Statistics, TargetRow
-from mlscorr.evaluate.scores import accuracy, misclosures, score, surveyed_rows, unseen_rows
+from mlscorr.evaluate.scores import (
+    accuracy,
+    misclosures,
+    score,
+    surveyed_rows,
+    target_rows,
+    unseen_rows,
+)
 from mlscorr.evaluate.wording import reason_in_words

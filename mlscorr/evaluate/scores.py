@@ -161,7 +161,7 @@ def unseen_rows(
     """
     rows = []
     for refusal in refusals:
-        if refusal.name in survey.control.name:
+        if refusal.name in (*survey.control.name, *survey.excluded.name):
             role = "control"
         else:
             role = "check"

@@ -14,6 +14,7 @@ from .compared_results import is_result as is_result
 from .comparison import ComparedSurvey as ComparedSurvey
 from .comparison import compare as compare
 from .corrected_survey import CorrectedSurvey as CorrectedSurvey
+from .correction import TieUse as TieUse
 from .correction import correct as correct
 from .diagnosis import DiagnosedSurvey as DiagnosedSurvey
 from .diagnosis import diagnose as diagnose
@@ -31,6 +32,7 @@ from .finding import match_targets as match_targets
 from .found_effects import read_effects as read_effects
 from .installation import Installation as Installation
 from .installation import doctor as doctor
+from .logs import recorded_log as recorded_log
 from .methods import method_named as method_named
 from .planning import PlannedSurvey as PlannedSurvey
 from .planning import plan as plan

@@ -5,15 +5,18 @@ A command's result says what it has as ``ResultFiles``; how that is written stan
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
-from mlscorr.io.store import document, output_folder, write_json
+from mlscorr.io.store import document, output_folder, progress_of, write_json
+from mlscorr.pipeline.logs import write_log
 from mlscorr.survey import InputFile, Summary
 
+LOG = logging.getLogger(__name__)
 Table = Callable[[Path], object]  # writes the file of this path
 Page = Callable[[Path, dict], object]  # likewise, of the document
 
@@ -137,12 +140,20 @@ class ResultFiles:
         clouds : object
             What the document says of the clouds.
         """
-        tables = {name: write(folder / name) for name, write in self.tables.items()}
+        tables = {}
+        for name, write in self.tables.items():
+            progress_of(f"Writing {name}")
+            tables[name] = write(folder / name)
+        progress_of(f"Writing {self.name}.json")
         content, pages = self.report(WrittenFiles(folder, clouds, tables))
         content = document(self.name, content)
         write_json(folder / f"{self.name}.json", content)
         for name, write in pages.items():
+            progress_of(f"Drawing {name}")
             write(folder / name, content)
+        for row in content.get("statements", ()):
+            LOG.info("%s: %s", row["what"], row["sentence"])
+        write_log(folder)
         return content
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -22,10 +23,12 @@ from mlscorr.matching import Refusal
 from mlscorr.pipeline.calibrated_survey import CalibratedSurvey, CalibrationResult, estimate_section
 from mlscorr.pipeline.control_checks import remounting_fault, reuse_warnings
 from mlscorr.pipeline.finding import (
+    COLLECTING,
     MatchedTargets,
     find_control,
     find_or_compare_surfaces,
     read_into,
+    silent,
 )
 from mlscorr.pipeline.settings import SETTINGS
 from mlscorr.surfaces import FeatureCollector
@@ -38,6 +41,8 @@ NOTHING_CALIBRATES = (
     "shows everything once, as its mounting puts it. Drive the way back as well, or survey control "
     "points on both sides of the way, near and far."
 )
+
+LOG = logging.getLogger(__name__)
 
 
 def calibrate(
@@ -101,17 +106,29 @@ def calibrate(
     if ties is None:
         ties = survey.use_ties
 
+    stage = progress or silent
     if ties:
         collector = FeatureCollector(survey)
         read = read_into(collector.add)
         finding, notes = find_or_compare_surfaces(survey, read, None, progress, rng)
+        stage(COLLECTING)
         features = collector.features()
     else:
         finding = find_control(survey, rng, progress)
         features = None
         notes = ()
+    stage("Calibrating the mounting")
     control, check = _numbered(survey, finding)
     calibration = calibrate_together(survey, control, features, notes)
+    LOG.info(
+        "mounting calibrated by %d of %d control observations, %d of %d components determined",
+        int(calibration.used.sum()),
+        len(calibration.used),
+        int(calibration.determined.sum()),
+        len(calibration.determined),
+    )
+    for test in calibration.screening.outliers:
+        LOG.info("%s not used: the others contradict it", test.name)
 
     parts = _parts(survey, control, check, finding, calibration)
     for name, part in parts.items():

@@ -241,7 +241,7 @@ def _looked(
             if finding is not None:
                 points = survey.surveyed
                 control, check_points = finding.matches.by_role(survey)
-                matched = control + check_points
+                matched = Matched.concatenate([control, check_points])
     elif probe.doubt:
         faults.warn(probe.doubt)
     control = matched[np.isin(matched.name, survey.control.name)]

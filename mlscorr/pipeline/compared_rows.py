@@ -87,6 +87,7 @@ def compare_with_belief(
         When there is too little to say anything.
     """
     pairing, rows, beams, absence, patches = _observed(survey, believed, library, progress)
+    progress("Simulating the survey's own pulses")
     rows, noisy = residuals.beside_seen_noise(rows)
     simulator = BeamSimulator(rows, believed, beams, effects, int(rng.integers(2**63)))
     used = np.arange(len(rows)) < len(pairing.rows)
@@ -246,6 +247,7 @@ def _observed(
     Patches.
     """
     finding, patches, surroundings, notes = _read(believed, progress)
+    progress("Pairing targets and surfaces")
     absence = residuals.find_absence(believed, finding.matches)
     correction = _by_control(believed, finding.matches.matched)
     finding = _with_moved(finding, believed)

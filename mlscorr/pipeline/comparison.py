@@ -221,10 +221,12 @@ def compare(
     for sentence in reuse_warnings(survey):
         warnings.warn(sentence, stacklevel=2)
     observed = Observed(survey, matches.candidates, features)
+    stage = progress or silent
+    stage("Loading Open3D")
     load_open3d()  # takes seconds, which are not the method's
     is_few = len(set(check.name)) < SETTINGS.sufficient_check_points
     groups = _groups(control) if is_few else []
-    done = (progress or silent)("Fitting", len(METHODS) * (1 + len(groups)))
+    done = stage("Fitting all methods", len(METHODS) * (1 + len(groups)))
     rows = []
     corrections = {}
     for method in METHODS:

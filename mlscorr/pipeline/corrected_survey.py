@@ -40,6 +40,7 @@ from mlscorr.io.trajectories import (
 from mlscorr.pipeline._result import Reported, ResultFiles
 from mlscorr.pipeline.clouds import MovedClouds, WrittenClouds, write_counted
 from mlscorr.pipeline.estimation import check_score, control_score
+from mlscorr.pipeline.exclusion import Exclusion, excluded_rows
 from mlscorr.pipeline.finding import silent
 from mlscorr.survey import Matched, Summary, Survey, Trajectory, chosen_origin, rows_frame
 from mlscorr.targets import FittedTarget
@@ -70,6 +71,10 @@ class CorrectedSurvey(Summary):
         On clouds and control, beside those of the estimate and of ``datum``.
     datum : tuple of DatumDifference
         By what the control that was used differs from the cloud as a whole.
+    excluded : Matched
+        Control points that the user keeps out.
+    exclusions : tuple of Exclusion
+        What the result gains or loses by each of them.
     """
 
     survey: Survey
@@ -80,6 +85,8 @@ class CorrectedSurvey(Summary):
     fitted: dict[tuple[int, float], FittedTarget] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     datum: tuple[DatumDifference, ...] = ()
+    excluded: Matched = field(default_factory=Matched.none)
+    exclusions: tuple[Exclusion, ...] = ()
 
     @property
     def trajectory(self) -> Trajectory:
@@ -110,7 +117,7 @@ class CorrectedSurvey(Summary):
         estimate = self.estimate
         points = self.matched_control, self.matched_check
         rows = surveyed_rows(*points, estimate.correction, estimate.outliers, estimate.left_out)
-        return rows + self.missing
+        return rows + excluded_rows(self.excluded, estimate.correction) + self.missing
 
     @property
     def accuracy(self) -> dict[str, object]:
@@ -207,6 +214,7 @@ class CorrectedSurvey(Summary):
         targets: Sequence[str] = (),
         displacement: bool = False,
         provenance: bool = False,
+        survey_toml: str | None = None,
     ) -> dict:
         """Write corrected clouds, trajectory, targets and report into a folder.
 
@@ -234,6 +242,8 @@ class CorrectedSurvey(Summary):
             Name mlscorr as the generating software of each cloud, and give it a VLR (user id
             mlscorr, record id 1) with version, settings, and the hash of the inputs. Without it all
             but the coordinates stays as it was, byte for byte; so it is not the default.
+        survey_toml : str, optional
+            Content of a survey.toml to write beside the results, where it was inferred.
 
         Returns
         -------
@@ -259,7 +269,11 @@ class CorrectedSurvey(Summary):
             (written,) = write_counted([moved], folder, done, added)
             return written
 
-        return self._files(progress, page, trajectories, targets).write(out, overwrite, clouds)
+        files = self._files(progress, page, trajectories, targets)
+        if survey_toml is not None:
+            inferred = {"survey.toml": lambda path: path.write_text(survey_toml, encoding="utf-8")}
+            files = replace(files, tables={**files.tables, **inferred})
+        return files.write(out, overwrite, clouds)
 
     def _provenance(self):
         """Text of the VLR that names what corrected a cloud."""
@@ -322,13 +336,19 @@ class CorrectedSurvey(Summary):
             "weak.csv": lambda path: write_weak(path.parent, weak, self.trajectory, survey.crs),
         }
 
+        stage = progress or silent
+
         def report(written):
+            stage("Hashing inputs and results")
             paths = [name for export in trajectories for name in written.tables[export]]
             report = self._report(
                 written.folder, written.clouds, paths, targets, written.tables["weak.csv"]
             )
-            pages = self._pages(report, progress or silent) if page else {}
-            return Reported(first_screen(report) | report.document(), pages)
+            pages = self._pages(report, stage) if page else {}
+            content = first_screen(report) | report.document()
+            if self.exclusions:
+                content["exclusions"] = [row.document() for row in self.exclusions]
+            return Reported(content, pages)
 
         return ResultFiles("report", survey.inputs, report, tables)
 
@@ -341,9 +361,11 @@ class CorrectedSurvey(Summary):
 
         def write_page(path, _):
             views = view_cloud(self.survey, correction, report.targets, progress, ties)
+            progress("Drawing report.html")
             write_report(path, self.survey, correction, report, views, self.fitted, ties)
 
         def draw(path, _):
+            progress("Drawing pictures")
             path.mkdir()
             write_pictures(path, correction, report, ties)
 
@@ -406,7 +428,11 @@ class CorrectedSurvey(Summary):
         return CorrectionReport(
             name=self.survey.name,
             crs=self.survey.crs,
-            notes=(*self.survey.notes, *filter(None, [self.estimate.untied])),
+            notes=(
+                *self.survey.notes,
+                *(row.sentence for row in self.exclusions),
+                *filter(None, [self.estimate.untied]),
+            ),
             targets=self.targets,
             control=self._control,
             check=self._check,

@@ -21,12 +21,19 @@ from mlscorr.evaluate import datum_differences, unseen_rows
 from mlscorr.pipeline.control_checks import check_control, reuse_warnings
 from mlscorr.pipeline.corrected_survey import CorrectedSurvey
 from mlscorr.pipeline.estimation import estimate_pos_error
+from mlscorr.pipeline.exclusion import (
+    inclusion_warnings,
+    marked_excluded,
+    weighed_exclusions,
+)
 from mlscorr.pipeline.finding import (
+    MATCHING,
     MatchedTargets,
     check_found_control,
     find_targets,
     match_if_any,
     match_targets,
+    silent,
 )
 from mlscorr.survey import Matched, Survey, TieFeatures, check_survey
 
@@ -94,18 +101,20 @@ def correct(
         survey = without_control(survey)
 
     matches, features = observe_survey(survey, ties, rng, progress)
-    estimate = estimate_pos_error(survey, matches, features, order)
+    estimate = estimate_pos_error(survey, matches, features, order, progress)
     if ties == "only" and estimate.ties is None:
         raise ValueError(f"{NOTHING_TIED.format(survey.path)} {estimate.untied}")
 
     result = CorrectedSurvey(
         **corrected_fields(
             matches.as_scanned(survey), matches.control, matches.check, matches, estimate
-        )
+        ),
+        exclusions=weighed_exclusions(survey, matches, features, order, estimate, progress),
     )
     datum = (difference.sentence for difference in result.datum)
     # those of the targets were given when they were matched
-    for sentence in (*control_warnings(survey, matches), *datum, *estimate.warnings):
+    own = (*control_warnings(survey, matches), *inclusion_warnings(survey, estimate))
+    for sentence in (*own, *datum, *estimate.warnings):
         warnings.warn(sentence, stacklevel=2)
     return result
 
@@ -141,7 +150,8 @@ def without_control(survey: Survey) -> Survey:
     ----------
     survey : Survey
     """
-    return replace(survey, control=survey.control[[]], check=survey.surveyed)
+    nothing = survey.control[[]]
+    return replace(survey, control=nothing, check=survey.surveyed, excluded=nothing, included=())
 
 
 def observe_survey(
@@ -175,6 +185,7 @@ def observe_survey(
     if ties != "only":
         check_control(survey)
     targets = find_targets(survey, rng, progress, with_ties=ties != "off")
+    (progress or silent)(MATCHING)
     if ties == "only":
         matches, _ = match_if_any(targets, survey)
     else:
@@ -203,12 +214,18 @@ def corrected_fields(
         "estimate": estimate,
         "matched_control": control,
         "matched_check": check,
-        "missing": unseen_rows(
-            survey, matches.matches.refusals, matches.candidates, matches.scanned
+        "missing": marked_excluded(
+            unseen_rows(survey, matches.matches.refusals, matches.candidates, matches.scanned),
+            survey,
         ),
         "fitted": matches.fitted,
-        "warnings": (*matches.warnings, *control_warnings(survey, matches)),
+        "warnings": (
+            *matches.warnings,
+            *control_warnings(survey, matches),
+            *inclusion_warnings(survey, estimate),
+        ),
         "datum": datum_differences(used, survey.trajectory, survey.pos, survey.crs),
+        "excluded": matches.kept_out,
     }
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import logging
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +22,7 @@ from mlscorr.estimate import (
 )
 from mlscorr.evaluate import Score
 from mlscorr.evaluate import score as score_matched
-from mlscorr.pipeline.finding import MatchedTargets
+from mlscorr.pipeline.finding import MatchedTargets, silent
 from mlscorr.pipeline.ties import TiedSurvey
 from mlscorr.survey import (
     Matched,
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
+LOG = logging.getLogger(__name__)
 LEFT_OUT = (
     'What two passes both saw was left out, as asked: --no-ties, or use = "off" of [ties] in '
     "survey.toml."
@@ -123,6 +125,7 @@ def estimate_pos_error(
     matches: MatchedTargets,
     ties: TiedSurvey | TieFeatures | None = None,
     order: int = SETTINGS.order,
+    progress: Callable | None = None,
 ) -> PosErrorEstimate:
     """Estimate the POS error over time from matched control points, and from ties of passes.
 
@@ -138,6 +141,8 @@ def estimate_pos_error(
         What ``find_ties`` gives, or the ``features`` of ``find_targets(..., with_ties=True)``.
     order : int
         Of the polynomial trend of the position error.
+    progress : function, optional
+        ``progress(title)`` is called when a stage begins.
 
     Returns
     -------
@@ -173,12 +178,17 @@ def estimate_pos_error(
         )
     features = ties.features if isinstance(ties, TiedSurvey) else ties
     scanned = matches.as_scanned(survey)
-    return PosErrorEstimate(**vars(estimate_together(scanned, control, features, order)))
+    estimate = estimate_together(scanned, control, features, order, progress)
+    return PosErrorEstimate(**vars(estimate))
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")  # more threads, other last digits
 def estimate_together(
-    survey: Survey, control: Matched, features: TieFeatures | None, order: int
+    survey: Survey,
+    control: Matched,
+    features: TieFeatures | None,
+    order: int,
+    progress: Callable | None = None,
 ) -> Estimate:
     """The POS error by matched control points, and by what two passes both saw.
 
@@ -191,14 +201,24 @@ def estimate_together(
         None where ties are left out.
     order : int
         Of the trend.
+    progress : function, optional
+        As of ``estimate_pos_error``.
     """
+    stage = progress or silent
+    stage("Estimating the POS error")
     if len(control):
-        estimate = estimate_correction(survey.trajectory, control, survey.pos, order)
+        estimate = estimate_correction(
+            survey.trajectory, control, survey.pos, order, survey.included
+        )
     else:
         estimate = believed_correction(survey.trajectory, survey.pos)
+    _log_estimate(estimate)
     if features is None:
+        LOG.info("%s", LEFT_OUT)
         return replace(estimate, untied=LEFT_OUT)
+    stage("Tying passes")
     estimate = tie_passes(survey, estimate, features)
+    _log_ties(estimate)
     wrong = ()  # of mountings, where the ties tell of it
     if estimate.adjustment.unknowns:
         wrong = tuple(scanner_warnings(estimate, list(survey.by_scanner)))
@@ -206,6 +226,41 @@ def estimate_together(
         error = find_mounting_error(estimate, control, survey.mountings)
         wrong = mounting_warnings(error, len(survey.mountings))
     return replace(estimate, notes=(*estimate.notes, *wrong))
+
+
+def _log_estimate(estimate):
+    """Log the parameters, what was used, and which control points the others contradict."""
+    LOG.info(
+        "POS error estimated by %d of %d control observations, trend of order %d, sigma0 %.2f",
+        int(estimate.used.sum()),
+        len(estimate.used),
+        estimate.order,
+        estimate.sigma0,
+    )
+    for parameters, probability in estimate.families:
+        numbers = (
+            f"{name} {value:.4g}" if isinstance(value, float) else str(value)
+            for name, value in vars(parameters).items()
+        )
+        LOG.info("covariance, probability %.3f: %s", probability, ", ".join(numbers))
+    for test in estimate.outliers:
+        LOG.info(
+            "%s not used: the others contradict it, statistic %.1f above %.1f",
+            test.name,
+            test.statistic,
+            test.critical,
+        )
+    for test in estimate.tests:
+        LOG.debug("%s: statistic %.1f of %.1f", test.name, test.statistic, test.critical)
+
+
+def _log_ties(estimate):
+    """Log how many ties there are, or why there are none."""
+    if estimate.ties is None:
+        LOG.info("no ties: %s", estimate.untied)
+        return
+    is_used = estimate.ties.used
+    LOG.info("%d of %d ties used", int(is_used.sum()), len(is_used))
 
 
 def control_score(estimate: Estimate, control: Matched) -> Score:

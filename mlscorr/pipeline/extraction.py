@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from mlscorr.io.tables import write_extracted_csv
 from mlscorr.pipeline._result import KnownResult, ResultFiles
 from mlscorr.pipeline.beams import with_beam_origin
 from mlscorr.pipeline.finding import (
+    MATCHING,
     MatchedTargets,
     fit_while_reading,
     match_fitted,
@@ -100,12 +101,16 @@ def extract(
         for file, targets in objects.items()
         for target in distinct(targets)
     ]
+    (progress or silent)(MATCHING)
     result = _without_doubles(list(near_control.targets), everywhere)
     sentences = _sentences(survey, np.flatnonzero(present), result)
     for sentence in sentences:
         warnings.warn(sentence, stacklevel=2)
     if result and len(surveyed):
-        finding = match_fitted(survey, result, near_control.candidates)
+        everything = replace(  # what is excluded from an estimate is a target all the same
+            survey, control=survey.control + survey.excluded, excluded=survey.control[[]]
+        )
+        finding = match_fitted(everything, result, near_control.candidates)
     else:
         finding = unmatched(survey, result, near_control.candidates, NO_CONTROL)
     return ExtractedSurvey(survey, finding, sentences)

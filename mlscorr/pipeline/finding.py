@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import logging
 import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
@@ -55,6 +56,10 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
+READING = "Reading the cloud and finding targets"  # stages
+MATCHING = "Matching targets with surveyed points"
+COLLECTING = "Collecting planes, poles and paint"
+LOG = logging.getLogger(__name__)
 SHOWN = 5  # refusals that an overview names: it fits a screen
 
 
@@ -91,6 +96,8 @@ class MatchedTargets(Summary):
         On cloud files whose beams can't have been measured so.
     uncovered : tuple of str
         On cloud files with points outside the trajectory.
+    excluded : TargetObservations, optional
+        Of control points that the user keeps out of the estimate.
     """
 
     survey: Survey
@@ -100,6 +107,7 @@ class MatchedTargets(Summary):
     scanned: frozenset[str] = frozenset()
     warnings: tuple[str, ...] = ()
     uncovered: tuple[str, ...] = ()
+    excluded: TargetObservations | None = None
 
     def __len__(self) -> int:
         return len(self.matches.matched)
@@ -118,6 +126,13 @@ class MatchedTargets(Summary):
     def check(self) -> Matched:
         """Observed check points, which take part in no estimate."""
         return self.matches.by_role(self.survey)[1]
+
+    @property
+    def kept_out(self) -> Matched:
+        """Observed control points that the user keeps out of the estimate."""
+        if self.excluded is None:
+            return Matched.none()
+        return Matched.by_name(self.excluded, self.survey.excluded)
 
     @property
     def refused(self) -> tuple[RefusedTarget, ...]:
@@ -403,8 +418,11 @@ def find_control(
         As match_targets does, and when no control point was surveyed or found.
     """
     check_control(survey)
-    reading = (progress or silent)("Reading the cloud", survey.points)
-    matches = match_targets(fit_while_reading(survey, read, rng, reading), survey)
+    stage = progress or silent
+    reading = stage(READING, survey.points)
+    targets = fit_while_reading(survey, read, rng, reading)
+    stage(MATCHING)
+    matches = match_targets(targets, survey)
     check_found_control(matches)
     return matches
 
@@ -475,11 +493,13 @@ def find_targets(
     5
     """
     check_survey(survey)
-    reading = (progress or silent)("Reading the cloud", survey.points)
+    stage = progress or silent
+    reading = stage(READING, survey.points)
     if not with_ties:
         return fit_while_reading(survey, read_chunks, rng, reading)
     collector = FeatureCollector(survey)
     targets = fit_while_reading(survey, read_into(collector.add), rng, reading)
+    stage(COLLECTING)
     return replace(targets, features=collector.features())
 
 
@@ -506,8 +526,11 @@ def find_or_compare_surfaces(
     notes : tuple of str
         The sentence that says so.
     """
-    reading = (progress or silent)("Reading the cloud", survey.points)
-    return match_if_any(fit_while_reading(survey, read, rng, reading, settle), survey)
+    stage = progress or silent
+    reading = stage(READING, survey.points)
+    targets = fit_while_reading(survey, read, rng, reading, settle)
+    stage(MATCHING)
+    return match_if_any(targets, survey)
 
 
 def match_if_any(targets: FoundTargets, survey: Survey) -> tuple[MatchedTargets, tuple[str, ...]]:
@@ -583,6 +606,16 @@ def fit_while_reading(
     for _, key, target in sorted(fits, key=itemgetter(0)):  # not in the order of their points
         of_pass[candidates.passes[key]].append(target)
     targets = tuple((number, t) for number, some in of_pass.items() for t in distinct(some))
+    LOG.info(
+        "%d targets found in %d passes, of %d fits near %d surveyed points; %d points looked at",
+        len(targets),
+        len(of_pass),
+        len(fits),
+        len(survey.surveyed),
+        near.points,
+    )
+    for number, target in targets:
+        LOG.debug("target of pass %d at %.3f s: score %.2f", number, target.gps_time, target.score)
     return FoundTargets(survey, targets, candidates, near)
 
 
@@ -621,10 +654,14 @@ def match_targets(targets: FoundTargets, survey: Survey) -> MatchedTargets:
     >>> len(matches.control), len(matches.check), matches.refused
     (4, 1, ())
     """
-    near = targets.near
-    for sentence in near.warnings():
+    on_beams = tuple(targets.near.warnings())
+    for sentence in on_beams:
         warnings.warn(sentence, stacklevel=2)
-    return match_silently(targets, survey)
+    matches = match_silently(targets, survey)
+    for sentence in matches.warnings:
+        if sentence not in on_beams:
+            warnings.warn(sentence, stacklevel=2)
+    return matches
 
 
 def match_silently(targets: FoundTargets, survey: Survey) -> MatchedTargets:
@@ -656,7 +693,7 @@ def match_silently(targets: FoundTargets, survey: Survey) -> MatchedTargets:
     return replace(
         matches,
         scanned=near.scanned,
-        warnings=tuple(near.warnings()),
+        warnings=(*near.warnings(), *matches.warnings),
         uncovered=tuple(near.beams.outside()),
     )
 
@@ -725,10 +762,110 @@ def match_fitted(
         survey.pos,
         survey.search_radius,
     )
+    # an excluded point has a residual, too, whatever matching says of it
+    matches, doubts = with_included(matches, (*survey.included, *survey.excluded.name))
+    doubts = tuple(text for name, text in doubts if name in survey.included)
+    matches, excluded = without_excluded(matches, survey)
+    _log_matches(matches, survey)
     numbers = np.repeat([n for n, _ in targets], [len(t.cloud) for _, t in targets]).astype(int)
     cloud = PointCloud.concatenate([NO_POINTS, *(t.cloud for _, t in targets)])
     on_targets = replace(candidates, cloud=cloud, pass_number=numbers)
-    return MatchedTargets(survey, matches, on_targets, _by_pass_and_time(targets))
+    by_time = _by_pass_and_time(targets)
+    return MatchedTargets(survey, matches, on_targets, by_time, warnings=doubts, excluded=excluded)
+
+
+def with_included(
+    matches: Matches, names: Sequence[str]
+) -> tuple[Matches, tuple[tuple[str, str], ...]]:
+    """Matches in which some points have the observations that were refused as theirs.
+
+    Parameters
+    ----------
+    matches : Matches
+    names : sequence of str
+        Of the points that have an observation in any case.
+
+    Returns
+    -------
+    matches : Matches
+    warnings : tuple of (str, str)
+        Name of each point that has one now, and a sentence on why it was refused.
+    """
+    left = matches.unmatched
+    taken = {}
+    warned = []
+    for refusal in matches.refusals:
+        if refusal.name not in names or refusal.gps_time is None:
+            continue
+        is_its = left.gps_time == refusal.gps_time
+        if refusal.pass_number is not None:
+            is_its &= left.pass_number == refusal.pass_number
+        for row in np.flatnonzero(is_its):
+            taken[int(row)] = refusal.name
+        sentence = (
+            f"{refusal.name} is used because include names it. Matching refused it: "
+            f"{refusal.reason}"
+        )
+        warned.append((refusal.name, sentence))
+    if not taken:
+        return matches, tuple(warned)
+    rows = list(taken)
+    free = np.setdiff1d(np.arange(len(left)), rows)
+    named = replace(left[rows], name=tuple(taken.values()))
+    moved = matches.moved
+    if moved is not None:
+        moved = moved[~np.isin(np.array(moved.name, dtype=str), list(taken.values()))]
+    changed = replace(
+        matches,
+        matched=TargetObservations.concatenate([matches.matched, named]),
+        unmatched=left[free],
+        refusals=tuple(row for row in matches.refusals if row.name not in taken.values()),
+        probability=np.append(matches.probability, np.zeros(len(rows))),
+        why=tuple(matches.why[row] for row in free),
+        moved=moved,
+    )
+    return changed, tuple(warned)
+
+
+def without_excluded(matches: Matches, survey: Survey) -> tuple[Matches, TargetObservations]:
+    """Matches without the points that are kept out of the estimate, and the observations of those.
+
+    Parameters
+    ----------
+    matches : Matches
+    survey : Survey
+    """
+    matched = matches.matched
+    is_out = np.isin(np.array(matched.name, dtype=str), survey.excluded.name)
+    kept = replace(matches, matched=matched[~is_out], probability=matches.probability[~is_out])
+    return kept, matched[is_out]
+
+
+def _log_matches(matches, survey):
+    """Log which surveyed points were matched, and why others were not."""
+    matched = Matched.by_name(matches.matched, survey.surveyed)
+    names = set(matched.name)
+    LOG.info(
+        "%d of %d control and %d of %d check points matched, by %d observations",
+        len(names & set(survey.control.name)),
+        len(survey.control),
+        len(names & set(survey.check.name)),
+        len(survey.check),
+        len(matched),
+    )
+    for row in matches.refusals:
+        LOG.info("not matched: %s: %s", row.name, row.reason)
+    observations = matched.observations
+    for name, time, misclosure, probability in zip(
+        matched.name, observations.gps_time, matched.misclosure, matches.probability, strict=True
+    ):
+        LOG.debug(
+            "%s at %.3f s: misclosure E %+.3f, N %+.3f, H %+.3f m, probability %.4f",
+            name,
+            time,
+            *misclosure,
+            probability,
+        )
 
 
 def unmatched(
@@ -773,6 +910,6 @@ def read_into(*adds: Callable) -> Callable:
     return read
 
 
-def silent(_title: str, _total: int) -> Callable:
+def silent(_title: str, _total: int | None = None) -> Callable:
     """Progress that is shown nowhere."""
     return lambda _points: None

@@ -67,7 +67,12 @@ def look_near_control(survey: Survey) -> QuickLook:
         Where the files are not in order of time, so that a look takes as long as reading them.
     """
     whole = survey
-    survey = replace(survey, control=spread_points(survey), check=survey.surveyed[[]])
+    survey = replace(
+        survey,
+        control=spread_points(survey),
+        check=survey.surveyed[[]],
+        excluded=survey.surveyed[[]],
+    )
     windows = {file: list(_near(survey, file)) for file in survey.clouds}
     survey = replace(survey, control=_affordable(survey, windows))
     start = perf_counter()

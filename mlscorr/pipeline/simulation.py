@@ -7,6 +7,7 @@ import numpy as np
 from mlscorr.io.store import check_output, document, output_folder
 from mlscorr.io.surveys import read_survey
 from mlscorr.pipeline.correction import correct
+from mlscorr.pipeline.finding import silent
 
 
 def demo(out, seed=1, overwrite=False, progress=None):
@@ -19,6 +20,7 @@ def demo(out, seed=1, overwrite=False, progress=None):
     with output_folder(out, overwrite=overwrite) as folder:
         simulated = Path(folder) / "survey"
         simulated.mkdir()
+        (progress or silent)("Building a street")
         simulate(DEMO, np.random.default_rng(seed)).write(simulated, progress=progress)
         result = correct(read_survey(simulated), progress=progress)
         return result.write(Path(folder) / "corrected", progress=progress)
@@ -35,6 +37,7 @@ def simulate_survey(scenario_path, out, seed=1, overwrite=False, progress=None):
 
     scenario = read_scenario(scenario_path)
     check_output(out, [scenario_path, *scenario_files(scenario)], overwrite)
+    (progress or silent)("Building the scene")
     simulate(scenario, np.random.default_rng(seed)).write(out, progress, overwrite)
     return _simulated(read_survey(out), scenario, seed)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ from mlscorr.evaluate import misfit
 from mlscorr.io.clouds import read_chunks
 from mlscorr.io.tables import write_ties_csv
 from mlscorr.pipeline._result import KnownResult, ResultFiles
-from mlscorr.pipeline.finding import silent
+from mlscorr.pipeline.finding import COLLECTING, silent
 from mlscorr.surfaces import FeatureCollector
 from mlscorr.survey import TIE_KINDS, Survey, TieFeatures, check_survey
 from mlscorr.ties import (
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 AXES = ("across", "along", "up")  # of the way of the earlier view
+
+LOG = logging.getLogger(__name__)
 
 
 def find_ties(
@@ -67,7 +70,9 @@ def find_ties(
     check_survey(survey)
     if features is None:
         features = _read_features(survey, progress)
+    (progress or silent)("Pairing what two passes both saw")
     tied = TiedSurvey(survey, features, search_ties(survey, features))
+    LOG.info("%d ties between %d planes, poles and markings", len(tied.search.ties), len(features))
     for sentence in tied.warnings:
         warnings.warn(sentence, stacklevel=2)
     return tied
@@ -75,12 +80,14 @@ def find_ties(
 
 def _read_features(survey, progress):
     """Planes, poles and paint of all clouds."""
-    done = (progress or silent)("Searching the cloud", survey.points)
+    stage = progress or silent
+    done = stage("Searching the cloud", survey.points)
     collector = FeatureCollector(survey)
     for file in survey.clouds:
         for chunk in read_chunks(file):
             collector.add(file, chunk)
             done(len(chunk))
+    stage(COLLECTING)
     return collector.features()
 
 

@@ -81,6 +81,8 @@ def check_lengths(record: Any) -> None:
 def _joined(columns):
     if isinstance(columns[0], tuple):
         return sum(columns, ())
+    if isinstance(columns[0], Columns):
+        return type(columns[0]).concatenate(columns)
     if isinstance(columns[0], Mapping):  # what all of them have
         shared = [name for name in columns[0] if all(name in others for others in columns)]
         return {name: np.concatenate([column[name] for column in columns]) for name in shared}

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
 
@@ -175,6 +176,10 @@ class Survey(Summary):
     beam_origin : (3,) array, optional
         Where the beams come from in body axes, as the cloud shows it, where no mounting is given.
         Units: m.
+    excluded : ControlPoints
+        Control points that the user keeps out of the estimate.
+    included : tuple of str
+        Names of the control points that are used whatever the tests say of them.
     """
 
     name: str
@@ -197,6 +202,8 @@ class Survey(Summary):
     corrected_by: tuple[str, ...] = ()
     is_remounted: bool = False
     beam_origin: np.ndarray | None = None
+    excluded: ControlPoints = field(default_factory=ControlPoints.none)
+    included: tuple[str, ...] = ()
 
     @classmethod
     def from_arrays(
@@ -289,8 +296,52 @@ class Survey(Summary):
 
     @cached_property
     def surveyed(self) -> ControlPoints:
-        """Control and check points, in this order."""
-        return self.control + self.check
+        """Control points, check points, and those that are excluded, in this order."""
+        return self.control + self.check + self.excluded
+
+    def choosing(self, exclude: Collection[str] = (), include: Collection[str] = ()) -> Survey:
+        """The survey with some control points kept out of the estimate, and others kept in it.
+
+        Parameters
+        ----------
+        exclude : collection of str
+            Names of control points that take no part; their residuals are reported.
+        include : collection of str
+            Names of control points that are used though matching or the other points contradict
+            them; those that were excluded before are used again.
+
+        Raises
+        ------
+        ValueError
+            For a name that is no control point, with the nearest, and one that is given as both.
+        """
+        points = self.control + self.excluded
+        for key, names in (("exclude", exclude), ("include", include)):
+            for name in names:
+                self._check_choice(key, name, points)
+        if both := sorted(set(exclude) & set(include)):
+            raise SurveyFileError(f"exclude and include both name {', '.join(both)}: choose one.")
+        out = (set(self.excluded.name) | set(exclude)) - set(include)
+        is_out = np.isin(np.array(points.name, dtype=str), list(out))
+        kept_in = (set(self.included) | set(include)) - set(exclude)
+        included = tuple(name for name in points.name if name in kept_in)
+        return replace(self, control=points[~is_out], excluded=points[is_out], included=included)
+
+    def _check_choice(self, key, name, points):
+        """Refuse a name that is no control point."""
+        if name in points.name:
+            return
+        if name in self.check.name:
+            raise SurveyFileError(
+                f"{key} names {name}, which is a check point and takes no part in any estimate. "
+                "Give names of control points, or change its role in the control list."
+            )
+        near = get_close_matches(name, points.name, n=1, cutoff=0.0)
+        hint = f"; the nearest name is {near[0]}" if near else ""
+        raise SurveyFileError(
+            f"{key} names {name}, which is none of the {counted(len(points), 'control point')}"
+            f"{hint}."
+        )
 
     @property
     def cloud_paths(self) -> tuple[Path, ...]:

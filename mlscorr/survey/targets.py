@@ -107,6 +107,12 @@ class ControlPoints(Columns):
             raise ValueError(f"kind = {strange[0]!r} is none of {', '.join(KINDS)}.")
         return points
 
+    @classmethod
+    def none(cls) -> ControlPoints:
+        """No point at all."""
+        vectors = np.empty((0, 3))
+        return cls((), vectors, vectors, (), np.empty(0), vectors)
+
     @cached_property
     def _row_of(self):
         return {name: row for row, name in reversed(list(enumerate(self.name)))}
@@ -198,7 +204,7 @@ class Matched(Columns):
         """No observation at all."""
         empty = np.empty(0)
         vectors = np.empty((0, 3))
-        points = ControlPoints((), vectors, vectors, (), empty, vectors)
+        points = ControlPoints.none()
         none = empty.astype(int)
         matrices = np.empty((0, 3, 3))
         return cls(

@@ -63,7 +63,8 @@ def tie_passes(survey: Survey, estimate: Estimate, features: TieFeatures) -> Est
             return estimate
         if is_last:
             unheld = _unheld(estimate, features, ties)
-            return with_ties(replace(estimate, notes=(*estimate.notes, *unheld)), ties, mountings)
+            noted = replace(estimate, notes=(*estimate.notes, *unheld))
+            return with_ties(noted, ties, mountings, survey.included)
 
         half = thinned_ties(ties, SETTINGS.ties // 2)  # shows as well how near partners are
         correction = previewed_correction(estimate, half, mountings)

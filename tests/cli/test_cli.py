@@ -175,7 +175,6 @@ BAD = [
         2,
         ["control.file", "control.csv", "does not exist"],
     ),
-    ("survey.toml missing", remove("survey.toml"), 2, ["survey.toml does not exist"]),
     (
         "check point unknown",
         edit("survey.toml", '"control.csv"', '"control.csv"\ncheck = ["X*"]'),
@@ -433,7 +432,6 @@ def test_an_output_folder_that_cannot_be_is_refused(out, arguments, code, words,
     [
         (),
         ("correct",),
-        ("correct", "survey.toml"),
         ("correct", "survey.toml", "-o"),
         ("correct", "survey.toml", "-o", "out", "--order", "two"),
         ("correct", "survey.toml", "-o", "out", "--order", "-1"),
@@ -478,7 +476,7 @@ def test_paths_may_be_relative_with_spaces_and_umlauts(commanded):
     process, out = commanded
     assert process.returncode == 0, process.stderr
     names = {"pass-1.laz", "pictures", "report.html", "report.json", "targets.csv"}
-    names |= {"weak.csv", "weak.geojson"}
+    names |= {"weak.csv", "weak.geojson", "log.txt"}
     names |= {"trajectory.csv", "drive.sbet", "smrmsg_drive.out", "drive.tum"}  # as asked for
     assert {path.name for path in out.iterdir()} == names
     assert [path.name for path in out.parent.iterdir()] == [out.name]
@@ -533,7 +531,7 @@ def test_few_control_points_lower_the_order_with_a_warning(kept, order, survey):
     out = survey.parent / "out"
     process = mlscorr("correct", survey, "-o", out, "--order", order, "--no-report")
     assert process.returncode == 0, process.stderr
-    names = ["pass-1.laz", "report.json", "targets.csv", "trajectory.csv"]
+    names = ["log.txt", "pass-1.laz", "report.json", "targets.csv", "trajectory.csv"]
     names += ["weak.csv", "weak.geojson"]
     assert sorted(path.name for path in out.iterdir()) == names
     assert "report.html" not in process.stderr

@@ -25,8 +25,7 @@ from mlscorr.frames import (
     mounting_partials,
     to_scanner,
 )
-from mlscorr.io.surveys import mounting_values, write_survey_copy
-from mlscorr.io.surveys.survey_file import read_survey_file
+from mlscorr.io.surveys import mounting_values, read_survey_file, write_survey_copy
 from mlscorr.io.surveys.survey_sections import CalibratedMountingSection
 from mlscorr.pipeline.calibration import warn_of_scanners
 from mlscorr.pipeline.control_checks import reuse_warnings

@@ -131,3 +131,14 @@ def test_targets_of_very_many_passes_have_no_neighbour_in_their_block():
     assert [len(block.target_rows) for block in objective.blocks] == [1] * 7
     known = ((objective.parameters("exponential", objective.initial), 1.0),)
     assert list(_doubtful_pairs(adjustment, Posterior(known, known))) == []
+
+
+def test_a_target_that_the_user_keeps_is_never_rejected():
+    "Off by 0.5 m, it is rejected; kept in, it is used, and its test still says so"
+    case = smooth_case(0)
+    case.spoil(5, [0.5, 0.0, 0.0])
+    assert [outlier.name for outlier in case.estimate().outliers] == ["T06"]
+    kept = case.estimate(kept_in=("T06",))
+    assert "T06" not in [outlier.name for outlier in kept.outliers]
+    (test,) = [test for test in kept.tests if test.name == "T06"]
+    assert test.excess > 1.0

@@ -237,7 +237,7 @@ def test_the_command_writes_page_document_and_clouds(commanded):
     printed = json.loads(process.stdout)
     assert printed == json.loads((out / "compare.json").read_text())
     assert sorted(path.name for path in out.iterdir()) == sorted(
-        ["compare.html", "compare.json", "lsc", "shift"]
+        ["compare.html", "compare.json", "log.txt", "lsc", "shift"]
     )
     assert [file["method"] for file in printed["files"]] == ["shift", "lsc"]
     assert all((out / file["name"]).exists() for file in printed["files"])

@@ -37,12 +37,13 @@ def glance(points: int = SETTINGS.glanced_points) -> AbstractContextManager[None
 
 
 def announced(progress: Any) -> AbstractContextManager[None]:
-    """Say how far conversions have come.
+    """Say which stage runs, and how far conversions and results have come.
 
     Parameters
     ----------
     progress : function
-        progress(title, total) gives a function of the number of points just done.
+        progress(title, total) begins a stage, and gives a function of the number of points just
+        done. Without a total the end is not known.
     """
     return _holding(_progress, progress)
 
@@ -52,14 +53,14 @@ def looked_points() -> int | None:
     return _limit.get()
 
 
-def progress_of(title: str, total: int) -> Callable[[int], object]:
-    """A function of the number of points just done, which says how far something has come.
+def progress_of(title: str, total: int | None = None) -> Callable[[int], object]:
+    """Begin a stage, and give a function of the number of points just done in it.
 
     Parameters
     ----------
     title : str
-    total : int
-        Number of points.
+    total : int, optional
+        Number of points; None where the end is not known.
     """
     return (_progress.get() or (lambda *_: lambda _: None))(title, total)
 

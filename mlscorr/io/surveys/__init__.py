@@ -24,12 +24,14 @@ from mlscorr.io.surveys.survey_file import (
     cloud_file,
     input_files,
     read_survey,
+    read_survey_file,
     stated_pos,
     survey_toml,
 )
 from mlscorr.io.surveys.survey_paths import (
     check_distinct,
     check_sessions,
+    files_of,
     given_file,
     matching,
     session_file,

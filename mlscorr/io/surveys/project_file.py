@@ -40,7 +40,7 @@ from mlscorr.io.surveys.survey_paths import (
 from mlscorr.io.surveys.survey_sections import CloudSection, SurveyFile
 from mlscorr.io.tables import NOTHING_SURVEYED
 from mlscorr.io.trajectories import check_crs, check_systems
-from mlscorr.survey import ControlPoints, InputFile, Trajectory
+from mlscorr.survey import ControlPoints, InputFile, SurveyFileError, Trajectory
 
 FOLDER_NAME = re.compile(r"[^\\/:*?\"<>|\x00-\x1f.][^\\/:*?\"<>|\x00-\x1f]*")  # on any system
 SHARED_TILES = "tiles"  # folder of the corrected files of more than one drive
@@ -249,6 +249,7 @@ def read_project(project: str | Path | StatedProject) -> ProjectParts:
     inputs = [input_file("project", path)]
     surveyed = NOTHING_SURVEYED
     if settings.control is not None:
+        _refuse_choice(path, settings.control)
         file = existing(path, "control.file", settings.control.file)
         inputs.append(input_file("control", file))
         try:
@@ -405,3 +406,12 @@ def _everywhere(drives):
     position = np.concatenate([w.position[some] for w, some in zip(ways, rows, strict=True)])
     number = np.arange(len(position), dtype=float)
     return Trajectory(number, position, Rotation.identity(len(position)))
+
+
+def _refuse_choice(path, section):
+    """Refuse exclude and include, which are of one survey."""
+    if section.exclude or section.include:
+        raise SurveyFileError(
+            f"{path}: exclude and include under [control] are of one survey. Give its survey.toml "
+            "a [control] of its own, or take the points out of the project's list."
+        )

@@ -180,7 +180,7 @@ class SurveyParts:
         if trajectory.position_sigma is None and "pos" not in settings.model_fields_set:
             notes.append(UNKNOWN_POS)
 
-        return Survey(
+        survey = Survey(
             name=settings.name or path.absolute().parent.name,
             path=path,
             crs=settings.crs,
@@ -201,6 +201,9 @@ class SurveyParts:
             corrected_by=tuple(n for part in settings.trajectories for n in part.corrected_by),
             is_remounted=settings.cloud is not None and settings.cloud.mounting == "recorded",
         )
+        if settings.control is None:
+            return survey
+        return survey.choosing(settings.control.exclude, settings.control.include)
 
 
 def read_parts(path: Path, settings: PlannedSurveyFile, files: SurveyPaths) -> SurveyParts:

@@ -266,6 +266,8 @@ class ControlSection(TomlSection):
     size: Positive | None = None  # m
     sigma: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = None  # m: E/N, H
     check: list[str] = Field(default_factory=list)  # names of check points, or patterns
+    exclude: list[str] = Field(default_factory=list)  # names of points that take no part
+    include: list[str] = Field(default_factory=list)  # names of points that are used in any case
     words: dict[str, str] = Field(default_factory=dict)  # of an office: to "circle 0.6", "check"
     columns: _ControlColumns = _ControlColumns()
     # By what eastings and northings are multiplied; "ground": by the map's own factor there

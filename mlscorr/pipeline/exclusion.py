@@ -1,0 +1,155 @@
+"""Control points that the user keeps out of an estimate, or in it, and what that does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mlscorr.correction import Correction
+from mlscorr.estimate import Estimate
+from mlscorr.evaluate import TargetRow, misclosures, target_rows
+from mlscorr.pipeline.estimation import check_score, estimate_together
+from mlscorr.pipeline.finding import MatchedTargets, silent
+from mlscorr.survey import Matched, Statement, Survey, TieFeatures
+from mlscorr.wording import length_in_words
+
+EXCLUDED = Statement("not matched", values={"why": "excluded by the user"})
+
+
+@dataclass(frozen=True)
+class Exclusion:
+    """What an excluded control point would do to the result if it took part.
+
+    Parameters
+    ----------
+    name : str
+    residual : float
+        Length of its misclosure after the correction by the other points, the largest of all
+        passes. Units: m.
+    by : str
+        What judges: ``check points``, or ``leave-one-out`` of the control points without any.
+    with_point, without_point : float
+        3D RMSE of those with the point in the estimate, and as it is. Units: m.
+    """
+
+    name: str
+    residual: float
+    by: str
+    with_point: float
+    without_point: float
+
+    @property
+    def sentence(self) -> str:
+        """The same in words."""
+        residual = length_in_words(self.residual)
+        before = length_in_words(self.with_point)
+        after = length_in_words(self.without_point)
+        return (
+            f"{self.name} is excluded by the user; its 3D residual is {residual}. 3D RMSE "
+            f"({self.by}): {before} with it, {after} without it."
+        )
+
+    def document(self) -> dict[str, str | float]:
+        """The row of ``exclusions[]`` in report.json."""
+        return {**vars(self), "sentence": self.sentence}
+
+
+def excluded_rows(excluded: Matched, correction: Correction) -> list[TargetRow]:
+    """Rows of control points that are kept out; what remains of them is left out by nature.
+
+    Parameters
+    ----------
+    excluded : Matched
+    correction : Correction
+        By the other control points.
+    """
+    if len(excluded) == 0:
+        return []
+    left_out = misclosures(excluded, correction)
+    reasons = [EXCLUDED] * len(excluded)
+    return target_rows(excluded, correction, "control", reasons, left_out)
+
+
+def marked_excluded(rows: list[TargetRow], survey: Survey) -> list[TargetRow]:
+    """Rows of points without an observation; of those that are kept out nobody misses one.
+
+    Parameters
+    ----------
+    rows : list of TargetRow
+    survey : Survey
+    """
+    return [
+        replace(row, why=EXCLUDED, scanned=False) if row.name in survey.excluded.name else row
+        for row in rows
+    ]
+
+
+def weighed_exclusions(
+    survey: Survey,
+    matches: MatchedTargets,
+    features: TieFeatures | None,
+    order: int,
+    estimate: Estimate,
+    progress: Callable | None = None,
+) -> tuple[Exclusion, ...]:
+    """What each excluded point would do to the result: the estimate is made again with it.
+
+    Parameters
+    ----------
+    survey : Survey
+    matches : MatchedTargets
+    features : TieFeatures or None
+        That the estimate used.
+    order : int
+        Of its trend.
+    estimate : Estimate
+        Without the points.
+    progress : function, optional
+        ``progress(title)`` is called when a stage begins.
+    """
+    excluded = matches.kept_out
+    rows = []
+    for name in dict.fromkeys(excluded.name):
+        (progress or silent)(f"Estimating with {name}, to see what its exclusion does")
+        point = excluded[np.array(excluded.name, dtype=object) == name]
+        control = Matched.concatenate([matches.control, point])
+        scanned = replace(
+            matches.as_scanned(survey),
+            control=survey.control + point.surveyed[:1],
+            included=(*survey.included, name),
+        )
+        with_point = estimate_together(scanned, control, features, order)
+        by, before = _judged(with_point, control, matches.check, name)
+        _, after = _judged(estimate, matches.control, matches.check, name)
+        residual = np.linalg.norm(misclosures(point, estimate.correction), axis=1).max()
+        rows.append(Exclusion(name, float(residual), by, before, after))
+    return tuple(rows)
+
+
+def _judged(estimate, control, check, name):
+    """What judges an estimate, and its 3D RMSE (m); the point itself is no judge."""
+    if len(check):
+        return "check points", float(check_score(estimate, check).after.rmse[4])
+    is_other = np.array(control.name, dtype=object) != name
+    left = estimate.left_out[estimate.used & is_other]
+    rmse = np.sqrt(np.mean(np.sum(left**2, axis=1)))
+    return "leave-one-out of the other control points", float(rmse)
+
+
+def inclusion_warnings(survey: Survey, estimate: Estimate) -> tuple[str, ...]:
+    """Sentences on points that are used as the user asks, and that the others contradict.
+
+    Parameters
+    ----------
+    survey : Survey
+    estimate : Estimate
+    """
+    return tuple(
+        f"{test.name} is used because include names it, and the other control points contradict "
+        f"it: statistic {test.statistic:.1f}, critical value {test.critical:.1f}. It draws the "
+        "cloud towards itself; check its coordinates."
+        for test in estimate.tests
+        if test.name in survey.included and test.excess > 1.0
+    )
