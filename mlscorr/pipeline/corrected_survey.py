@@ -253,13 +253,21 @@ class CorrectedSurvey(Summary):
         text = self._provenance() if provenance else None
         added = Additions(sigma, displacement, text, VERSION)
 
+        sampler = None
+        if page:
+            from mlscorr.report import cloud_sampler
+
+            sampler = cloud_sampler(self.targets, self.estimate.ties)
+
         def clouds(folder):
             done = (progress or silent)("Writing the cloud", self.survey.points)
-            moved = MovedClouds(self.survey, self.estimate.correction, self.held)
+            add = None if sampler is None else sampler.add
+            moved = MovedClouds(self.survey, self.estimate.correction, self.held, add)
             (written,) = write_counted([moved], folder, done, added)
             return written
 
-        return self._files(progress, page, trajectories, targets).write(out, overwrite, clouds)
+        files = self._files(progress, page, trajectories, targets, sampler)
+        return files.write(out, overwrite, clouds)
 
     def _provenance(self):
         """Text of the VLR that names what corrected a cloud."""
@@ -297,7 +305,7 @@ class CorrectedSurvey(Summary):
         """Write all but the clouds into a folder that is there, as ``write`` does."""
         return self._files(progress, page, trajectories, targets).write_beside(folder, written)
 
-    def _files(self, progress, page, trajectories, targets):
+    def _files(self, progress, page, trajectories, targets, sampler=None):
         """Trajectory, targets, weak stretches and report.json; report.html and the pictures."""
         from mlscorr.report import first_screen
 
@@ -327,25 +335,27 @@ class CorrectedSurvey(Summary):
             report = self._report(
                 written.folder, written.clouds, paths, targets, written.tables["weak.csv"]
             )
-            pages = self._pages(report, progress or silent) if page else {}
+            pages = self._pages(report, progress or silent, sampler) if page else {}
             return Reported(first_screen(report) | report.document(), pages)
 
         return ResultFiles("report", survey.inputs, report, tables)
 
-    def _pages(self, report, progress):
+    def _pages(self, report, progress, sampler):
         """report.html and the folder of pictures."""
-        from mlscorr.report import view_cloud, write_pictures, write_report
+        from mlscorr.report import correction_figures, view_cloud, write_pictures, write_report
 
         correction = self.estimate.correction
         ties = self.estimate.ties
+        figures = correction_figures(correction, report, ties)
 
         def write_page(path, _):
-            views = view_cloud(self.survey, correction, report.targets, progress, ties)
-            write_report(path, self.survey, correction, report, views, self.fitted, ties)
+            sample = None if sampler is None else sampler.sample
+            views = view_cloud(self.survey, correction, report.targets, progress, ties, sample)
+            write_report(path, self.survey, correction, report, views, self.fitted, ties, figures)
 
         def draw(path, _):
             path.mkdir()
-            write_pictures(path, correction, report, ties)
+            write_pictures(path, correction, report, ties, figures)
 
         return {"report.html": write_page, "pictures": draw}
 

@@ -5,6 +5,7 @@ from ._comparison_screen import comparison_screen as comparison_screen
 from ._comparison_screen import method_warnings as method_warnings
 from ._results_screen import results_screen as results_screen
 from ._show import show as show
+from .cloud import cloud_sampler as cloud_sampler
 from .cloud import view_cloud as view_cloud
 from .comparison_page import comparison_figure as comparison_figure
 from .comparison_page import write_comparison as write_comparison

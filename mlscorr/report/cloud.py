@@ -21,6 +21,7 @@ from mlscorr.report.pages import data_uri
 from mlscorr.report.render import (
     LABELS,
     MARK,
+    Easels,
     Picture,
     PictureOptions,
     colour_table,
@@ -29,7 +30,7 @@ from mlscorr.report.render import (
     swatches,
     worst_facades,
 )
-from mlscorr.report.sample import gather
+from mlscorr.report.sample import CloudSample, CloudSampler, gather, near_targets
 from mlscorr.report.settings import SETTINGS
 from mlscorr.report.style import break_at_gaps, thin
 from mlscorr.survey import PointCloud, Survey
@@ -65,6 +66,7 @@ def view_cloud(
     targets: list[TargetRow],
     progress: Progress,
     ties: TieResiduals | None = None,
+    sample: CloudSample | None = None,
 ) -> CloudViews:
     """Draw a cloud before and after its correction, in one pass over it and flat memory.
 
@@ -77,20 +79,21 @@ def view_cloud(
         ``progress(title, total)`` returns a function of the number of points just done.
     ties : TieResiduals, optional
         Near the facades of which all points are drawn, where passes lay the farthest apart.
+    sample : CloudSample, optional
+        That of the ``cloud_sampler``, where the cloud was read already.
     """
-    rows = sorted((row for row in targets if row.is_observed), key=lambda row: row.gps_time)
-    names = close_ups(rows)
-    near = [row for row in rows if row.name in names]
-    done = progress("Looking at the cloud", sum(file.points for file in survey.clouds))
-    if ties is None:
-        facades = np.empty((0, 3))
-    else:
-        facades = worst_facades(ties).place.reshape(-1, 3)
-    stream = chain.from_iterable(map(read_chunks, survey.clouds))
-    sample = gather(_watched(stream, done), near, facades)
-    done = progress("Drawing the cloud", 4 * len(sample.cloud))  # scouted and drawn, twice
+    rows = _in_time(targets)
+    near = _close_up_rows(rows)
+    facades = _facades(ties)
+    if sample is None:
+        done = progress("Looking at the cloud", sum(file.points for file in survey.clouds))
+        stream = chain.from_iterable(map(read_chunks, survey.clouds))
+        sample = gather(_watched(stream, done), near, facades)
+    about = CloudSample(near_targets(sample.cloud, near), sample.step)
+    total = 2 * (len(sample.cloud) + len(about.cloud))  # scouted and drawn
+    done = progress("Drawing the cloud", total)
 
-    def pictures(rows, size, *views):
+    def pictures(sample, rows, size, *views):
         wide = size[0] * 3 // 2, size[1]
         chunks = lambda: _watched(sample.chunks(), done)  # noqa: E731
         return draw(
@@ -99,10 +102,40 @@ def view_cloud(
 
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "There is no cross-section", UserWarning)
-        drawn = [*pictures(rows, SETTINGS.panel, "overview", "section")]
-    drawn += pictures(near, SETTINGS.close_up, "targets")
+        drawn = [*pictures(sample, rows, SETTINGS.panel, "overview", "section")]
+    if len(about.cloud):
+        drawn += pictures(about, near, SETTINGS.close_up, "targets")
     scene = viewer_data(correction, sample.cloud, targets, near)
     return CloudViews(tuple(drawn), scene, sample.step, len(facades) > 0)
+
+
+def cloud_sampler(targets: list[TargetRow], ties: TieResiduals | None = None) -> CloudSampler:
+    """Gatherer of what ``view_cloud`` needs of a cloud, while that is read for something else.
+
+    Parameters
+    ----------
+    targets : list of TargetRow
+    ties : TieResiduals, optional
+    """
+    return CloudSampler(_close_up_rows(_in_time(targets)), _facades(ties))
+
+
+def _in_time(targets):
+    """The observed ones of rows of targets, in time."""
+    return sorted((row for row in targets if row.is_observed), key=lambda row: row.gps_time)
+
+
+def _close_up_rows(rows):
+    """Rows of the targets that are drawn close up."""
+    names = close_ups(rows)
+    return [row for row in rows if row.name in names]
+
+
+def _facades(ties):
+    """Places (k, 3) of the facades where passes lay the farthest apart. Units: m."""
+    if ties is None:
+        return np.empty((0, 3))
+    return worst_facades(ties).place.reshape(-1, 3)
 
 
 def _watched(chunks, done):
@@ -139,7 +172,8 @@ def close_ups(rows: list[TargetRow], limit: int = SETTINGS.close_ups) -> list[st
 
 def cloud_content(views: CloudViews, targets: list[TargetRow]) -> dict:
     """What the templates show of CloudViews."""
-    pictures = [_pair(picture) for picture in views.pictures]
+    easels: Easels = {}
+    pictures = [_pair(picture, easels) for picture in views.pictures]
     kinds = {pair["kind"]: pair for pair in pictures}
     return {
         "overview": kinds["overview"],
@@ -155,10 +189,10 @@ def cloud_content(views: CloudViews, targets: list[TargetRow]) -> dict:
     }
 
 
-def _pair(picture):
+def _pair(picture, easels):
     """One pair of pictures in words and as addresses of images."""
     view = picture.view
-    before, after = (data_uri(panel, "png") for panel in picture.panels())
+    before, after = (data_uri(panel, "png") for panel in picture.panels(easels=easels))
     times = {mark.text for side in view.marks for mark in side if mark.kind == "residual"}
     return {
         "kind": view.name.partition("-")[0],

@@ -16,6 +16,7 @@ from mlscorr.report.figures import correction_figures
 from mlscorr.report.headline import statements, statements_section
 from mlscorr.report.pages import Page, data_uri, drawn
 from mlscorr.report.settings import SETTINGS
+from mlscorr.report.style import Figures
 from mlscorr.report.target_figures import target_drawings
 from mlscorr.survey import WEEK, Survey
 from mlscorr.targets import FittedTarget
@@ -54,6 +55,7 @@ def write_report(
     views: CloudViews | None = None,
     fitted: dict[tuple[int, float], FittedTarget] | None = None,
     ties: TieResiduals | None = None,
+    drawings: Figures | None = None,
 ) -> None:
     """Write the self-contained page of a correction.
 
@@ -71,11 +73,15 @@ def write_report(
         FittedTarget by (pass number, gps_time), each of which gets a figure.
     ties : TieResiduals, optional
         What two passes both saw; without any the section is left out.
+    drawings : dict of functions, optional
+        Those of ``correction_figures``, where files of them are written, too.
     """
     figures = target_drawings(report.targets, fitted or {})
     there = {"pictures": views is not None, "turn": views is not None, "targets": bool(figures)}
     there |= {"ties": ties is not None, "residuals": bool(report.targets)}
-    content = _content(survey, correction, report, ties) | _model(report.model)
+    if drawings is None:
+        drawings = correction_figures(correction, report, ties)
+    content = _content(survey, correction, report, drawings) | _model(report.model)
     content["target_figures"] = [(title, data_uri(picture, "png")) for title, picture in figures]
     scripts = ()
     if views is not None:
@@ -90,7 +96,7 @@ def write_report(
     ).write(path)
 
 
-def _content(survey, correction, report, ties):
+def _content(survey, correction, report, drawings):
     """Everything that the templates show, except of cloud and model."""
     return {
         "survey": survey,
@@ -101,7 +107,7 @@ def _content(survey, correction, report, ties):
         "tie_pairs": _largest(report.ties),
         "rmse_rows": tables.rmse_rows(report),
         "statistics": tables.statistics_rows(report),
-        "figures": drawn(correction_figures(correction, report, ties)),
+        "figures": drawn(drawings),
         "groups": [(name, ordered(report.targets, name)) for name in GROUPS],
         "has_left_out": any(np.isfinite(row.left_out).all() for row in report.targets),
         "coverage": coverage(correction, report),
