@@ -33,6 +33,10 @@ def correct(
     no_report: Annotated[
         bool, typer.Option("--no-report", help="Leave out report.html and the pictures: faster.")
     ] = False,
+    pdf: Annotated[
+        bool,
+        typer.Option("--pdf", help="Write certificate.pdf, too: two A4 pages to sign."),
+    ] = False,
     trajectory: Annotated[
         list[str],
         typer.Option(
@@ -106,6 +110,11 @@ def correct(
                     "--provenance is of one survey, and a cloud of a project may belong to several "
                     "drives. The report.json of each drive names its inputs and their SHA-256."
                 )
+            if pdf:
+                raise ValueError(
+                    "--pdf is of one survey. Correct each drive by itself for its certificate.pdf; "
+                    "the report.json of each drive has its numbers."
+                )
             exports = tuple(trajectory), tuple(targets)
             given = order, ties, sigma, not no_report, *exports, displacement, *shared, overwrite
             correct_drives(survey, out, Options(*given), gates, as_json)
@@ -135,12 +144,13 @@ def correct(
             targets=targets,
             displacement=displacement,
             provenance=provenance,
+            pdf=pdf,
         )
-    tell(report, out, as_json, not no_report)
+    tell(report, out, as_json, not no_report, pdf)
     terminal.end(failures(gates, report), not report["coverage"]["points_untouched"])
 
 
-def tell(report: dict, out: Path, as_json: bool, page: bool = True) -> None:
+def tell(report: dict, out: Path, as_json: bool, page: bool = True, pdf: bool = False) -> None:
     """Say what stands first in the report, the RMSE of misclosures, and where the results lie.
 
     Parameters
@@ -153,6 +163,8 @@ def tell(report: dict, out: Path, as_json: bool, page: bool = True) -> None:
         Whether to print the report on stdout.
     page : bool
         Whether report.html was written.
+    pdf : bool
+        Whether certificate.pdf was written.
     """
     from mlscorr.report import tie_sentences
 
@@ -169,5 +181,7 @@ def tell(report: dict, out: Path, as_json: bool, page: bool = True) -> None:
     results: list[tuple[str, object]] = []
     if page:
         results += [("Report", out / "report.html"), ("Pictures", out / "pictures")]
+    if pdf:
+        results.append(("Certificate", out / "certificate.pdf"))
     clouds = ", ".join(str(out / file["name"]) for file in report["files"])
     terminal.say_results([*results, ("Corrected", clouds)])

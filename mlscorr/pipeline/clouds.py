@@ -138,9 +138,7 @@ class MovedClouds:
             of_part = self.correction, part.scanner, part.mounting
             sigma = PointSigma.of(*of_part) if additions.sigma else None
             for file in part.clouds:
-                yield CorrectedPart(
-                    file, self.correction, sigma, watch, additions, self.sample
-                )
+                yield CorrectedPart(file, self.correction, sigma, watch, additions, self.sample)
 
 
 def write_counted(

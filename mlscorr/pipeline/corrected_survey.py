@@ -39,7 +39,7 @@ from mlscorr.io.trajectories import (
 )
 from mlscorr.pipeline._result import Reported, ResultFiles
 from mlscorr.pipeline.clouds import MovedClouds, WrittenClouds, write_counted
-from mlscorr.pipeline.estimation import check_score, control_score
+from mlscorr.pipeline.estimation import check_score, check_sigmas, control_score
 from mlscorr.pipeline.finding import silent
 from mlscorr.survey import Matched, Summary, Survey, Trajectory, chosen_origin, rows_frame
 from mlscorr.targets import FittedTarget
@@ -70,6 +70,8 @@ class CorrectedSurvey(Summary):
         On clouds and control, beside those of the estimate and of ``datum``.
     datum : tuple of DatumDifference
         By what the control that was used differs from the cloud as a whole.
+    pdf : bool
+        Whether ``write`` makes certificate.pdf where nothing else is asked for.
     """
 
     survey: Survey
@@ -80,6 +82,7 @@ class CorrectedSurvey(Summary):
     fitted: dict[tuple[int, float], FittedTarget] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     datum: tuple[DatumDifference, ...] = ()
+    pdf: bool = False
 
     @property
     def trajectory(self) -> Trajectory:
@@ -207,6 +210,7 @@ class CorrectedSurvey(Summary):
         targets: Sequence[str] = (),
         displacement: bool = False,
         provenance: bool = False,
+        pdf: bool | None = None,
     ) -> dict:
         """Write corrected clouds, trajectory, targets and report into a folder.
 
@@ -234,6 +238,8 @@ class CorrectedSurvey(Summary):
             Name mlscorr as the generating software of each cloud, and give it a VLR (user id
             mlscorr, record id 1) with version, settings, and the hash of the inputs. Without it all
             but the coordinates stays as it was, byte for byte; so it is not the default.
+        pdf : bool, optional
+            Write certificate.pdf, two A4 pages to sign, too; as ``correct`` was asked by default.
 
         Returns
         -------
@@ -266,7 +272,8 @@ class CorrectedSurvey(Summary):
             (written,) = write_counted([moved], folder, done, added)
             return written
 
-        files = self._files(progress, page, trajectories, targets, sampler)
+        certified = self.pdf if pdf is None else pdf
+        files = self._files(progress, page, trajectories, targets, sampler, certified)
         return files.write(out, overwrite, clouds)
 
     def _provenance(self):
@@ -305,7 +312,7 @@ class CorrectedSurvey(Summary):
         """Write all but the clouds into a folder that is there, as ``write`` does."""
         return self._files(progress, page, trajectories, targets).write_beside(folder, written)
 
-    def _files(self, progress, page, trajectories, targets, sampler=None):
+    def _files(self, progress, page, trajectories, targets, sampler=None, certified=False):
         """Trajectory, targets, weak stretches and report.json; report.html and the pictures."""
         from mlscorr.report import first_screen
 
@@ -336,6 +343,10 @@ class CorrectedSurvey(Summary):
                 written.folder, written.clouds, paths, targets, written.tables["weak.csv"]
             )
             pages = self._pages(report, progress or silent, sampler) if page else {}
+            if certified:
+                from mlscorr.report import write_certificate
+
+                pages["certificate.pdf"] = write_certificate
             return Reported(first_screen(report) | report.document(), pages)
 
         return ResultFiles("report", survey.inputs, report, tables)
@@ -410,10 +421,10 @@ class CorrectedSurvey(Summary):
     @cached_property
     def _draft(self) -> CorrectionReport:
         """What figures show of the correction: all but files, counts of points, next control."""
-        from mlscorr.report import CorrectionReport, Coverage
+        from mlscorr.report import CorrectionReport, Coverage, recorded_time, well_determined
 
         start, end = self.estimate.guards.longest_gap
-        return CorrectionReport(
+        draft = CorrectionReport(
             name=self.survey.name,
             crs=self.survey.crs,
             notes=(*self.survey.notes, *filter(None, [self.estimate.untied])),
@@ -429,7 +440,12 @@ class CorrectedSurvey(Summary):
             position_sigma=largest_sigma(self.trajectory, self.survey),
             datum=self.datum,
             assumed=self.survey.assumed_pos if self.survey.has_assumed_position else (),
+            project=self.survey.project,
+            recorded=recorded_time(self.survey),
+            check_sigmas=check_sigmas(self.estimate, self.matched_check),
         )
+        share = well_determined(self.estimate.correction, draft)
+        return replace(draft, well_determined=share)
 
 
 def _digest(text):

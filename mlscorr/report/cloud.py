@@ -17,6 +17,7 @@ from mlscorr.evaluate import TargetRow
 from mlscorr.io.clouds import read_chunks
 from mlscorr.report import tables
 from mlscorr.report.correction_report import ordered, recomputed
+from mlscorr.report.first_look import independent_residual, worst_target
 from mlscorr.report.pages import data_uri
 from mlscorr.report.render import (
     LABELS,
@@ -158,11 +159,10 @@ def close_ups(rows: list[TargetRow], limit: int = SETTINGS.close_ups) -> list[st
         return names
     left = dict.fromkeys(names, 0.0)  # m, what remains without the point's own help
     for row in rows:
-        if np.isfinite(row.left_out).all():
-            rest = row.left_out
-        else:
-            rest = row.after
-        left[row.name] = max(left[row.name], tables.norm(rest))
+        left[row.name] = max(left[row.name], tables.norm(independent_residual(row)))
+    first = worst_target(rows)
+    if first is not None:  # of the first screen
+        left[first.name] = np.inf
     worst = sorted(names, key=lambda name: -left[name])[: limit // 3]
     others = [name for name in names if name not in worst]
     spread = np.linspace(0, len(others) - 1, limit - len(worst)).round().astype(int)
@@ -175,11 +175,13 @@ def cloud_content(views: CloudViews, targets: list[TargetRow]) -> dict:
     easels: Easels = {}
     pictures = [_pair(picture, easels) for picture in views.pictures]
     kinds = {pair["kind"]: pair for pair in pictures}
+    close = [pair for pair in pictures if pair["kind"] == "target"]
     return {
         "overview": kinds["overview"],
         "section": kinds.get("section"),
-        "close_ups": [pair for pair in pictures if pair["kind"] == "target"],
-        "close_up_legend": _legend("intensity", None),
+        "close_ups": close,
+        "close_up_of": {pair["name"]: number for number, pair in enumerate(close, start=1)},
+        "close_up_legend": _legend("intensity"),
         "observed_targets": len({row.name for row in ordered(targets) if row.is_observed}),
         "mark": MARK,
         "step": views.step,
@@ -196,25 +198,30 @@ def _pair(picture, easels):
     times = {mark.text for side in view.marks for mark in side if mark.kind == "residual"}
     return {
         "kind": view.name.partition("-")[0],
+        "name": view.name.partition("-")[2],
         "title": view.title,
         "note": view.note,
         "size": view.camera.size,
         "before": before,
         "after": after,
         "times": times.pop() if len(times) == 1 else None,
-        "legend": _legend(view.colour, picture.limits, view.visits),
+        "legend": _legend(view.colour, picture.scale, view.visits),
     }
 
 
-def _legend(colour, limits, visits=()):
+def _legend(colour, scale=None, visits=()):
     """A colour's scale (words, low, high, gradient) or its swatches (colour, words)."""
     if pairs := swatches(colour, visits):
         return {"swatches": pairs}
     words, unit = LABELS[colour]
     stops = colour_table(colour)[np.linspace(0, 255, 9).round().astype(int)]
     gradient = ", ".join(f"#{r:02x}{g:02x}{b:02x}" for r, g, b in stops)
-    low, high = ("low", "high") if not unit else (f"{v:.2f} {unit}" for v in limits)
-    return {"words": words, "low": low, "high": high, "gradient": gradient}
+    ends = {"low": "low", "high": "high", "middle": ""}
+    if unit:
+        ends |= {"low": f"{scale.low:.2f} {unit}", "high": f"{scale.high:.2f} {unit}"}
+        if scale.exponent < 1:
+            ends["middle"] = f"(middle of the scale {scale.middle:.3f} {unit})"
+    return {"words": words, "gradient": gradient, **ends}
 
 
 def viewer_data(

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from mlscorr.report.render import symbols
+from mlscorr.report.render.quantities import ColourScale
 from mlscorr.report.render.view import View
 from mlscorr.report.settings import SETTINGS
 from mlscorr.report.style import STYLE, label, wipe
@@ -28,14 +29,13 @@ class Picture:
     view : View
     before, after : (h, w, 3) array of uint8
         RGB.
-    limits : (float, float)
-        Ends of the colour scale.
+    scale : ColourScale
     """
 
     view: View
     before: np.ndarray
     after: np.ndarray
-    limits: tuple[float, float]
+    scale: ColourScale
 
     @property
     def name(self) -> str:
@@ -88,7 +88,7 @@ class Picture:
             _panel(axes, self.view, k, (self.before, self.after)[k], corners[k], corner)
             axes.set_title(words, fontsize=symbols.letter(axes, 1.0), color="#333333", loc="left")
         _words(figure, self.view, corners[0][0] / size[0])
-        symbols.legend(figure, self.view, self.limits, (GAP, FOOT))
+        symbols.legend(figure, self.view, self.scale, (GAP, FOOT))
         return _png(_few_colours(_drawn(figure)))
 
 
