@@ -140,9 +140,9 @@ def _first_page(sheet, report):
     sheet.row("", ("surveyed", "observed", "used"), NUMBERS[:3], color=SOFT)
     for role in ROLES:
         rows = [row for row in report["targets"] if row["role"] == role]
-        seen = {row["name"] for row in rows if row["observed"] is not None}
+        observed = {row["name"] for row in rows if row["observed"] is not None}
         used = {row["name"] for row in rows if row["used"]}
-        values = (len({row["name"] for row in rows}), len(seen), len(used))
+        values = (len({row["name"] for row in rows}), len(observed), len(used))
         words = {"control": "Control points (make the correction)"}
         name = words.get(role, "Check points (only test it)")
         sheet.row(name, [str(value) for value in values], NUMBERS[:3])

@@ -175,11 +175,11 @@ class CorrectionReport:
             "position_sigma": self.position_sigma,
             "assumed": [vars(row) for row in self.assumed],
             "next_control": [place.document() for place in self.next_control],
+            **{name: [row.document() for row in getattr(self, name)] for name in rows[1:]},
             "project": asdict(self.project),
             "recorded": self.recorded,
             "check_sigmas": None if self.check_sigmas is None else self.check_sigmas.document(),
             "well_determined": self.well_determined,
-            **{name: [row.document() for row in getattr(self, name)] for name in rows[1:]},
         }
 
     def points(self, role: str) -> PointCounts:

@@ -60,9 +60,9 @@ def worst_target(rows: list[TargetRow]) -> TargetRow | None:
     rows : list of TargetRow
     """
     for group in ("check", "control"):
-        seen = [row for row in rows if row.group == group and row.is_observed]
-        if seen:
-            return max(seen, key=lambda row: tables.norm(independent_residual(row)))
+        observed = [row for row in rows if row.group == group and row.is_observed]
+        if observed:
+            return max(observed, key=lambda row: tables.norm(independent_residual(row)))
     return None
 
 

@@ -39,7 +39,7 @@ def letters(path):
             continue
         if b" Tf" in content:
             parts = re.findall(rb"\(((?:\\.|[^\\)])*)\)", content)
-            text = b"".join(parts).decode("latin-1")
+            text = b"".join(parts).decode("latin-1").replace("\0", "")  # of two bytes a letter
             sheets.append(re.sub(r"\\(.)", r"\1", text).replace(" ", ""))
     return pdf, sheets
 
