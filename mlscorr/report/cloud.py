@@ -31,7 +31,7 @@ from mlscorr.report.render import (
     swatches,
     worst_facades,
 )
-from mlscorr.report.sample import CloudSample, CloudSampler, gather, near_targets
+from mlscorr.report.sample import CloudSample, CloudSampler, gather, near_rows
 from mlscorr.report.settings import SETTINGS
 from mlscorr.report.style import break_at_gaps, thin
 from mlscorr.survey import PointCloud, Survey
@@ -90,7 +90,7 @@ def view_cloud(
         done = progress("Looking at the cloud", sum(file.points for file in survey.clouds))
         stream = chain.from_iterable(map(read_chunks, survey.clouds))
         sample = gather(_watched(stream, done), near, facades)
-    about = CloudSample(near_targets(sample.cloud, near), sample.step)
+    about = CloudSample(sample.cloud[near_rows(sample.cloud.xyz, near)], sample.step)
     total = 2 * (len(sample.cloud) + len(about.cloud))  # scouted and drawn
     done = progress("Drawing the cloud", total)
 
@@ -275,8 +275,10 @@ def thin_evenly(
     sample = np.arange(0, len(xyz), max(1, len(xyz) // (30 * limit)))
     local = xyz[sample] - xyz[sample].min(axis=0)
     edge = 0.05
-    while len(rows := _first_in_cells(local, edge)) > limit:
+    rows = _first_in_cells(local, edge)
+    while len(rows) > limit:
         edge *= max(1.05, np.sqrt(len(rows) / limit))  # surfaces: a quarter at twice the edge
+        rows = rows[_first_in_cells(local[rows], edge)]
     return sample[rows], float(edge)
 
 
@@ -291,8 +293,10 @@ def _near_rows(xyz, targets):
     rows_near = [np.empty(0, int)]
     half = max(SETTINGS.viewer_points[1] // max(len(targets), 1) // 2, 1)
     radius = 1.5 * SETTINGS.plan_cell
+    candidates = near_rows(xyz, targets)
+    easting = xyz[candidates, 0]
     for row in targets:
-        rows = np.flatnonzero(np.abs(xyz[:, 0] - row.observed[0]) <= radius)
+        rows = candidates[np.abs(easting - row.observed[0]) <= radius]
         away = np.linalg.norm(xyz[rows] - row.observed, axis=1)
         on_it = rows[away <= radius / 4]
         about = rows[(away > radius / 4) & (away <= radius)]

@@ -72,7 +72,7 @@ class CloudSampler:
     def add(self, chunk: PointCloud) -> None:
         """Take what the sample needs of a further chunk."""
         self._spread.add(chunk)
-        number = _cell_numbers(chunk)
+        number = _cell_numbers(chunk.xyz)
         for cells, sample in zip(self._regions, self._near, strict=True):
             if len(cells) > 1:
                 sample.add(chunk[_is_in(number, cells)])
@@ -106,15 +106,16 @@ def gather(
     return sampler.sample
 
 
-def near_targets(cloud: PointCloud, targets: list[TargetRow]) -> PointCloud:
-    """Points of a cloud that a close-up of a target may show.
+def near_rows(xyz: np.ndarray, targets: list[TargetRow]) -> np.ndarray:
+    """Rows of points (n, 3) that a close-up of a target may show.
 
     Parameters
     ----------
-    cloud : PointCloud
+    xyz : (n, 3) array
+        Units: m.
     targets : list of TargetRow
     """
-    return cloud[_is_in(_cell_numbers(cloud), _cells(targets))]
+    return np.flatnonzero(_is_in(_cell_numbers(xyz), _cells(targets)))
 
 
 def _cells(targets):
@@ -142,9 +143,9 @@ def _number(column, row):
     return column * (1 << 31) + row
 
 
-def _cell_numbers(chunk):
+def _cell_numbers(xyz):
     """Number of the plan cell of each point."""
-    return _number(*np.floor(chunk.xyz[:, :2] / SETTINGS.plan_cell).astype(np.int64).T)
+    return _number(*np.floor(xyz[:, :2] / SETTINGS.plan_cell).astype(np.int64).T)
 
 
 def _is_in(number, cells):

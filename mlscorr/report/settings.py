@@ -29,6 +29,7 @@ class Settings:
     # what is taken of the cloud
     sample_points: int = 1_000_000  # of each part; up to twice as many are gathered; guard
     plan_cell: float = 2.0  # m, of the grid that tells what is near a target, and of walls
+    framing_points: int = 100_000  # that frame the whole survey; more change no pixel
     viewer_points: tuple[int, int] = (36_000, 24_000)  # even and near targets: 3 MB of a page
     shown_points: int = 300_000  # of a page of clouds alone: 6 MB
     shown_extent: float = 100_000.0  # m; float32, in which views draw, holds 4 mm there
