@@ -50,6 +50,10 @@ def correct(
     no_report: Annotated[
         bool, typer.Option("--no-report", help="Leave out report.html and the pictures: faster.")
     ] = False,
+    pdf: Annotated[
+        bool,
+        typer.Option("--pdf", help="Write certificate.pdf, too: two A4 pages to sign."),
+    ] = False,
     trajectory: Annotated[
         list[str],
         typer.Option(
@@ -151,6 +155,11 @@ def correct(
                     "--exclude and --include are of one survey: correct the drive by its "
                     "survey.toml, or take the points out of the project's control list."
                 )
+            if pdf:
+                raise ValueError(
+                    "--pdf is of one survey. Correct each drive by itself for its certificate.pdf; "
+                    "the report.json of each drive has its numbers."
+                )
             exports = tuple(trajectory), tuple(targets)
             given = order, ties, sigma, not no_report, *exports, displacement, *shared, overwrite
             options = Options(*given)
@@ -172,6 +181,7 @@ def correct(
         "targets": targets,
         "displacement": displacement,
         "provenance": provenance,
+        "pdf": pdf,
     }
     chosen = {"exclude": exclude, "include": include}
     with ExitStack() as ends:
@@ -192,7 +202,7 @@ def correct(
         if path != survey:
             check_first(path)
         report = _corrected(path, out, overwrite, order, ties, chosen, settings)
-    tell(report, out, as_json, not no_report, worst_first)
+    tell(report, out, as_json, not no_report, pdf, worst_first)
     terminal.end(failures(gates, report), not report["coverage"]["points_untouched"])
 
 
@@ -228,13 +238,20 @@ def _written(survey, settings):
     names += ["weak.csv", "report.json", "log.txt"]
     if settings["page"]:
         names += ["report.html", "pictures"]
+    if settings["pdf"]:
+        names.append("certificate.pdf")
     if "survey_toml" in settings:
         names.append("survey.toml")
     return names
 
 
 def tell(
-    report: dict, out: Path, as_json: bool, page: bool = True, worst_first: bool = False
+    report: dict,
+    out: Path,
+    as_json: bool,
+    page: bool = True,
+    pdf: bool = False,
+    worst_first: bool = False,
 ) -> None:
     """Say what stands first in the report, the RMSE of misclosures, and where the results lie.
 
@@ -248,6 +265,8 @@ def tell(
         Whether to print the report on stdout.
     page : bool
         Whether report.html was written.
+    pdf : bool
+        Whether certificate.pdf was written.
     worst_first : bool
         Whether to print the residual of each point, too.
     """
@@ -270,6 +289,8 @@ def tell(
     results: list[tuple[str, object]] = []
     if page:
         results += [("Report", out / "report.html"), ("Pictures", out / "pictures")]
+    if pdf:
+        results.append(("Certificate", out / "certificate.pdf"))
     clouds = ", ".join(str(out / file["name"]) for file in report["files"])
     terminal.say_results([*results, ("Corrected", clouds)])
 

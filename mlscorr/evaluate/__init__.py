@@ -5,11 +5,13 @@
 - model: what the estimate says of itself, and of what two passes both saw
 - datum, beams: control and clouds that belong to something else
 - accuracy: the ASPRS standard
+- check_sigmas: the stated sigmas, tested by check points
 - quality: gates that make a command fail
 - wording: the sentences on all of it
 """
 
 from mlscorr.evaluate.beams import BeamCheck, outside_warnings
+from mlscorr.evaluate.check_sigmas import CheckSigmas
 from mlscorr.evaluate.datum import DatumDifference, datum_differences
 from mlscorr.evaluate.model import largest_sigma, misfit, misfit_section, model_section, tie_section
 from mlscorr.evaluate.quality import Gate, failures, read_gate

@@ -11,7 +11,7 @@ import numpy as np
 from mlscorr.correction import Correction, PointSigma
 from mlscorr.estimate import Support
 from mlscorr.io.clouds import Additions, CorrectedPart, sha256, write_parts, written_name
-from mlscorr.survey import Correcting, Survey
+from mlscorr.survey import Correcting, PointCloud, Survey
 
 
 def write_clouds(
@@ -113,11 +113,14 @@ class MovedClouds:
     correction : Correction
     held : pair of (float, float) and Support
         First and last control epoch (s), and what holds the correction along the drive.
+    sample : function, optional
+        As of CorrectedPart.
     """
 
     survey: Survey
     correction: Correction
     held: tuple[tuple[float, float], Support]
+    sample: Callable[[PointCloud], object] | None = None
 
     def parts(
         self, watch: Callable[[np.ndarray, np.ndarray], object], additions: Additions
@@ -135,7 +138,7 @@ class MovedClouds:
             of_part = self.correction, part.scanner, part.mounting
             sigma = PointSigma.of(*of_part) if additions.sigma else None
             for file in part.clouds:
-                yield CorrectedPart(file, self.correction, sigma, watch, additions)
+                yield CorrectedPart(file, self.correction, sigma, watch, additions, self.sample)
 
 
 def write_counted(

@@ -39,7 +39,7 @@ from mlscorr.io.trajectories import (
 )
 from mlscorr.pipeline._result import Reported, ResultFiles
 from mlscorr.pipeline.clouds import MovedClouds, WrittenClouds, write_counted
-from mlscorr.pipeline.estimation import check_score, control_score
+from mlscorr.pipeline.estimation import check_score, check_sigmas, control_score
 from mlscorr.pipeline.exclusion import Exclusion, excluded_rows
 from mlscorr.pipeline.finding import silent
 from mlscorr.survey import Matched, Summary, Survey, Trajectory, chosen_origin, rows_frame
@@ -75,6 +75,8 @@ class CorrectedSurvey(Summary):
         Control points that the user keeps out.
     exclusions : tuple of Exclusion
         What the result gains or loses by each of them.
+    pdf : bool
+        Whether ``write`` makes certificate.pdf where nothing else is asked for.
     """
 
     survey: Survey
@@ -87,6 +89,7 @@ class CorrectedSurvey(Summary):
     datum: tuple[DatumDifference, ...] = ()
     excluded: Matched = field(default_factory=Matched.none)
     exclusions: tuple[Exclusion, ...] = ()
+    pdf: bool = False
 
     @property
     def trajectory(self) -> Trajectory:
@@ -215,6 +218,7 @@ class CorrectedSurvey(Summary):
         displacement: bool = False,
         provenance: bool = False,
         survey_toml: str | None = None,
+        pdf: bool | None = None,
     ) -> dict:
         """Write corrected clouds, trajectory, targets and report into a folder.
 
@@ -244,6 +248,8 @@ class CorrectedSurvey(Summary):
             but the coordinates stays as it was, byte for byte; so it is not the default.
         survey_toml : str, optional
             Content of a survey.toml to write beside the results, where it was inferred.
+        pdf : bool, optional
+            Write certificate.pdf, two A4 pages to sign, too; as ``correct`` was asked by default.
 
         Returns
         -------
@@ -263,13 +269,21 @@ class CorrectedSurvey(Summary):
         text = self._provenance() if provenance else None
         added = Additions(sigma, displacement, text, VERSION)
 
+        sampler = None
+        if page:
+            from mlscorr.report import cloud_sampler
+
+            sampler = cloud_sampler(self.targets, self.estimate.ties)
+
         def clouds(folder):
             done = (progress or silent)("Writing the cloud", self.survey.points)
-            moved = MovedClouds(self.survey, self.estimate.correction, self.held)
+            add = None if sampler is None else sampler.add
+            moved = MovedClouds(self.survey, self.estimate.correction, self.held, add)
             (written,) = write_counted([moved], folder, done, added)
             return written
 
-        files = self._files(progress, page, trajectories, targets)
+        certified = self.pdf if pdf is None else pdf
+        files = self._files(progress, page, trajectories, targets, sampler, certified)
         if survey_toml is not None:
             inferred = {"survey.toml": lambda path: path.write_text(survey_toml, encoding="utf-8")}
             files = replace(files, tables={**files.tables, **inferred})
@@ -311,7 +325,7 @@ class CorrectedSurvey(Summary):
         """Write all but the clouds into a folder that is there, as ``write`` does."""
         return self._files(progress, page, trajectories, targets).write_beside(folder, written)
 
-    def _files(self, progress, page, trajectories, targets):
+    def _files(self, progress, page, trajectories, targets, sampler=None, certified=False):
         """Trajectory, targets, weak stretches and report.json; report.html and the pictures."""
         from mlscorr.report import first_screen
 
@@ -344,7 +358,11 @@ class CorrectedSurvey(Summary):
             report = self._report(
                 written.folder, written.clouds, paths, targets, written.tables["weak.csv"]
             )
-            pages = self._pages(report, stage) if page else {}
+            pages = self._pages(report, stage, sampler) if page else {}
+            if certified:
+                from mlscorr.report import write_certificate
+
+                pages["certificate.pdf"] = write_certificate
             content = first_screen(report) | report.document()
             if self.exclusions:
                 content["exclusions"] = [row.document() for row in self.exclusions]
@@ -352,22 +370,24 @@ class CorrectedSurvey(Summary):
 
         return ResultFiles("report", survey.inputs, report, tables)
 
-    def _pages(self, report, progress):
+    def _pages(self, report, progress, sampler):
         """report.html and the folder of pictures."""
-        from mlscorr.report import view_cloud, write_pictures, write_report
+        from mlscorr.report import correction_figures, view_cloud, write_pictures, write_report
 
         correction = self.estimate.correction
         ties = self.estimate.ties
+        figures = correction_figures(correction, report, ties)
 
         def write_page(path, _):
-            views = view_cloud(self.survey, correction, report.targets, progress, ties)
+            sample = None if sampler is None else sampler.sample
+            views = view_cloud(self.survey, correction, report.targets, progress, ties, sample)
             progress("Drawing report.html")
-            write_report(path, self.survey, correction, report, views, self.fitted, ties)
+            write_report(path, self.survey, correction, report, views, self.fitted, ties, figures)
 
         def draw(path, _):
             progress("Drawing pictures")
             path.mkdir()
-            write_pictures(path, correction, report, ties)
+            write_pictures(path, correction, report, ties, figures)
 
         return {"report.html": write_page, "pictures": draw}
 
@@ -422,10 +442,10 @@ class CorrectedSurvey(Summary):
     @cached_property
     def _draft(self) -> CorrectionReport:
         """What figures show of the correction: all but files, counts of points, next control."""
-        from mlscorr.report import CorrectionReport, Coverage
+        from mlscorr.report import CorrectionReport, Coverage, recorded_time, well_determined
 
         start, end = self.estimate.guards.longest_gap
-        return CorrectionReport(
+        draft = CorrectionReport(
             name=self.survey.name,
             crs=self.survey.crs,
             notes=(
@@ -445,7 +465,12 @@ class CorrectedSurvey(Summary):
             position_sigma=largest_sigma(self.trajectory, self.survey),
             datum=self.datum,
             assumed=self.survey.assumed_pos if self.survey.has_assumed_position else (),
+            project=self.survey.project,
+            recorded=recorded_time(self.survey),
+            check_sigmas=check_sigmas(self.estimate, self.matched_check),
         )
+        share = well_determined(self.estimate.correction, draft)
+        return replace(draft, well_determined=share)
 
 
 def _digest(text):

@@ -51,6 +51,7 @@ def correct(
     rng: np.random.Generator | None = None,
     progress: Callable | None = None,
     ties: TieUse | None = None,
+    pdf: bool = False,
 ) -> CorrectedSurvey:
     """Find the targets of a survey and estimate the POS error from its control points.
 
@@ -69,6 +70,8 @@ def correct(
         ``auto`` where passes overlap, ``off``, or ``only``: then no control point takes part, all
         of them are check points, and the passes are brought together where the POS says they are.
         What survey.toml says by default.
+    pdf : bool
+        ``write`` of the result makes certificate.pdf, too, unless it is told otherwise.
 
     Returns
     -------
@@ -110,6 +113,7 @@ def correct(
             matches.as_scanned(survey), matches.control, matches.check, matches, estimate
         ),
         exclusions=weighed_exclusions(survey, matches, features, order, estimate, progress),
+        pdf=pdf,
     )
     datum = (difference.sentence for difference in result.datum)
     # those of the targets were given when they were matched

@@ -20,7 +20,7 @@ from mlscorr.estimate import (
     mounting_warnings,
     scanner_warnings,
 )
-from mlscorr.evaluate import Score
+from mlscorr.evaluate import CheckSigmas, Score, misclosures
 from mlscorr.evaluate import score as score_matched
 from mlscorr.pipeline.finding import MatchedTargets, silent
 from mlscorr.pipeline.ties import TiedSurvey
@@ -285,10 +285,27 @@ def check_score(estimate: Estimate, check: Matched) -> Score:
     estimate : Estimate
     check : Matched
     """
-    corrected = estimate.correction.corrected
-    there = corrected.at(check.gps_time).position_sigma
-    sigma = np.sqrt(check.variance + there**2)
-    return score_matched(check, estimate.correction, sigma=sigma)
+    return score_matched(check, estimate.correction, sigma=_check_sigma(estimate, check))
+
+
+def check_sigmas(estimate: Estimate, check: Matched) -> CheckSigmas | None:
+    """Test of the stated sigmas by the check points; None without any.
+
+    Parameters
+    ----------
+    estimate : Estimate
+    check : Matched
+    """
+    if not len(check):
+        return None
+    residuals = misclosures(check, estimate.correction)
+    return CheckSigmas.of(residuals, _check_sigma(estimate, check), len(set(check.name)))
+
+
+def _check_sigma(estimate, check):
+    """One sigma (n, 3) of residuals of check points: target, survey and correction. Units: m."""
+    there = estimate.correction.corrected.at(check.gps_time).position_sigma
+    return np.sqrt(check.variance + there**2)
 
 
 @dataclass(frozen=True, repr=False)

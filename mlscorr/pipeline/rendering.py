@@ -93,7 +93,7 @@ def render(
             (Path(folder) / name).write_bytes(picture.page(size))
             view = picture.view
             row = {"file": name, "title": view.title, "colour": view.colour}
-            pictures.append({**row, "scale": list(picture.limits)})
+            pictures.append({**row, "scale": [picture.scale.low, picture.scale.high]})
     return document("render", {"name": survey.name, "pictures": pictures})
 
 

@@ -5,6 +5,8 @@ from ._comparison_screen import comparison_screen as comparison_screen
 from ._comparison_screen import method_warnings as method_warnings
 from ._results_screen import results_screen as results_screen
 from ._show import show as show
+from .certificate import write_certificate as write_certificate
+from .cloud import cloud_sampler as cloud_sampler
 from .cloud import view_cloud as view_cloud
 from .comparison_page import comparison_figure as comparison_figure
 from .comparison_page import write_comparison as write_comparison
@@ -14,6 +16,8 @@ from .correction_report import Coverage as Coverage
 from .correction_report import FileRow as FileRow
 from .figures import correction_figures as correction_figures
 from .figures import write_pictures as write_pictures
+from .first_look import recorded_time as recorded_time
+from .first_look import well_determined as well_determined
 from .geometry import correction_lines as correction_lines
 from .geometry import misclosure_lines as misclosure_lines
 from .geometry import target_lines as target_lines

@@ -17,10 +17,12 @@ from mlscorr.evaluate import TargetRow
 from mlscorr.io.clouds import read_chunks
 from mlscorr.report import tables
 from mlscorr.report.correction_report import ordered, recomputed
+from mlscorr.report.first_look import independent_residual, worst_target
 from mlscorr.report.pages import data_uri
 from mlscorr.report.render import (
     LABELS,
     MARK,
+    Easels,
     Picture,
     PictureOptions,
     colour_table,
@@ -29,7 +31,7 @@ from mlscorr.report.render import (
     swatches,
     worst_facades,
 )
-from mlscorr.report.sample import gather
+from mlscorr.report.sample import CloudSample, CloudSampler, gather, near_rows
 from mlscorr.report.settings import SETTINGS
 from mlscorr.report.style import break_at_gaps, thin
 from mlscorr.survey import PointCloud, Survey
@@ -65,6 +67,7 @@ def view_cloud(
     targets: list[TargetRow],
     progress: Progress,
     ties: TieResiduals | None = None,
+    sample: CloudSample | None = None,
 ) -> CloudViews:
     """Draw a cloud before and after its correction, in one pass over it and flat memory.
 
@@ -77,20 +80,21 @@ def view_cloud(
         ``progress(title, total)`` returns a function of the number of points just done.
     ties : TieResiduals, optional
         Near the facades of which all points are drawn, where passes lay the farthest apart.
+    sample : CloudSample, optional
+        That of the ``cloud_sampler``, where the cloud was read already.
     """
-    rows = sorted((row for row in targets if row.is_observed), key=lambda row: row.gps_time)
-    names = close_ups(rows)
-    near = [row for row in rows if row.name in names]
-    done = progress("Looking at the cloud", sum(file.points for file in survey.clouds))
-    if ties is None:
-        facades = np.empty((0, 3))
-    else:
-        facades = worst_facades(ties).place.reshape(-1, 3)
-    stream = chain.from_iterable(map(read_chunks, survey.clouds))
-    sample = gather(_watched(stream, done), near, facades)
-    done = progress("Drawing the cloud", 4 * len(sample.cloud))  # scouted and drawn, twice
+    rows = _in_time(targets)
+    near = _close_up_rows(rows)
+    facades = _facades(ties)
+    if sample is None:
+        done = progress("Looking at the cloud", sum(file.points for file in survey.clouds))
+        stream = chain.from_iterable(map(read_chunks, survey.clouds))
+        sample = gather(_watched(stream, done), near, facades)
+    about = CloudSample(sample.cloud[near_rows(sample.cloud.xyz, near)], sample.step)
+    total = 2 * (len(sample.cloud) + len(about.cloud))  # scouted and drawn
+    done = progress("Drawing the cloud", total)
 
-    def pictures(rows, size, *views):
+    def pictures(sample, rows, size, *views):
         wide = size[0] * 3 // 2, size[1]
         chunks = lambda: _watched(sample.chunks(), done)  # noqa: E731
         return draw(
@@ -99,10 +103,40 @@ def view_cloud(
 
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "There is no cross-section", UserWarning)
-        drawn = [*pictures(rows, SETTINGS.panel, "overview", "section")]
-    drawn += pictures(near, SETTINGS.close_up, "targets")
+        drawn = [*pictures(sample, rows, SETTINGS.panel, "overview", "section")]
+    if len(about.cloud):
+        drawn += pictures(about, near, SETTINGS.close_up, "targets")
     scene = viewer_data(correction, sample.cloud, targets, near)
     return CloudViews(tuple(drawn), scene, sample.step, len(facades) > 0)
+
+
+def cloud_sampler(targets: list[TargetRow], ties: TieResiduals | None = None) -> CloudSampler:
+    """Gatherer of what ``view_cloud`` needs of a cloud, while that is read for something else.
+
+    Parameters
+    ----------
+    targets : list of TargetRow
+    ties : TieResiduals, optional
+    """
+    return CloudSampler(_close_up_rows(_in_time(targets)), _facades(ties))
+
+
+def _in_time(targets):
+    """The observed ones of rows of targets, in time."""
+    return sorted((row for row in targets if row.is_observed), key=lambda row: row.gps_time)
+
+
+def _close_up_rows(rows):
+    """Rows of the targets that are drawn close up."""
+    names = close_ups(rows)
+    return [row for row in rows if row.name in names]
+
+
+def _facades(ties):
+    """Places (k, 3) of the facades where passes lay the farthest apart. Units: m."""
+    if ties is None:
+        return np.empty((0, 3))
+    return worst_facades(ties).place.reshape(-1, 3)
 
 
 def _watched(chunks, done):
@@ -125,11 +159,10 @@ def close_ups(rows: list[TargetRow], limit: int = SETTINGS.close_ups) -> list[st
         return names
     left = dict.fromkeys(names, 0.0)  # m, what remains without the point's own help
     for row in rows:
-        if np.isfinite(row.left_out).all():
-            rest = row.left_out
-        else:
-            rest = row.after
-        left[row.name] = max(left[row.name], tables.norm(rest))
+        left[row.name] = max(left[row.name], tables.norm(independent_residual(row)))
+    first = worst_target(rows)
+    if first is not None:  # of the first screen
+        left[first.name] = np.inf
     worst = sorted(names, key=lambda name: -left[name])[: limit // 3]
     others = [name for name in names if name not in worst]
     spread = np.linspace(0, len(others) - 1, limit - len(worst)).round().astype(int)
@@ -139,13 +172,16 @@ def close_ups(rows: list[TargetRow], limit: int = SETTINGS.close_ups) -> list[st
 
 def cloud_content(views: CloudViews, targets: list[TargetRow]) -> dict:
     """What the templates show of CloudViews."""
-    pictures = [_pair(picture) for picture in views.pictures]
+    easels: Easels = {}
+    pictures = [_pair(picture, easels) for picture in views.pictures]
     kinds = {pair["kind"]: pair for pair in pictures}
+    close = [pair for pair in pictures if pair["kind"] == "target"]
     return {
         "overview": kinds["overview"],
         "section": kinds.get("section"),
-        "close_ups": [pair for pair in pictures if pair["kind"] == "target"],
-        "close_up_legend": _legend("intensity", None),
+        "close_ups": close,
+        "close_up_of": {pair["name"]: number for number, pair in enumerate(close, start=1)},
+        "close_up_legend": _legend("intensity"),
         "observed_targets": len({row.name for row in ordered(targets) if row.is_observed}),
         "mark": MARK,
         "step": views.step,
@@ -155,32 +191,37 @@ def cloud_content(views: CloudViews, targets: list[TargetRow]) -> dict:
     }
 
 
-def _pair(picture):
+def _pair(picture, easels):
     """One pair of pictures in words and as addresses of images."""
     view = picture.view
-    before, after = (data_uri(panel, "png") for panel in picture.panels())
+    before, after = (data_uri(panel, "png") for panel in picture.panels(easels=easels))
     times = {mark.text for side in view.marks for mark in side if mark.kind == "residual"}
     return {
         "kind": view.name.partition("-")[0],
+        "name": view.name.partition("-")[2],
         "title": view.title,
         "note": view.note,
         "size": view.camera.size,
         "before": before,
         "after": after,
         "times": times.pop() if len(times) == 1 else None,
-        "legend": _legend(view.colour, picture.limits, view.visits),
+        "legend": _legend(view.colour, picture.scale, view.visits),
     }
 
 
-def _legend(colour, limits, visits=()):
+def _legend(colour, scale=None, visits=()):
     """A colour's scale (words, low, high, gradient) or its swatches (colour, words)."""
     if pairs := swatches(colour, visits):
         return {"swatches": pairs}
     words, unit = LABELS[colour]
     stops = colour_table(colour)[np.linspace(0, 255, 9).round().astype(int)]
     gradient = ", ".join(f"#{r:02x}{g:02x}{b:02x}" for r, g, b in stops)
-    low, high = ("low", "high") if not unit else (f"{v:.2f} {unit}" for v in limits)
-    return {"words": words, "low": low, "high": high, "gradient": gradient}
+    ends = {"low": "low", "high": "high", "middle": ""}
+    if unit:
+        ends |= {"low": f"{scale.low:.2f} {unit}", "high": f"{scale.high:.2f} {unit}"}
+        if scale.exponent < 1:
+            ends["middle"] = f"(middle of the scale {scale.middle:.3f} {unit})"
+    return {"words": words, "gradient": gradient, **ends}
 
 
 def viewer_data(
@@ -234,8 +275,10 @@ def thin_evenly(
     sample = np.arange(0, len(xyz), max(1, len(xyz) // (30 * limit)))
     local = xyz[sample] - xyz[sample].min(axis=0)
     edge = 0.05
-    while len(rows := _first_in_cells(local, edge)) > limit:
+    rows = _first_in_cells(local, edge)
+    while len(rows) > limit:
         edge *= max(1.05, np.sqrt(len(rows) / limit))  # surfaces: a quarter at twice the edge
+        rows = rows[_first_in_cells(local[rows], edge)]
     return sample[rows], float(edge)
 
 
@@ -250,8 +293,10 @@ def _near_rows(xyz, targets):
     rows_near = [np.empty(0, int)]
     half = max(SETTINGS.viewer_points[1] // max(len(targets), 1) // 2, 1)
     radius = 1.5 * SETTINGS.plan_cell
+    candidates = near_rows(xyz, targets)
+    easting = xyz[candidates, 0]
     for row in targets:
-        rows = np.flatnonzero(np.abs(xyz[:, 0] - row.observed[0]) <= radius)
+        rows = candidates[np.abs(easting - row.observed[0]) <= radius]
         away = np.linalg.norm(xyz[rows] - row.observed, axis=1)
         on_it = rows[away <= radius / 4]
         about = rows[(away > radius / 4) & (away <= radius)]

@@ -9,20 +9,27 @@ import numpy as np
 
 from mlscorr.correction import Correction
 from mlscorr.estimate import TieResiduals
+from mlscorr.evaluate import CheckSigmas
 from mlscorr.report import tables
 from mlscorr.report.cloud import CloudViews, cloud_content
 from mlscorr.report.correction_report import GROUPS, CorrectionReport, FileRow, ordered
 from mlscorr.report.figures import correction_figures
-from mlscorr.report.headline import statements, statements_section
+from mlscorr.report.first_figures import locator_map, sigma_figure
+from mlscorr.report.first_look import facts, three_numbers, worst_target
+from mlscorr.report.headline import sigmas_statement, statements, statements_section
+from mlscorr.report.model_rows import model_rows
 from mlscorr.report.pages import Page, data_uri, drawn
 from mlscorr.report.settings import SETTINGS
+from mlscorr.report.style import Figures, svg
 from mlscorr.report.target_figures import target_drawings
+from mlscorr.report.wording import in_words
 from mlscorr.survey import WEEK, Survey
 from mlscorr.targets import FittedTarget
 from mlscorr.wording import number, percent, thousands
 
 SECTIONS = {  # in their order; one without anything to show is left out
     "statistics": "How far off",
+    "sigmas": "Stated sigmas",
     "accuracy": "Accuracy",
     "pictures": "Before and after",
     "turn": "3D view",
@@ -35,14 +42,22 @@ SECTIONS = {  # in their order; one without anything to show is left out
     "used": "What was used",
     "conventions": "Conventions",
 }
-WORDS = {
-    "alternatives": "models that were compared",
-    "orders": "orders of the trend, side by side",
-    "tests": "what the other control points say of each",
-    "estimated_by": "estimated by",
-    "order": "order of the polynomial trend",
-    "sigma0": "sigma0 (1 when the stated sigmas are right)",
-    "correlation_time": "correlation time (s)",
+TABLES = {  # of the model: its title, and what its columns are
+    "alternatives": (
+        "Covariance functions compared",
+        "The correction averages over them by their probability. Correlation times in s; scales "
+        "are factors on the stated sigmas.",
+    ),
+    "orders": (
+        "Orders of the trend compared",
+        "Leave-one-out RMSE of the control points in E, N, H in m.",
+    ),
+    "tests": (
+        "Leave-one-out test of each control point",
+        "w: residual over its sigma once the other points alone have corrected it. Redundancy: "
+        "share of an error that would show, 0 to 1. Detectable: smallest error that the test "
+        "finds, in m. A point is rejected where its statistic exceeds the critical value.",
+    ),
 }
 
 
@@ -54,6 +69,7 @@ def write_report(
     views: CloudViews | None = None,
     fitted: dict[tuple[int, float], FittedTarget] | None = None,
     ties: TieResiduals | None = None,
+    drawings: Figures | None = None,
 ) -> None:
     """Write the self-contained page of a correction.
 
@@ -71,37 +87,55 @@ def write_report(
         FittedTarget by (pass number, gps_time), each of which gets a figure.
     ties : TieResiduals, optional
         What two passes both saw; without any the section is left out.
+    drawings : dict of functions, optional
+        Those of ``correction_figures``, where files of them are written, too.
     """
     figures = target_drawings(report.targets, fitted or {})
     there = {"pictures": views is not None, "turn": views is not None, "targets": bool(figures)}
     there |= {"ties": ties is not None, "residuals": bool(report.targets)}
-    content = _content(survey, correction, report, ties) | _model(report.model)
+    there["sigmas"] = report.check_sigmas is not None
+    if drawings is None:
+        drawings = correction_figures(correction, report, ties)
+    content = _content(survey, correction, report, drawings) | _model(report.model)
     content["target_figures"] = [(title, data_uri(picture, "png")) for title, picture in figures]
-    scripts = ()
+    content |= {"close_ups": [], "close_up_of": {}, "scene": None}
+    scripts: tuple[str, ...] = ()
     if views is not None:
         content |= cloud_content(views, report.targets)
         scripts = ("slide.js", "view.js", "turn.js")
+    worst = worst_target(report.targets)
+    name = None if worst is None else worst.name
+    content["hero"] = next((pair for pair in content["close_ups"] if pair["name"] == name), None)
+    marked = worst if content["hero"] else None
+    content["locator"] = data_uri(svg(locator_map(correction, report, marked)))
     Page(
-        title=f"{survey.name}: correction of a mobile laser scan",
+        title=f"{survey.project.title or survey.name}: correction of a mobile laser scan",
         summary="summary.html",
         sections={name: title for name, title in SECTIONS.items() if there.get(name, True)},
         content=content,
+        styles=("correction.css",),
         scripts=scripts,
     ).write(path)
 
 
-def _content(survey, correction, report, ties):
+def _content(survey, correction, report, drawings):
     """Everything that the templates show, except of cloud and model."""
     return {
         "survey": survey,
         "report": report,
         **statements_section(statements(report)),
+        "title": survey.project.title or survey.name,
+        "numbers": three_numbers(correction, report),
+        "heading": facts(survey, report),
         "facts": key_figures(correction, report),
+        "check_sigmas": sigmas_section(report.check_sigmas),
+        "weak": list(zip(report.support.weak, weak_places(correction, report), strict=True)),
+        "next_places": next_places(correction, report),
         "tie_sentences": tables.tie_sentences(report.ties, report.points("control").scored),
         "tie_pairs": _largest(report.ties),
         "rmse_rows": tables.rmse_rows(report),
         "statistics": tables.statistics_rows(report),
-        "figures": drawn(correction_figures(correction, report, ties)),
+        "figures": drawn(drawings),
         "groups": [(name, ordered(report.targets, name)) for name in GROUPS],
         "has_left_out": any(np.isfinite(row.left_out).all() for row in report.targets),
         "coverage": coverage(correction, report),
@@ -110,6 +144,49 @@ def _content(survey, correction, report, ties):
         "files": files(report),
         "zero_time": f"{np.floor(correction.recorded.gps_time[0]):.0f}",
     }
+
+
+def sigmas_section(sigmas: CheckSigmas | None) -> dict[str, str] | None:
+    """Sentence and figure on the stated sigmas; None without check points.
+
+    Parameters
+    ----------
+    sigmas : CheckSigmas or None
+    """
+    if sigmas is None:
+        return None
+    (sentence,) = in_words([sigmas_statement(sigmas)])
+    return {"sentence": sentence, "figure": data_uri(svg(sigma_figure(sigmas.z)))}
+
+
+def weak_places(correction: Correction, report: CorrectionReport) -> list[list[float]]:
+    """Middle of each poorly constrained interval on the corrected drive: E, N, H in m.
+
+    Parameters
+    ----------
+    correction : Correction
+    report : CorrectionReport
+    """
+    middles = [(stretch.start + stretch.end) / 2 for stretch in report.support.weak]
+    return _places(correction, middles)
+
+
+def next_places(correction: Correction, report: CorrectionReport) -> list[list[float]]:
+    """Places of the drive beside which another control point helps: E, N, H in m.
+
+    Parameters
+    ----------
+    correction : Correction
+    report : CorrectionReport
+    """
+    return _places(correction, [place.gps_time for place in report.next_control])
+
+
+def _places(correction, times):
+    """Positions of the corrected drive at the epochs next to some times."""
+    corrected = correction.corrected
+    rows = np.searchsorted(corrected.gps_time, times).clip(0, len(corrected) - 1)
+    return np.round(corrected.position[rows], 2).tolist()
 
 
 def _largest(ties):
@@ -125,9 +202,9 @@ def _model(model):
         rest["order"] = "none"
     lists = {key: rest.pop(key) for key in list(rest) if _is_table(rest[key])}
     return {
-        "model": [pair for key, value in rest.items() for pair in _pairs(key, value)],
+        "model": model_rows(rest),
         "outliers": model.get("outliers") or [],
-        "model_tables": [(_title(key), rows) for key, rows in lists.items()],
+        "model_tables": [(*TABLES.get(key, (key.capitalize(), "")), r) for key, r in lists.items()],
     }
 
 
@@ -135,21 +212,8 @@ def _is_table(value):
     return isinstance(value, list) and bool(value) and all(isinstance(row, dict) for row in value)
 
 
-def _title(key):
-    """A key of the model in words."""
-    words = WORDS.get(key, key.replace("_", " "))
-    return words[:1].upper() + words[1:]
-
-
-def _pairs(key, value):
-    """Pairs (name, value) of an entry of the model, a nested one level by level."""
-    if not isinstance(value, dict) or not value:
-        return [(_title(key), value)]
-    return [(f"{_title(key)}: {_title(below)}", item) for below, item in value.items()]
-
-
 def key_figures(correction: Correction, report: CorrectionReport) -> list[tuple[str, str]]:
-    """Pairs (number, what it is) that a client reads first.
+    """Pairs (number, what it is) that follow the three on top.
 
     Parameters
     ----------
@@ -157,16 +221,7 @@ def key_figures(correction: Correction, report: CorrectionReport) -> list[tuple[
     report : CorrectionReport
     """
     change = np.linalg.norm(correction.corrected.position - correction.recorded.position, axis=1)
-    before, after, kind = report.judgement
-    facts = []
-    if before is not None and after is not None:
-        title = {
-            "check": "3D RMSE of check points",
-            "leave-one-out": "3D RMSE of control points, each left out in turn",
-            "fit": "3D RMSE of control points (fit only)",
-        }[kind]
-        pair = [number(statistics.rmse[4]) for statistics in (before, after)]
-        facts.append((f"{pair[0]} → {pair[1]} m", title))
+    figures = []
     deeds = {
         "control": ("made the correction", "took part"),
         "check": ("tested it", "were there to test it"),
@@ -180,13 +235,13 @@ def key_figures(correction: Correction, report: CorrectionReport) -> list[tuple[
             share = f"{points} of {surveyed}"
         else:
             share = str(points)
-        facts.append((share, f"{role} point{'s' * (points != 1)} {deed}{often}"))
-    facts.append((f"{number(float(change.max()))} m", "largest correction of the position"))
+        figures.append((share, f"{role} point{'s' * (points != 1)} {deed}{often}"))
+    figures.append((f"{number(float(change.max()))} m", "largest correction of the position"))
     sigma = report.position_sigma
     if sigma is not None:
         median = f"{number(sigma['median'])} m"
-        facts.append((median, "3D sigma of the corrected position, median"))
-    return [*facts, (thousands(report.cloud_points), "points in the cloud files")]
+        figures.append((median, "3D sigma of the corrected position, median"))
+    return [*figures, (thousands(report.cloud_points), "points in the cloud files")]
 
 
 FRAMES = {

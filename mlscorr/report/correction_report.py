@@ -5,8 +5,8 @@ from dataclasses import asdict, dataclass, field, replace
 import numpy as np
 
 from mlscorr.estimate import DRIFT, REASONS, Jump, NextControl, Support
-from mlscorr.evaluate import DatumDifference, PointCounts, Score, Statistics, TargetRow
-from mlscorr.survey import Assumption, PointCloud
+from mlscorr.evaluate import CheckSigmas, DatumDifference, PointCounts, Score, Statistics, TargetRow
+from mlscorr.survey import Assumption, PointCloud, ProjectNames
 
 GROUPS = ("control", "check", "unused")
 
@@ -115,6 +115,14 @@ class CorrectionReport:
         By what the control that was used differs from the cloud as a whole.
     assumed : tuple of Assumption
         Accuracies of the POS that nobody stated.
+    project : ProjectNames
+        Names that survey.toml gives.
+    recorded : dict or None
+        As mlscorr.report.first_look.recorded_time has it.
+    check_sigmas : CheckSigmas or None
+        Test of the stated sigmas; None without check points.
+    well_determined : float or None
+        Share of the driven distance that lies in no poorly constrained interval, 0 to 1.
     """
 
     name: str
@@ -136,6 +144,10 @@ class CorrectionReport:
     position_sigma: dict[str, float] | None = None
     datum: tuple[DatumDifference, ...] = ()
     assumed: tuple[Assumption, ...] = ()
+    project: ProjectNames = field(default_factory=ProjectNames)
+    recorded: dict[str, str | None] | None = None
+    check_sigmas: CheckSigmas | None = None
+    well_determined: float | None = None
 
     def document(self) -> dict:
         """The content of report.json."""
@@ -164,6 +176,10 @@ class CorrectionReport:
             "assumed": [vars(row) for row in self.assumed],
             "next_control": [place.document() for place in self.next_control],
             **{name: [row.document() for row in getattr(self, name)] for name in rows[1:]},
+            "project": asdict(self.project),
+            "recorded": self.recorded,
+            "check_sigmas": None if self.check_sigmas is None else self.check_sigmas.document(),
+            "well_determined": self.well_determined,
         }
 
     def points(self, role: str) -> PointCounts:

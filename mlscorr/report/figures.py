@@ -3,7 +3,7 @@
 They are SVG for the page and PNG files beside it.
 """
 
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +37,7 @@ from mlscorr.report.style import (
     thin,
 )
 
+PICTURES = ("correction", "map", "residuals", "ties")  # of the figures; the page shows them all
 LEGEND = {
     "control": "Control point: misclosure before, 1 sigma",
     "check": "Check point: misclosure before, 1 sigma",
@@ -47,7 +48,7 @@ LEGEND = {
 def correction_figures(
     correction: Correction, report: CorrectionReport, ties: TieResiduals | None = None
 ) -> Figures:
-    """Functions that draw the figures of a correction, by name.
+    """Functions that draw the figures of a correction, by name, each once.
 
     ``correction``, ``attitude``, ``map``, and ``residuals`` and ``ties`` where there are some.
 
@@ -65,9 +66,9 @@ def correction_figures(
     }
     if report.control.n or report.check.n:
         figures["residuals"] = partial(residual_figure, report)
-    if ties is None:
-        return figures
-    return figures | {"ties": partial(tie_figure, correction, ties)}
+    if ties is not None:
+        figures["ties"] = partial(tie_figure, correction, ties)
+    return {name: cache(draw) for name, draw in figures.items()}
 
 
 def write_pictures(
@@ -75,6 +76,7 @@ def write_pictures(
     correction: Correction,
     report: CorrectionReport,
     ties: TieResiduals | None = None,
+    figures: Figures | None = None,
 ) -> list[Path]:
     """Write correction.png, map.png and, where there are some, residuals.png and ties.png.
 
@@ -86,16 +88,21 @@ def write_pictures(
         Its corrected trajectory may hold the sigmas after the estimate.
     report : CorrectionReport
     ties : TieResiduals, optional
+    figures : dict of functions, optional
+        Those of ``correction_figures``, where a page shows them, too.
 
     Returns
     -------
     list of Path
     """
-    figures = correction_figures(correction, report, ties)
-    del figures["attitude"]
-    paths = [Path(folder) / f"{name}.png" for name in figures]
-    for path, draw in zip(paths, figures.values(), strict=True):
-        path.write_bytes(png(draw()))
+    if figures is None:
+        figures = correction_figures(correction, report, ties)
+    paths = []
+    for name, draw in figures.items():
+        if name in PICTURES:
+            path = Path(folder) / f"{name}.png"
+            path.write_bytes(png(draw()))
+            paths.append(path)
     return paths
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from mlscorr.estimate import SETTINGS as ESTIMATE
-from mlscorr.evaluate import SEEN_BY_OTHERS, PointCounts, reason_in_words
+from mlscorr.evaluate import SEEN_BY_OTHERS, CheckSigmas, PointCounts, reason_in_words
 from mlscorr.report.correction_report import CorrectionReport
 from mlscorr.report.settings import SETTINGS
 from mlscorr.report.tables import AXES
@@ -119,6 +119,20 @@ def statements(report: CorrectionReport) -> list[StatementRow]:
         *assumed_statement(assumed, " until control points show better", "green"),
         *warning_statements(report.model.get("warnings") or ()),
     ]
+
+
+def sigmas_statement(sigmas: CheckSigmas) -> Statement:
+    """Statement on the test of the stated sigmas by check points.
+
+    Parameters
+    ----------
+    sigmas : CheckSigmas
+    """
+    names = ("points", "statistic", "degrees_of_freedom", "limits", "significance", "factor")
+    document = sigmas.document()
+    severity: Severity = "warning" if sigmas.verdict == "too small" else "note"
+    values = {name: document[name] for name in names}
+    return Statement(f"check sigmas {sigmas.verdict}", severity, values)
 
 
 def headline(report: CorrectionReport) -> str:

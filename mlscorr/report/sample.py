@@ -49,6 +49,43 @@ class CloudSample:
             yield self.cloud[first : first + IO_SETTINGS.chunk_points]
 
 
+class CloudSampler:
+    """Gathers the sample of a cloud that passes in chunks.
+
+    Parameters
+    ----------
+    targets : list of TargetRow
+        Those near which points are kept.
+    walls : (k, 3) array
+        Places near which points are kept, too. Units: m.
+    limit : int
+        Of the points spread over the cloud, near targets and near walls: at most twice as many.
+    """
+
+    def __init__(
+        self, targets: list[TargetRow], walls: np.ndarray, limit: int = SETTINGS.sample_points
+    ):
+        self._regions = (_cells(targets), _about(walls, SETTINGS.plan_cell))
+        self._spread = EvenSample(limit)
+        self._near = [EvenSample(limit) for _ in self._regions]
+
+    def add(self, chunk: PointCloud) -> None:
+        """Take what the sample needs of a further chunk."""
+        self._spread.add(chunk)
+        number = _cell_numbers(chunk.xyz)
+        for cells, sample in zip(self._regions, self._near, strict=True):
+            if len(cells) > 1:
+                sample.add(chunk[_is_in(number, cells)])
+
+    @property
+    def sample(self) -> CloudSample:
+        """The sample of all that was added."""
+        parts = [*self._spread.parts]
+        if self._spread.step > 1:
+            parts += [part for near in self._near for part in near.parts]
+        return CloudSample(PointCloud.concatenate(parts), self._spread.step)
+
+
 def gather(
     chunks: Iterable[PointCloud],
     targets: list[TargetRow],
@@ -60,22 +97,25 @@ def gather(
     Parameters
     ----------
     chunks : iterable of PointCloud
-    targets : list of TargetRow
-        Those near which points are kept.
-    walls : (k, 3) array
-        Places near which points are kept, too. Units: m.
-    limit : int
-        Of the points spread over the cloud, near targets and near walls: at most twice as many.
+    targets, walls, limit
+        As of CloudSampler.
     """
-    regions = _cells(targets), _about(walls, SETTINGS.plan_cell)
-    spread = EvenSample(limit)
-    near = [EvenSample(limit) for _ in regions]
+    sampler = CloudSampler(targets, walls, limit)
     for chunk in chunks:
-        spread.add(chunk)
-        for cells, sample in zip(regions, near, strict=True):
-            sample.add(chunk[_is_near(chunk, cells)])
-    parts = spread.parts + (near[0].parts + near[1].parts if spread.step > 1 else [])
-    return CloudSample(PointCloud.concatenate(parts), spread.step)
+        sampler.add(chunk)
+    return sampler.sample
+
+
+def near_rows(xyz: np.ndarray, targets: list[TargetRow]) -> np.ndarray:
+    """Rows of points (n, 3) that a close-up of a target may show.
+
+    Parameters
+    ----------
+    xyz : (n, 3) array
+        Units: m.
+    targets : list of TargetRow
+    """
+    return np.flatnonzero(_is_in(_cell_numbers(xyz), _cells(targets)))
 
 
 def _cells(targets):
@@ -103,7 +143,11 @@ def _number(column, row):
     return column * (1 << 31) + row
 
 
-def _is_near(chunk, cells):
-    """Which points lie in the cells (sorted)."""
-    number = _number(*np.floor(chunk.xyz[:, :2] / SETTINGS.plan_cell).astype(np.int64).T)
+def _cell_numbers(xyz):
+    """Number of the plan cell of each point."""
+    return _number(*np.floor(xyz[:, :2] / SETTINGS.plan_cell).astype(np.int64).T)
+
+
+def _is_in(number, cells):
+    """Which numbers are among those of the cells (sorted)."""
     return cells[np.searchsorted(cells, number)] == number

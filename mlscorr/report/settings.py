@@ -17,6 +17,7 @@ class Settings:
     figure_width: float = 7.6  # inch: A4 without its margins
     dots_per_inch: int = 200  # of PNGs: letters of 8.5 pt stay sharp on paper
     curve_epochs: int = 3000  # rows of a curve: two for each dot of a figure's width
+    locator_width: float = 4.4  # inch, of the small map on the first screen
     longest_arrow: float = 0.12  # of the map's width
     axis_names: int = 60  # more names under an axis would touch each other
 
@@ -28,6 +29,7 @@ class Settings:
     # what is taken of the cloud
     sample_points: int = 1_000_000  # of each part; up to twice as many are gathered; guard
     plan_cell: float = 2.0  # m, of the grid that tells what is near a target, and of walls
+    framing_points: int = 100_000  # that frame the whole survey; more change no pixel
     viewer_points: tuple[int, int] = (36_000, 24_000)  # even and near targets: 3 MB of a page
     shown_points: int = 300_000  # of a page of clouds alone: 6 MB
     shown_extent: float = 100_000.0  # m; float32, in which views draw, holds 4 mm there
@@ -36,6 +38,8 @@ class Settings:
     close_up: tuple[int, int] = (440, 330)  # pixels, as the page shows it: so are its letters
 
     # how pictures are taken of it
+    darkest_median: float = 0.35  # of a scale, where the darker picture has its median
+    strongest_power: float = 4.0  # of the scale, lest noise near zero fill it
     canvas_bytes: float = 400e6  # B: as many views as fit are drawn at once; guard
     picture_sizes: tuple[int, int] = (64, 8192)  # pixels, least and largest width and height; guard
     page_margins: tuple[float, float, float, float] = (0.012, 0.105, 0.11, 0.045)

@@ -9,6 +9,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.font_manager import findfont, get_font
 from matplotlib.lines import Line2D
@@ -170,8 +171,7 @@ def draw(figures: Figures, name: str) -> Figure:
 def svg(figure: Figure) -> bytes:
     """The figure as the bytes of an SVG, coordinates cut to 0.01 pt."""
     stream = io.BytesIO()
-    with matplotlib.rc_context(STYLE):
-        figure.savefig(stream, format="svg", metadata={"Date": None})
+    _save(figure, stream, format="svg", metadata={"Date": None})
     text = stream.getvalue().decode()
     return re.sub(r' d="[^"]*"', lambda d: re.sub(r"(\.\d\d)\d+", r"\1", d[0]), text).encode()
 
@@ -179,11 +179,22 @@ def svg(figure: Figure) -> bytes:
 def png(figure: Figure) -> bytes:
     """The figure as the bytes of a PNG."""
     stream = io.BytesIO()
-    with matplotlib.rc_context(STYLE):
-        figure.savefig(
-            stream, format="png", dpi=SETTINGS.dots_per_inch, metadata={"Software": "mlscorr"}
-        )
+    software = {"Software": "mlscorr"}
+    _save(figure, stream, format="png", dpi=SETTINGS.dots_per_inch, metadata=software)
     return stream.getvalue()
+
+
+def _save(figure, stream, **options):
+    """Save a figure; its layout, most of the work, is found once and kept for further files."""
+    with matplotlib.rc_context(STYLE):
+        figure.savefig(stream, **options)
+    figure.set_layout_engine("none")
+
+
+def wipe(axes: Axes) -> None:
+    """Remove all that was drawn into axes, which can then be drawn into again."""
+    for artist in [*axes.lines, *axes.patches, *axes.texts]:
+        artist.remove()
 
 
 def thin(

@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from mlscorr.evaluate import TargetRow
 from mlscorr.report.settings import SETTINGS
-from mlscorr.report.style import BLUE, MARKS, STYLE, VERMILLION, label, png, styled
+from mlscorr.report.style import BLUE, MARKS, STYLE, VERMILLION, label, png, styled, wipe
 from mlscorr.targets import FittedTarget
 
 BEAMS = ("dark", "bright", "went by")  # 0, 1 and -1 in a TargetView, and so counted as here
@@ -32,14 +32,22 @@ def target_figure(
     note : str
         What is doubtful about it, written in red.
     """
-    figure = Figure(SETTINGS.target_figure)
-    # three lines above it; a layout that is sought takes a third of the time and cuts the first
-    axes = figure.add_axes((0.13, 0.13, 0.85, 0.7))
+    figure, axes = _blank()
     _draw(axes, target)
     _title(axes, target, name, pass_number, note, bool(note))
     return figure
 
 
+def _blank():
+    """A figure and its axes, with three lines above them.
+
+    A layout that is sought takes a third of the time and cuts the first line.
+    """
+    figure = Figure(SETTINGS.target_figure)
+    return figure, figure.add_axes((0.13, 0.13, 0.85, 0.7))
+
+
+@styled
 def target_drawings(
     rows: list[TargetRow], fitted: dict[tuple[int, float], FittedTarget]
 ) -> list[tuple[str, bytes]]:
@@ -52,11 +60,16 @@ def target_drawings(
         FittedTarget by (pass number, gps_time).
     """
     drawings = []
+    figure, axes = _blank()  # new axes for each would take most of the time
     for row in rows:
         target = fitted.get((row.pass_number, row.gps_time))
-        if target is not None:
-            figure = target_figure(target, row.name, row.pass_number, _doubt(row, target))
-            drawings.append((f"{row.name}, pass {row.pass_number}", png(figure)))
+        if target is None:
+            continue
+        note = _doubt(row, target)
+        _draw(axes, target)
+        _title(axes, target, row.name, row.pass_number, note, bool(note))
+        drawings.append((f"{row.name}, pass {row.pass_number}", png(figure)))
+        wipe(axes)
     return drawings
 
 

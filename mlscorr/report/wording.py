@@ -560,6 +560,30 @@ def _inputs_differ(count, all):
     return f"{count} of {counted(all, 'input')} differ:"
 
 
+CORRELATED = (
+    "The residuals of neighboring check points are correlated, which the test disregards: a narrow "
+    "miss proves little."
+)
+
+
+def _check_sigmas(relation: str, consequence: str) -> Callable[..., str]:
+    """A sentence on the test of check points, by how their residuals relate to the sigmas."""
+
+    def sentence(points, statistic, degrees_of_freedom, limits, significance, factor):
+        inside = "within"
+        if consequence:
+            inside = "outside"
+        return (
+            f"The residuals of {counted(points, 'check point')} {relation} their stated sigmas: "
+            f"chi-squared is {statistic:.1f} with {degrees_of_freedom} degrees of freedom, "
+            f"{inside} its limits {limits[0]:.1f} and {limits[1]:.1f} "
+            f"({percent(1 - significance)}). "
+            f"{consequence.format(factor=factor)}{CORRELATED}"
+        )
+
+    return sentence
+
+
 SENTENCES: dict[str, Wording] = {
     "nothing to judge by": "There is no surveyed point that could tell how good the correction is.",
     "no target to judge by": "No target was found that could tell how good the correction is.",
@@ -606,6 +630,16 @@ SENTENCES: dict[str, Wording] = {
     "stated sigma": lambda sigma: f"The POS states {length_in_words(sigma)} of the recorded one.",
     "assumed": _assumed,
     "warnings": lambda count: f"{counted(count, 'warning')}:",
+    "check sigmas hold": _check_sigmas("agree with", ""),
+    "check sigmas too small": _check_sigmas(
+        "exceed",
+        "The sigmas are too small by a factor of about {factor:.1f}, or some check points are "
+        "wrong. ",
+    ),
+    "check sigmas too large": _check_sigmas(
+        "are smaller than",
+        "The sigmas are pessimistic: residuals are about {factor:.2f} times as large. ",
+    ),
     "no ties": "{reason}",
     "unused ties": _unused_ties,
     "ties": _ties_apart,

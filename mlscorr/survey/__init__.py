@@ -29,6 +29,7 @@ from mlscorr.survey.recording import (
     InputFile,
     MountedScanner,
     Pos,
+    ProjectNames,
     Scanner,
     Survey,
     SurveyFileError,

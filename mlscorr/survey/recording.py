@@ -117,6 +117,37 @@ class InputFile:
 
 
 @dataclass(frozen=True)
+class ProjectNames:
+    """Names that head a report and a certificate; empty where nobody gave one.
+
+    Parameters
+    ----------
+    title, client, project, instrument, operator : str
+
+    >>> from mlscorr.survey import ProjectNames
+    >>> ProjectNames(client="City of Wuhan").known
+    {'Client': 'City of Wuhan'}
+    """
+
+    title: str = ""
+    client: str = ""
+    project: str = ""
+    instrument: str = ""
+    operator: str = ""
+
+    @property
+    def known(self) -> dict[str, str]:
+        """Those given but the title, by what they are, in the order of a title page."""
+        names = {
+            "Client": self.client,
+            "Project": self.project,
+            "Instrument": self.instrument,
+            "Operator": self.operator,
+        }
+        return {what: name for what, name in names.items() if name}
+
+
+@dataclass(frozen=True)
 class MountedScanner:
     """One of several scanners on a vehicle.
 
@@ -173,6 +204,7 @@ class Survey(Summary):
         Names of the control points by which the trajectory, and the clouds, were corrected before.
     is_remounted : bool
         Whether a calibration changed the mounting, and the clouds are as it was recorded before.
+    project : ProjectNames
     beam_origin : (3,) array, optional
         Where the beams come from in body axes, as the cloud shows it, where no mounting is given.
         Units: m.
@@ -201,6 +233,7 @@ class Survey(Summary):
     scanners: tuple[MountedScanner, ...] = ()
     corrected_by: tuple[str, ...] = ()
     is_remounted: bool = False
+    project: ProjectNames = field(default_factory=ProjectNames)
     beam_origin: np.ndarray | None = None
     excluded: ControlPoints = field(default_factory=ControlPoints.none)
     included: tuple[str, ...] = ()

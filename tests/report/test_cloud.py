@@ -9,6 +9,7 @@ from mlscorr.report.cloud import CloudViews, close_ups, viewer_data
 from mlscorr.report.correction_page import write_report
 from mlscorr.report.render import Picture
 from mlscorr.report.render._views import View
+from mlscorr.report.render.quantities import ColourScale
 from mlscorr.report.render.view import Camera
 from mlscorr.report.settings import SETTINGS
 from tests.beds.reports import drive, fabricate, words
@@ -41,7 +42,7 @@ def test_24_targets_fit_in_15_megabytes_whatever_they_look_like(tmp_path):
     def picture(name, size):
         camera = Camera.towards(ORIGIN, 0.0, 30.0, 100.0, size)
         sides = rng.integers(0, 256, (2, size[1], size[0], 3), dtype=np.uint8)
-        return Picture(View(name, name, "", camera, "intensity"), *sides, (0.0, 1.0))
+        return Picture(View(name, name, "", camera, "intensity"), *sides, ColourScale(0.0, 1.0))
 
     names = [f"target-{row.name}" for row in report.targets[:3]]
     close = [picture(name, SETTINGS.close_up) for name in names]

@@ -20,7 +20,7 @@ def test_the_page_needs_nothing_but_itself(tmp_path):
     html = page(tmp_path, *fabricate(drive()))
     links = Links(html)
     inside = [link for link in links.links if link.startswith("#")]
-    assert len(links.links) - len(inside) == 4 and inside
+    assert len(links.links) - len(inside) == 5 and inside
     assert all(
         link.startswith("data:image/svg+xml;base64,") or link in inside for link in links.links
     )

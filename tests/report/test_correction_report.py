@@ -64,6 +64,7 @@ def test_the_document_has_its_parts_in_order():
         *("coverage", "ties", "weak", "drift", "jumps", "position_sigma", "assumed"),
         "next_control",
         *("files", "inputs", "outputs"),
+        *("project", "recorded", "check_sigmas", "well_determined"),
     ]
     assert list(content["targets"][0])[:4] == ["name", "pass", "gps_time", "role"]
     for role, n in (("control", 6), ("check", 2)):

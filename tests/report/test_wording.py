@@ -22,6 +22,13 @@ COMPONENTS = [
     {"name": "lever arm up", "lsc": 0.424, "lsc_sigma": 0.041, "unit": "m", "determined": False},
 ]
 
+SIGMA_TEST = {
+    "points": 8,
+    "degrees_of_freedom": 24,
+    "limits": (12.4, 39.36),
+    "significance": 0.05,
+    "factor": 1.0,
+}
 CATALOGUE = [
     (
         "nothing to judge by",
@@ -563,6 +570,30 @@ CATALOGUE = [
     ("inputs differ", {"count": 1, "all": 4}, "1 of 4 inputs differ:"),
     ("inputs differ", {"count": 0, "all": 4}, "All 4 inputs have the same contents."),
     ("warnings of one", {"count": 1}, "1 warning stands in one result only:"),
+    (
+        "check sigmas hold",
+        SIGMA_TEST | {"statistic": 20.14},
+        "The residuals of 8 check points agree with their stated sigmas: chi-squared is 20.1 with "
+        "24 degrees of freedom, within its limits 12.4 and 39.4 (95 %). The residuals of "
+        "neighboring check points are correlated, which the test disregards: a narrow miss proves "
+        "little.",
+    ),
+    (
+        "check sigmas too small",
+        SIGMA_TEST | {"statistic": 60.0, "factor": 1.58},
+        "The residuals of 8 check points exceed their stated sigmas: chi-squared is 60.0 with 24 "
+        "degrees of freedom, outside its limits 12.4 and 39.4 (95 %). The sigmas are too small by "
+        "a factor of about 1.6, or some check points are wrong. The residuals of neighboring "
+        "check points are correlated, which the test disregards: a narrow miss proves little.",
+    ),
+    (
+        "check sigmas too large",
+        SIGMA_TEST | {"statistic": 9.2, "factor": 0.62},
+        "The residuals of 8 check points are smaller than their stated sigmas: chi-squared is 9.2 "
+        "with 24 degrees of freedom, outside its limits 12.4 and 39.4 (95 %). The sigmas are "
+        "pessimistic: residuals are about 0.62 times as large. The residuals of neighboring check "
+        "points are correlated, which the test disregards: a narrow miss proves little.",
+    ),
 ]
 
 

@@ -57,8 +57,6 @@ def read_chunks(
         yield from cloud_file.chunks(chunk_size, first, end)
         return
     layout = in_time_order(read_layout(cloud_file.path), cloud_file.new_week)
-    scale = layout.scale
-    offset = layout.offset
     flagged = read = 0
     for whole in read_records(layout, chunk_size, first, end):
         records = whole[cloud_file.rows(whole["point_source_id"])]
@@ -67,16 +65,8 @@ def read_chunks(
         if is_noise.any():
             flagged += int(np.count_nonzero(is_noise))
             records = records[~is_noise]
-        xyz = np.empty((len(records), 3))
-        for axis, name in enumerate("XYZ"):
-            np.multiply(records[name], scale[axis], out=xyz[:, axis])
-        xyz += offset
-        times = cloud_file.trajectory_time(records["gps_time"])
-        cloud = PointCloud(xyz, times, records["intensity"].copy())
-        is_timed = np.isfinite(times)
-        if is_timed.any():
-            if not is_timed.all():
-                cloud = cloud[is_timed]
+        cloud = timed_points(cloud_file, layout, records)
+        if len(cloud):
             yield cloud
     count = _count.get()
     if count is not None:
@@ -84,6 +74,27 @@ def read_chunks(
         if first > 0 or end not in (None, layout.points):
             part = (first, end or layout.points)
         count.add(cloud_file, part, flagged, read)
+
+
+def timed_points(file: CloudFile, layout: LasLayout, records: np.ndarray) -> PointCloud:
+    """Points of records whose gps_time is a number, with times in the trajectory's system.
+
+    Parameters
+    ----------
+    file : CloudFile
+    layout : LasLayout
+    records : (n,) structured array
+    """
+    xyz = np.empty((len(records), 3))
+    for axis, name in enumerate("XYZ"):
+        np.multiply(records[name], layout.scale[axis], out=xyz[:, axis])
+    xyz += layout.offset
+    times = file.trajectory_time(records["gps_time"])
+    cloud = PointCloud(xyz, times, records["intensity"].copy())
+    is_timed = np.isfinite(times)
+    if is_timed.all():
+        return cloud
+    return cloud[is_timed]
 
 
 def read_cloud(

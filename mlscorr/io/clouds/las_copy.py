@@ -11,7 +11,7 @@ from laspy.vlrs.known import ExtraBytesStruct, ExtraBytesVlr
 
 from mlscorr.correction import PointSigma, require_fit
 from mlscorr.io.clouds._copc_writer import CopcWriter
-from mlscorr.io.clouds.las import read_records, records_at
+from mlscorr.io.clouds.las import read_records, records_at, timed_points
 from mlscorr.io.clouds.las_checks import read_layout, variable_records
 from mlscorr.io.clouds.las_layout import LasLayout
 from mlscorr.io.clouds.las_writer import INTEGER_LIMIT, LasOutput, PlainWriter, cloud_writer
@@ -81,6 +81,8 @@ class CorrectedPart:
         with which points are flagged as noise (n,).
     additions : Additions
         Displacement and provenance; sigmas go by ``sigma``. The same for all parts of a file.
+    sample : function, optional
+        Called for each chunk, before it is corrected, with its points as ``read_chunks`` has them.
     """
 
     file: CloudFile
@@ -88,6 +90,7 @@ class CorrectedPart:
     sigma: PointSigma | None = None
     watch: Callable[[np.ndarray, np.ndarray], object] | None = None
     additions: Additions = NOTHING_ADDED
+    sample: Callable[[PointCloud], object] | None = None
 
     @property
     def added(self) -> Additions:
@@ -106,6 +109,10 @@ class CorrectedPart:
         """
         rows = self.file.rows(records["point_source_id"])
         some = records[rows]
+        if self.sample is not None and len(some):
+            is_noise = layout.is_noise(some, self.file.noise_classes)
+            measured = some[~is_noise] if is_noise.any() else some
+            self.sample(timed_points(self.file, layout, measured))
         xyz = [some[name] for name in "XYZ"]
         times = self.file.counted(some["gps_time"])
         scaled = layout.scale, layout.offset, times, self.file.time_constant
@@ -139,6 +146,8 @@ def _write_points(part, file, target):
     outside = 0
     with cloud_writer(target, file.cloud.xyz[0], file.crs) as writer:
         for chunk in file.chunks(SETTINGS.chunk_points):
+            if part.sample is not None:
+                part.sample(chunk)
             if hasattr(part.correction, "increments"):
                 added, inside = part.correction.increments(chunk.xyz, chunk.gps_time)
                 places = chunk.xyz + added
@@ -241,7 +250,7 @@ class _Corrected:
         if is_final:
             parts = self._parts
         else:
-            parts = [replace(part, watch=None) for part in self._parts]
+            parts = [replace(part, watch=None, sample=None) for part in self._parts]
         self.outside = np.zeros(len(parts), int)
         self.untimed = dict.fromkeys((np.nan, *PLACEHOLDERS), 0)
         self.bounds = np.array([np.full(3, -np.inf), np.full(3, np.inf)])

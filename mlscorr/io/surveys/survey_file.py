@@ -200,6 +200,7 @@ class SurveyParts:
             scanners=scanners,
             corrected_by=tuple(n for part in settings.trajectories for n in part.corrected_by),
             is_remounted=settings.cloud is not None and settings.cloud.mounting == "recorded",
+            project=settings.project.names(),
         )
         if settings.control is None:
             return survey

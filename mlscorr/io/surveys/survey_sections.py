@@ -12,7 +12,14 @@ from scipy.spatial.transform import Rotation
 from mlscorr.io.store import Degrees, Meters, PointSource, Positive, Share, Six, Three, TomlSection
 from mlscorr.io.tables import ControlSection
 from mlscorr.io.trajectories import SessionSection, TrajectorySection
-from mlscorr.survey import NOISE_CLASSES, SEARCH_RADIUS, Mounting, Pos, Scanner
+from mlscorr.survey import (
+    NOISE_CLASSES,
+    SEARCH_RADIUS,
+    Mounting,
+    Pos,
+    ProjectNames,
+    Scanner,
+)
 
 NoiseClasses = Annotated[
     list[Annotated[int, Field(ge=0, le=255)]],  # 8 bits of a LAS point
@@ -174,6 +181,21 @@ class SceneSection(TomlSection):
     reference: str | None = None
 
 
+class ProjectSection(TomlSection):
+    """Names that head the report and the certificate."""
+
+    title: str | None = None
+    client: str | None = None
+    project: str | None = None
+    instrument: str | None = None
+    operator: str | None = None
+
+    def names(self) -> ProjectNames:
+        """The same as a noun, without the blanks around a name."""
+        stripped = {key: (value or "").strip() for key, value in self.model_dump().items()}
+        return ProjectNames(**stripped)
+
+
 class CommonSections(TomlSection):
     """What stands in the survey.toml of a drive, and in the project.toml of several."""
 
@@ -193,6 +215,7 @@ class PlannedSurveyFile(CommonSections):
     cloud: CloudSection | None = None
     trajectory: Trajectories
     scene: SceneSection = SceneSection()
+    project: ProjectSection = ProjectSection()
 
     @model_validator(mode="after")
     def _parts_scanners(self) -> Self:

@@ -32,6 +32,7 @@ from mlscorr.io.trajectories.time_systems import (
     WEEK,
     TimeMatch,
     count_on,
+    gps_epoch,
     lacks_time,
     listed_times,
     match_times,

@@ -6,6 +6,7 @@ plain GPS seconds are found under either flag.
 """
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import date, datetime, timedelta
 from importlib.resources import files
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mlscorr.io.settings import SETTINGS
-from mlscorr.survey import WEEK, Trajectory, counted_on
+from mlscorr.survey import WEEK, CloudFile, Trajectory, counted_on
 from mlscorr.wording import percent
 
 EPOCH = date(1980, 1, 6)  # when both were the same
@@ -315,6 +316,35 @@ def utc_lag(*times: np.ndarray) -> int:
             # of garbage too, to the 23rd century
             return leap_seconds(EPOCH + timedelta(days=np.clip(seconds / DAY, 0, 1e5)))
     return leap_seconds(date.max)
+
+
+def gps_epoch(trajectory: Trajectory, clouds: Sequence[CloudFile]) -> datetime | None:
+    """Date and time at which a trajectory's gps_time is zero, in GPS time.
+
+    Seconds of the week tell no date; a cloud of the drive whose times count on does.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    clouds : sequence of CloudFile
+
+    Returns
+    -------
+    datetime.datetime or None
+        None where no file states the week.
+    """
+    start = datetime.combine(EPOCH, datetime.min.time())
+    continuous = {"standard": ADJUSTMENT, "gps": 0.0}
+    system = usual_systems(trajectory.gps_time)[0]
+    if system in continuous:
+        return start + timedelta(seconds=continuous[system])
+    for cloud in clouds:
+        if cloud.time_system not in continuous:
+            continue
+        seconds = continuous[cloud.time_system] - cloud.time_constant
+        if seconds % WEEK == 0:  # else times of the header's own offset
+            return start + timedelta(seconds=seconds)
+    return None
 
 
 def leap_seconds(day: date) -> int:

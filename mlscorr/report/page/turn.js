@@ -50,5 +50,12 @@
   });
   const choice = view.querySelector("select"), named = new Map(scene.targets.map(target => [target.name, target]));
   for (const name of [...named.keys()].sort((a, b) => a.localeCompare(b, "en", { numeric: true }))) choice.append(new Option(name, name));
-  choice.addEventListener("change", () => { const target = named.get(choice.value); if (target) shown.goTo(target.surveyed, facing(target)); else shown.goTo(null); });
+  const show = () => { const target = named.get(choice.value); if (target) shown.goTo(target.surveyed, facing(target)); else shown.goTo(null); };
+  choice.addEventListener("change", show);
+  document.addEventListener("click", event => { // rows of tables lead to their target or place
+    const link = event.target.closest("a[data-target], a[data-place]");
+    if (!link) return;
+    if (link.dataset.place === undefined) { choice.value = link.dataset.target; show(); }
+    else { choice.value = ""; shown.goTo(link.dataset.place.split(",").map((value, k) => value - scene.origin[k]), 0); }
+  });
 })();

@@ -15,7 +15,7 @@ import numpy as np
 
 from mlscorr.report.render._zbuffer import Canvas
 from mlscorr.report.render.picture import Picture
-from mlscorr.report.render.quantities import GHOST, PAIRS, CloudPair, limits, paint, rgb
+from mlscorr.report.render.quantities import GHOST, PAIRS, CloudPair, colour_scale, paint, rgb
 from mlscorr.report.render.view import View
 from mlscorr.report.settings import SETTINGS
 
@@ -67,22 +67,22 @@ class Sheet:
         if view.is_cut:  # a few points in a row are all there is to see
             radius = max(radius, 0.004 * view.camera.size[0])
         pair = [canvas.grown(radius) for canvas in self.canvases]
-        ends = limits(view.colour, *(canvas.value for canvas in pair))
+        scale = colour_scale(view.colour, *(canvas.value for canvas in pair))
         if by_open3d:
-            colours = [paint(view.colour, canvas.value, ends) for canvas in self.canvases]
+            colours = [paint(view.colour, canvas.value, scale) for canvas in self.canvases]
             surface = reference if np.isinf(view.half_depth) else None  # it would hide a slice
             before, after = draw_pair(self.canvases, colours, 2 * radius + 1, surface)
         else:
-            before, after = (_side(view, pair[k], pair[1 - k], ends) for k in (0, 1))
-        return Picture(view, before, after, ends)
+            before, after = (_side(view, pair[k], pair[1 - k], scale) for k in (0, 1))
+        return Picture(view, before, after, scale)
 
 
-def _side(view, canvas, other, ends):
+def _side(view, canvas, other, scale):
     """RGB (h, w, 3) of a canvas on white paper."""
     pixels = np.full((*canvas.pixels.shape, 3), 255, np.uint8)
     if view.colour == "state":
         pixels[other.drawn] = rgb(GHOST)[0]
-    colours = paint(view.colour, canvas.value, ends)
+    colours = paint(view.colour, canvas.value, scale)
     if np.isinf(view.half_depth) and view.colour not in PAIRS:  # in a thin slice edges of single
         colours = np.round(colours * canvas.light[..., None]).astype(np.uint8)  # points are noise
     pixels[canvas.drawn] = colours[canvas.drawn]

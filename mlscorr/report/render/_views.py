@@ -27,7 +27,8 @@ def overview(scouted: Scouted, rows: list[TargetRow], options: PictureOptions) -
         Those observed.
     options : PictureOptions
     """
-    xyz = scouted.before.xyz
+    step = -(-len(scouted.before) // SETTINGS.framing_points)
+    xyz = scouted.before.xyz[::step]
     low, high = np.percentile(xyz, [0.5, 99.5], axis=0)
     focus = np.append((low + high)[:2] / 2, np.median(xyz[:, 2]))
     from_above = (high - low)[:2].min() > SETTINGS.largest_street

@@ -5,16 +5,19 @@ from dataclasses import dataclass
 
 import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
 from mlscorr.report.render import symbols
+from mlscorr.report.render.quantities import ColourScale
 from mlscorr.report.render.view import View
 from mlscorr.report.settings import SETTINGS
-from mlscorr.report.style import STYLE, label
+from mlscorr.report.style import STYLE, label, wipe
 
 GAP, HEAD, FOOT, STACK_GAP = SETTINGS.page_margins
+Easels = dict[tuple[int, int], tuple[Figure, Axes]]
 
 
 @dataclass(frozen=True)
@@ -26,33 +29,44 @@ class Picture:
     view : View
     before, after : (h, w, 3) array of uint8
         RGB.
-    limits : (float, float)
-        Ends of the colour scale.
+    scale : ColourScale
     """
 
     view: View
     before: np.ndarray
     after: np.ndarray
-    limits: tuple[float, float]
+    scale: ColourScale
 
     @property
     def name(self) -> str:
         """A name for a file, without suffix."""
         return "".join(c if c.isalnum() or c in "-_." else "_" for c in self.view.name)
 
-    def panels(self, decorated: bool = True) -> tuple[bytes, ...]:
+    def panels(self, decorated: bool = True, easels: Easels | None = None) -> tuple[bytes, ...]:
         """The bytes of two PNGs, before and after, for one to be laid over the other.
 
-        Undecorated they are the points alone, pixel by pixel.
+        Parameters
+        ----------
+        decorated : bool
+            Without, they are the points alone, pixel by pixel.
+        easels : dict, optional
+            Figures to draw on by their size, which many pictures share: a new one takes longer
+            than what is drawn on it.
         """
         pair = [self.before, self.after]
         if decorated:
             corner = symbols.free_corner(*pair)
             height, width = self.before.shape[:2]
-            for k in (0, 1):
+            easels = {} if easels is None else easels
+            if (width, height) not in easels:
                 figure = _blank(width, height)
-                _panel(figure, self.view, k, pair[k], (0, 0), corner)
+                easels[width, height] = (figure, _panel_axes(figure, (width, height), (0, 0)))
+            figure, axes = easels[width, height]
+            for k in (0, 1):
+                _panel(axes, self.view, k, pair[k], (0, 0), corner)
                 pair[k] = _drawn(figure)
+                wipe(axes)
+                figure.images.clear()
         both = _few_colours(np.concatenate(pair))  # the same colours in both
         width = both.width
         half = both.height // 2
@@ -70,10 +84,11 @@ class Picture:
         corner = symbols.free_corner(self.before, self.after)
         corners = _panel_corners(self.view.camera.size, size)
         for k, words in enumerate(("Before the correction", "After the correction")):
-            axes = _panel(figure, self.view, k, (self.before, self.after)[k], corners[k], corner)
+            axes = _panel_axes(figure, self.view.camera.size, corners[k])
+            _panel(axes, self.view, k, (self.before, self.after)[k], corners[k], corner)
             axes.set_title(words, fontsize=symbols.letter(axes, 1.0), color="#333333", loc="left")
         _words(figure, self.view, corners[0][0] / size[0])
-        symbols.legend(figure, self.view, self.limits, (GAP, FOOT))
+        symbols.legend(figure, self.view, self.scale, (GAP, FOOT))
         return _png(_few_colours(_drawn(figure)))
 
 
@@ -123,22 +138,28 @@ def _drawn(figure):
     return np.asarray(figure.canvas.buffer_rgba())[..., :3].copy()
 
 
-def _panel(figure, view, k, pixels, corner, free):
-    """The points of one side, pixel by pixel, under its marks, with scale and compass; its axes."""
-    height, width = pixels.shape[:2]
+def _panel_axes(figure, size, corner):
+    """Axes in pixels for a panel whose upper left corner is there on the figure."""
+    width, height = size
     wide = figure.bbox.width
     high = figure.bbox.height
     bottom = high - corner[1] - height
-    figure.figimage(pixels, corner[0], bottom, origin="upper", zorder=-1)
     axes = figure.add_axes((corner[0] / wide, bottom / high, width / wide, height / high))
     axes.set(xlim=(0, width), ylim=(height, 0), xticks=[], yticks=[], facecolor="none")
     axes.spines[:].set(visible=True, color="#bbbbbb", linewidth=0.8)
+    return axes
+
+
+def _panel(axes, view, k, pixels, corner, free):
+    """Draw the points of one side, pixel by pixel, under its marks, with scale and compass."""
+    figure = axes.figure
+    bottom = figure.bbox.height - corner[1] - pixels.shape[0]
+    figure.figimage(pixels, corner[0], bottom, origin="upper", zorder=-1)
     for mark in view.marks[k]:
         _mark(axes, mark, view.camera)
     _names(axes, view.marks[k], view.camera)
     symbols.scale_bar(axes, view.camera)
     symbols.compass(axes, view.camera, free)
-    return axes
 
 
 def _mark(axes, mark, camera):

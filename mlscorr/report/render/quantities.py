@@ -1,11 +1,12 @@
 """What a picture shows by colour: a number for each point, before and after."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import matplotlib
 import numpy as np
 
 from mlscorr.correction import Correction, PointSigma
+from mlscorr.report.settings import SETTINGS
 from mlscorr.report.style import AFTER, BEFORE, BLACK, BLUE, GREEN, GREY, ORANGE, SKY, VERMILLION
 from mlscorr.survey import PointCloud, Scanner, Trajectory
 
@@ -25,6 +26,34 @@ LABELS = {
 GHOST = "#c9c9c9"  # the other state, behind
 PAIRS = {"visit": (BLUE, VERMILLION, GREEN, ORANGE, SKY, BLACK), "state": (BEFORE, AFTER)}
 STATES = ("as recorded", "corrected", "the other of the two")
+
+
+@dataclass(frozen=True)
+class ColourScale:
+    """A scale of colours from a low to a high value, by a power of the share between them.
+
+    Parameters
+    ----------
+    low, high : float
+    exponent : float
+        1 is linear; below it, small values take more of the colours.
+
+    >>> ColourScale(0.0, 0.4, 0.5).middle
+    0.1
+    """
+
+    low: float
+    high: float
+    exponent: float = 1.0
+
+    def share(self, value: np.ndarray) -> np.ndarray:
+        """Place of values on the scale, 0 to 1."""
+        return np.clip((value - self.low) / (self.high - self.low), 0, 1) ** self.exponent
+
+    @property
+    def middle(self) -> float:
+        """Value of the colour in the middle."""
+        return self.low + (self.high - self.low) * 0.5 ** (1 / self.exponent)
 
 
 @dataclass(frozen=True)
@@ -101,8 +130,12 @@ def percentiles(values: np.ndarray) -> np.ndarray:
     return np.percentile(values, [1.0, 99.0])
 
 
-def limits(colour: str, *values: np.ndarray) -> tuple[float, float]:
-    """Ends of the colour scale: one scale for all pictures.
+def colour_scale(colour: str, *values: np.ndarray) -> ColourScale:
+    """One scale for all pictures of a view, by which the darkest of them shows structure, too.
+
+    Its exponent lifts the median of the darkest picture to ``SETTINGS.darkest_median``. Without it
+    a cloud of a few centimeters beside one of decimeters, or a road beside a bright target, is one
+    dark mass.
 
     Parameters
     ----------
@@ -110,29 +143,31 @@ def limits(colour: str, *values: np.ndarray) -> tuple[float, float]:
     *values : (h, w) arrays
         NaN where there is nothing.
     """
-    finite = np.concatenate([v[np.isfinite(v)] for v in values])
-    if colour in PAIRS or len(finite) == 0:
-        return 0.0, 1.0
-    low, high = percentiles(finite).tolist()
-    if colour != "height":  # noise of a target alone would fill the whole scale
-        low = 0.0
-    return low, max(high, low + 1e-3)
+    sides = [side for side in (v[np.isfinite(v)] for v in values) if len(side)]
+    if colour in PAIRS or not sides:
+        return ColourScale(0.0, 1.0)
+    low, high = percentiles(np.concatenate(sides)).tolist()
+    if colour == "height":
+        return ColourScale(low, max(high, low + 1e-3))
+    linear = ColourScale(0.0, max(high, 1e-3))  # from its low, noise would fill the whole scale
+    darkest = min(float(np.median(linear.share(side))) for side in sides)
+    darkest = max(darkest, SETTINGS.darkest_median**SETTINGS.strongest_power)
+    exponent = min(1.0, np.log(SETTINGS.darkest_median) / np.log(min(darkest, 0.999)))
+    return replace(linear, exponent=float(exponent))
 
 
-def paint(colour: str, value: np.ndarray, ends: tuple[float, float]) -> np.ndarray:
+def paint(colour: str, value: np.ndarray, scale: ColourScale) -> np.ndarray:
     """RGB (h, w, 3) uint8 of values, grey where the value is NaN.
 
     Parameters
     ----------
     colour : str
     value : (h, w) array
-    ends : (float, float)
-        Of the colour scale.
+    scale : ColourScale
     """
     if colour in PAIRS:
         return rgb(*PAIRS[colour])[np.nan_to_num(value).astype(int) % len(PAIRS[colour])]
-    share = np.clip((value - ends[0]) / (ends[1] - ends[0]), 0, 1)
-    picture = colour_table(colour)[np.nan_to_num(share * 255).astype(np.uint8)]
+    picture = colour_table(colour)[np.nan_to_num(scale.share(value) * 255).astype(np.uint8)]
     picture[np.isnan(value)] = rgb(GREY)
     return picture
 

@@ -11,7 +11,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
-from mlscorr.report.render.quantities import LABELS, colour_table, swatches
+from mlscorr.report.render.quantities import LABELS, ColourScale, colour_table, swatches
 from mlscorr.report.render.view import Camera
 from mlscorr.report.style import mark_handle, nice
 
@@ -105,17 +105,14 @@ def compass(axes: Axes, camera: Camera, corner: tuple[int, int]) -> None:
         )
 
 
-def legend(
-    figure: Figure, view: Any, limits: tuple[float, float], margins: tuple[float, float]
-) -> None:
+def legend(figure: Figure, view: Any, scale: ColourScale, margins: tuple[float, float]) -> None:
     """What colours and marks mean, in the foot of the page.
 
     Parameters
     ----------
     figure : Figure
     view : View
-    limits : (float, float)
-        Ends of the colour scale.
+    scale : ColourScale
     margins : (float, float)
         Beside the panels and below them, over width and height of the page.
     """
@@ -123,7 +120,7 @@ def legend(
     place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (gap, 0.01)}
     if view.colour in LABELS:
         place = {"loc": "center left", "bbox_to_anchor": (0.5, foot / 2 + 0.012)}
-        _colour_bar(figure, view.colour, limits, (1.5 * gap, foot * 0.50, 0.40, foot * 0.14))
+        _colour_bar(figure, view.colour, scale, (1.5 * gap, foot * 0.50, 0.40, foot * 0.14))
     handles = list(_handles(view))
     if handles:
         figure.legend(
@@ -137,17 +134,28 @@ def legend(
         )
 
 
-def _colour_bar(figure, colour, limits, place):
+def _colour_bar(figure, colour, scale, place):
     words, unit = LABELS[colour]
     axes = figure.add_axes(place)
-    axes.imshow(colour_table(colour)[None], aspect="auto", extent=(*limits, 0, 1))
+    axes.imshow(colour_table(colour)[None], aspect="auto", extent=(0, 1, 0, 1))
     axes.set_yticks([])
     size = letter(figure, 0.85)
     axes.tick_params(labelsize=size, length=3)
-    axes.xaxis.set_major_locator(MaxNLocator(6))
+    values = MaxNLocator(6).tick_values(scale.low, scale.high)
+    values = values[(values >= scale.low) & (values <= scale.high)]
+    if scale.exponent < 1:  # where even steps would crowd at the end
+        values = np.array([scale.low, *_quarters(scale), scale.high])
+    axes.set_xticks(scale.share(values), [f"{value:.2g}" for value in values])
     if unit:
         words = f"{words} ({unit})"
     axes.set_title(words, fontsize=size, loc="left", pad=4)
+
+
+def _quarters(scale):
+    """Values at a quarter, the half and three quarters of a scale."""
+    return scale.low + (scale.high - scale.low) * np.array([0.25, 0.5, 0.75]) ** (
+        1 / scale.exponent
+    )
 
 
 def _handles(view) -> Iterator[Line2D]:

@@ -12,7 +12,7 @@ import pytest
 from mlscorr.io.surveys import read_survey
 from mlscorr.io.surveys.survey_file import read_survey_file
 from mlscorr.io.tables import read_control
-from mlscorr.survey import Pos, Scanner
+from mlscorr.survey import Pos, ProjectNames, Scanner
 from tests.beds.shared import shared
 
 TOML = """
@@ -777,4 +777,17 @@ def test_keys_of_one_of_several_do_not_stand_in_a_single_section(folder):
     with pytest.raises(
         ValueError, match=r"scanner.files .* write \[\[scanner\]\], not \[scanner\]"
     ):
+        read_survey(folder)
+
+
+def test_names_of_the_project_head_what_is_handed_over(folder):
+    "All five are optional texts; a key that is none of them is refused with the nearest one"
+    assert read_survey(folder).project == ProjectNames()
+    section = '\n[project]\ntitle = " Ring road "\nclient = "City"\noperator = "J. Meyer"\n'
+    (folder / "survey.toml").write_text(TOML + section)
+    names = read_survey(folder).project
+    assert names == ProjectNames(title="Ring road", client="City", operator="J. Meyer")
+    assert names.known == {"Client": "City", "Operator": "J. Meyer"}
+    (folder / "survey.toml").write_text(TOML + '\n[project]\nclent = "City"\n')
+    with pytest.raises(ValueError, match="client"):
         read_survey(folder)

@@ -5,7 +5,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mlscorr.report.render import colour_table
-from mlscorr.report.render.quantities import COLOURS, CloudPair, limits, paint, point_sigma
+from mlscorr.report.render.quantities import (
+    COLOURS,
+    CloudPair,
+    colour_scale,
+    paint,
+    point_sigma,
+)
 from mlscorr.survey import PointCloud, Trajectory
 from tests.beds.street_of_points import ORIGIN, START
 
@@ -37,9 +43,9 @@ def test_every_colour_has_a_value_before_and_after(colour):
     before, after = CloudPair(cloud, moved, (None, None)).values(colour)
     expected = {"intensity": [1, 3], "height": [42, 42], "correction": [0.5, 0.5]}
     np.testing.assert_allclose(before, expected.get(colour, [np.nan] * 2))
-    ends = limits(colour, before, after)
-    pixels = paint(colour, np.array([before]), ends)
-    assert pixels.shape == (1, 2, 3) and ends[0] < ends[1]
+    scale = colour_scale(colour, before, after)
+    pixels = paint(colour, np.array([before]), scale)
+    assert pixels.shape == (1, 2, 3) and scale.low < scale.high
     assert (colour == "sigma") == (pixels == 0x76).all()
 
 

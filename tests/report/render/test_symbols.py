@@ -4,6 +4,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from mlscorr.report.render._views import Mark, View
+from mlscorr.report.render.quantities import ColourScale
 from mlscorr.report.render.symbols import compass, free_corner, legend, letter, scale_bar
 from mlscorr.report.render.view import Camera
 from tests.beds.street_of_points import ORIGIN, SIZE
@@ -49,7 +50,7 @@ def test_the_legend_names_what_the_view_shows():
     for colour, words in (("height", "Where the target"), ("visit", "Scanned at the first")):
         figure = Figure(figsize=(9, 5), dpi=100)
         view = View("a", "", "", camera, colour, marks=((outline,), (outline,)))
-        legend(figure, view, (0.0, 1.0), (0.012, 0.11))
+        legend(figure, view, ColourScale(0.0, 1.0), (0.012, 0.11))
         labels = [text.get_text() for text in figure.legends[0].texts]
         assert any(label.startswith(words) for label in labels)
         assert len(figure.axes) == (colour == "height")

@@ -1,0 +1,292 @@
+"""Certificate of a correction: two A4 pages to sign, made of report.json alone."""
+
+import textwrap
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+from matplotlib.backends.backend_pdf import PdfPages
+from matplotlib.figure import Figure
+
+from mlscorr.report.pages import now, versions
+from mlscorr.report.style import STYLE
+from mlscorr.wording import number, percent, thousands
+
+A4 = (8.27, 11.69)  # inch, ISO 216
+POINTS = 72.0  # of an inch
+MARGIN = 57.0  # pt, 20 mm
+LETTERS = 8.5  # pt
+LEADING = 1.45  # of the letters, from line to line
+MONOSPACE = 5.9  # pt: 64 digits of a SHA-256 beside the name of a file
+SOFT = "#555555"
+LINE = "#9a9a9a"
+FILES = 12  # rows of files; more would fill the page, and report.json has all
+INTERVALS = 10  # rows of poorly constrained intervals, so too
+WARNINGS = 3  # that fit; the report has all
+NAME = 38  # letters of a file's name beside its digits
+NUMBERS = (0.52, 0.64, 0.76, 0.88, 1.0)  # right ends of columns, over the width between margins
+ROLES = ("control", "check")
+
+
+def write_certificate(path: str | Path, report: Mapping[str, Any]) -> None:
+    """Write the certificate of a correction as a PDF of two A4 pages, whose text is text.
+
+    Parameters
+    ----------
+    path : path
+    report : mapping
+        The document of report.json.
+    """
+    fonts: dict[str, Any] = {
+        "pdf.fonttype": 42,
+        "axes.grid": False,
+    }  # TrueType: letters stay letters
+    title = f"Certificate of correction: {_title(report)}"
+    written = now()
+    with (
+        matplotlib.rc_context({**STYLE, **fonts}),
+        PdfPages(path, metadata={"Title": title}) as pdf,
+    ):
+        for number_of_page, draw in enumerate((_first_page, _second_page), start=1):
+            sheet = _Sheet()
+            draw(sheet, report)
+            sheet.foot(f"Written {written} by {_software()}. Page {number_of_page} of 2")
+            pdf.savefig(sheet.figure)
+
+
+class _Sheet:
+    """An A4 page that is written from top to bottom."""
+
+    def __init__(self):
+        self.figure = Figure(A4)
+        self._width, self._height = (POINTS * length for length in A4)
+        self._at = MARGIN  # pt below the upper edge
+
+    def text(self, words, share=0.0, size=LETTERS, **style):
+        """Write words at a share of the width between margins, on the present line."""
+        x = (MARGIN + share * (self._width - 2 * MARGIN)) / self._width
+        y = 1 - self._at / self._height
+        self.figure.text(x, y, words, fontsize=size, va="top", **style)
+
+    def down(self, lines=1.0, size=LETTERS):
+        """Go down by lines of letters of a size."""
+        self._at += lines * LEADING * size
+
+    def rule(self, start=0.0, end=1.0):
+        """Draw a line between shares of the width."""
+        between = self._width - 2 * MARGIN
+        x = [(MARGIN + share * between) / self._width for share in (start, end)]
+        y = 1 - (self._at - 2) / self._height
+        self.figure.add_artist(matplotlib.lines.Line2D(x, [y, y], color=LINE, linewidth=0.6))
+
+    def heading(self, words):
+        """Write the heading of a section."""
+        self.down(0.8)
+        self.text(words, size=11, fontweight="bold")
+        self.down(1.25, 11)
+
+    def paragraph(self, words, letters=112, **style):
+        """Write words that are broken into lines."""
+        for line in textwrap.wrap(words, letters):
+            self.text(line, **style)
+            self.down()
+
+    def pairs(self, items, start=0.27):
+        """Write names with their values beside them, broken into lines."""
+        for name, value in items:
+            self.text(name, color=SOFT)
+            for line in textwrap.wrap(str(value), 80) or [""]:
+                self.text(line, start)
+                self.down()
+
+    def row(self, name, values, ends=NUMBERS, **style):
+        """Write a row of a table: a name, and values that end at shares of the width."""
+        self.text(name, **style)
+        for value, end in zip(values, ends, strict=True):
+            self.text(value, end, ha="right", **style)
+        self.down(1.1)
+
+    def foot(self, words):
+        """Write a line at the lower margin."""
+        self._at = self._height - 0.75 * MARGIN
+        self.text(words, size=7, color=SOFT)
+
+
+def _first_page(sheet, report):
+    """Names, what was corrected, by which control, and how accurate it is."""
+    sheet.text("Certificate of correction", size=9, color=SOFT)
+    sheet.down(1.3, 9)
+    sheet.text(_title(report), size=17, fontweight="bold")
+    sheet.down(1.3, 17)
+    sheet.rule()
+    sheet.down(0.4)
+    project = report["project"]
+    names = {name.capitalize(): project[name] for name in project if name != "title"}
+    recorded = (report["recorded"] or {}).get("text", "not known")
+    crs = report["crs"] or "not stated"
+    survey = {"Survey": report["name"], "Recorded": recorded, "Coordinate system": crs}
+    sheet.pairs([(name, value or "–") for name, value in (names | survey).items()])
+
+    sheet.heading("What was corrected")
+    points = sum(row.get("points", 0) for row in report["files"])
+    coverage = report["coverage"]
+    sheet.paragraph(
+        f"The coordinates of {thousands(points)} points of a mobile laser scan in "
+        f"{len(report['files'])} file{'s' * (len(report['files']) != 1)} were corrected for the "
+        "error of the positioning system by least squares collocation on surveyed targets. "
+        f"{thousands(coverage['points_outside_trajectory'])} points lie outside the trajectory "
+        "and are unchanged. Page 2 lists the files."
+    )
+
+    sheet.heading("Control")
+    sheet.row("", ("surveyed", "observed", "used"), NUMBERS[:3], color=SOFT)
+    for role in ROLES:
+        rows = [row for row in report["targets"] if row["role"] == role]
+        observed = {row["name"] for row in rows if row["observed"] is not None}
+        used = {row["name"] for row in rows if row["used"]}
+        values = (len({row["name"] for row in rows}), len(observed), len(used))
+        words = {"control": "Control points (make the correction)"}
+        name = words.get(role, "Check points (only test it)")
+        sheet.row(name, [str(value) for value in values], NUMBERS[:3])
+
+    sheet.heading("Residuals")
+    sheet.row("RMSE in m", ("East", "North", "Height", "Horizontal", "3D"), color=SOFT)
+    sheet.rule()
+    for words, section, state in (
+        ("Check points, before", "check", "before"),
+        ("Check points, after", "check", "after"),
+        ("Control points, before", "control", "before"),
+        ("Control points, leave-one-out", "control", "leave_one_out"),
+        ("Control points, after (fit)", "control", "after"),
+    ):
+        statistics = report[section].get(state)
+        if statistics is None or statistics["rmse"] is None:
+            continue
+        is_independent = (section, state) in (("check", "after"), ("control", "leave_one_out"))
+        weight = "bold" if is_independent else "normal"
+        values = [*statistics["rmse"], statistics["rmse_horizontal"], statistics["rmse_3d"]]
+        sheet.row(words, [number(value) for value in values], fontweight=weight)
+    sheet.down(0.3)
+    sheet.paragraph(
+        "Residual = surveyed − observed. Check points took no part in the correction; in the "
+        "leave-one-out, each control point is predicted by the others.",
+        color=SOFT,
+    )
+
+    sheet.heading("Accuracy")
+    for sentence in _accuracy(report["accuracy"]):
+        sheet.paragraph(sentence)
+    sigmas = report["check_sigmas"]
+    if sigmas is not None:
+        low, high = sigmas["limits"]
+        verdict = {"hold": "The stated sigmas hold"}
+        relation = verdict.get(sigmas["verdict"], f"The stated sigmas are {sigmas['verdict']}")
+        sheet.paragraph(
+            f"{relation}: chi-squared of the check residuals over their sigmas is "
+            f"{sigmas['statistic']:.1f} ({sigmas['degrees_of_freedom']} degrees of freedom, limits "
+            f"{low:.1f} and {high:.1f} at {percent(1 - sigmas['significance'])})."
+        )
+
+
+def _accuracy(accuracy):
+    """Sentences on the class of the standard, and whether the test conforms to it."""
+    if not accuracy or accuracy["based_on"] is None:
+        return ["Not determined: no point judges the result."]
+    horizontal, vertical = (accuracy[f"class_{axis}_cm"] for axis in ("horizontal", "vertical"))
+    conforms = "does not conform"
+    if accuracy["conformant"]:
+        conforms = "conforms"
+    return [
+        f"Accuracy class: {horizontal} cm horizontal, {vertical} cm vertical. The test {conforms} "
+        f"to the {accuracy['standard']}.",
+        *accuracy["statement"],
+    ]
+
+
+def _second_page(sheet, report):
+    """Poorly constrained intervals, files with their digits, software and signatures."""
+    sheet.text("Poorly constrained intervals", size=11, fontweight="bold")
+    sheet.down(1.25, 11)
+    weak = report["weak"]
+    share = report["well_determined"]
+    if share is not None:
+        sheet.paragraph(f"{percent(share)} of the driven distance is well determined by control.")
+    if weak:
+        _intervals(sheet, weak)
+    else:
+        sheet.paragraph("None: control constrains the whole drive.")
+
+    sheet.heading("Files")
+    groups = {"Corrected": report["files"], "Read": report["inputs"], "Written": report["outputs"]}
+    room = FILES
+    for title, rows in groups.items():
+        if not rows:
+            continue
+        shown = rows[: max(room, 1)]
+        room -= len(shown)
+        sheet.text(f"{title} ({len(rows)})", color=SOFT)
+        sheet.down(1.1)
+        for row in shown:
+            _file(sheet, row)
+        if len(shown) < len(rows):
+            rest = f"and {len(rows) - len(shown)} more; report.json lists all with their SHA-256"
+            sheet.text(rest, color=SOFT)
+            sheet.down()
+
+    sheet.heading("Software")
+    sheet.paragraph(", ".join(f"{name} {version}" for name, version in versions()))
+    for words in (report["model"].get("warnings") or ())[:WARNINGS]:
+        sheet.paragraph(f"Warning: {textwrap.shorten(words, 220, placeholder=' …')}")
+
+    sheet.heading("Signatures")
+    sheet.down(3.2)
+    for words, start in (("Operator", 0.0), ("Responsible surveyor", 0.53)):
+        sheet.rule(start, start + 0.47)
+        sheet.text(f"{words}: name, date, signature", start, size=7.5, color=SOFT)
+
+
+def _intervals(sheet, weak):
+    """A table of the poorly constrained intervals, those with the largest sigma first."""
+    ends = (0.16, 0.32, 0.46, 0.6)
+    sheet.row("", ("From (s)", "To (s)", "Length (m)", "Sigma (m)"), ends, color=SOFT)
+    sheet.rule()
+    worst = sorted(weak, key=lambda row: -(row["sigma"] or 0.0))[:INTERVALS]
+    for row in sorted(worst, key=lambda row: row["from"]):
+        sheet.text(textwrap.shorten(row["why"], 48, placeholder=" …"), 0.63, size=7.5)
+        values = (number(row[key], digits) for key, digits in COLUMNS.items())
+        sheet.row("", list(values), ends)
+    if len(worst) < len(weak):
+        rest = f"and {len(weak) - len(worst)} more with smaller sigmas; weak.csv lists all"
+        sheet.text(rest, color=SOFT)
+        sheet.down()
+
+
+COLUMNS = {"from": 1, "to": 1, "length_m": 0, "sigma": 3}  # of an interval, with their decimals
+
+
+def _file(sheet, row):
+    """A line of a file: name, size and digits."""
+    name = row["name"]
+    if len(name) > NAME:
+        name = f"{name[: NAME - 1]}…"
+    size = "–"
+    if row.get("points") is not None:
+        size = f"{thousands(row['points'])} points"
+    elif row.get("bytes") is not None:
+        size = f"{thousands(row['bytes'])} bytes"
+    sheet.text(name, size=7.5)
+    sheet.text(size, 0.505, size=7, ha="right")
+    digits: Sequence[str] = row.get("sha256") or "–"
+    sheet.text(digits, 0.52, size=MONOSPACE, family="DejaVu Sans Mono")
+    sheet.down(1.0)
+
+
+def _title(report):
+    """Title of the project, or the survey's name."""
+    return report["project"]["title"] or report["name"]
+
+
+def _software():
+    """Name and version of this package."""
+    return " ".join(versions()[0])
