@@ -45,7 +45,7 @@ def write_certificate(path: str | Path, report: Mapping[str, Any]) -> None:
     title = f"Certificate of correction: {_title(report)}"
     written = now()
     with (
-        matplotlib.rc_context({**STYLE, **fonts}),
+        matplotlib.rc_context(style),
         PdfPages(path, metadata={"Title": title}) as pdf,
     ):
         for number_of_page, draw in enumerate((_first_page, _second_page), start=1):

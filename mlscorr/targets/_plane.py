@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mlscorr.compiled_loops import loop
 from mlscorr.targets._sequence import quasi_random
 from mlscorr.targets.settings import SETTINGS
 
@@ -65,6 +66,7 @@ class Plane:
         return replace(self, axes=np.array([u, np.cross(normal, u), normal]))
 
 
+@loop
 def most_common(xyz: np.ndarray, triples: np.ndarray, tolerance: float) -> np.ndarray:
     """Which points lie on the plane that most of them support, nearer ones more.
 
@@ -84,17 +86,25 @@ def most_common(xyz: np.ndarray, triples: np.ndarray, tolerance: float) -> np.nd
 
     Source: MSAC (Torr and Zisserman 2000).
     """
-    first, second, third = xyz[triples].swapaxes(0, 1)
-    normal = np.cross(second - first, third - first)
-    length = np.linalg.norm(normal, axis=1)
-    normal = normal[length > 0.0] / length[length > 0.0, None]
-    if len(normal) == 0:
-        return np.zeros(len(xyz), dtype=bool)
-    offset = np.sum(normal * first[length > 0.0], axis=1)
-    # not by BLAS, which sums otherwise with another number of threads
-    height = np.einsum("kd,nd->kn", normal, xyz) - offset[:, None]
-    support = np.maximum(1.0 - (height / tolerance) ** 2, 0.0).sum(axis=1)
-    return np.abs(height[np.argmax(support)]) <= tolerance
+    origin = xyz[0]
+    best = np.zeros(3)
+    largest = -1.0
+    for i, j, k in triples:
+        normal = np.cross(xyz[j] - xyz[i], xyz[k] - xyz[i])
+        length = np.sqrt(np.sum(normal**2))
+        if length == 0.0:
+            continue
+        normal /= length
+        a, b, c = normal
+        offset = np.sum(normal * xyz[i])
+        support = 0.0
+        for x, y, z in xyz:
+            support += max(1.0 - ((a * x + b * y + c * z - offset) / tolerance) ** 2, 0.0)
+        if support > largest:
+            origin = xyz[i]
+            best = normal
+            largest = support
+    return (np.abs(np.sum((xyz - origin) * best, axis=1)) <= tolerance) & (largest >= 0.0)
 
 
 def fit_plane(xyz: np.ndarray, tolerance: float) -> Plane:
@@ -121,17 +131,26 @@ def fit_plane(xyz: np.ndarray, tolerance: float) -> Plane:
     if len(xyz) < 3:
         raise ValueError(f"A plane needs 3 points, there are {len(xyz)}.")
     triples = (quasi_random(SETTINGS.plane_trials, 3) * len(xyz)).astype(int)
+    return Plane(*_fit_plane(xyz, triples, tolerance))
+
+
+@loop
+def _fit_plane(xyz, triples, tolerance):
+    """Origin (3,), axes (3, 3), sigma and inliers (n,): a piece of cloud asks for hundreds."""
     middle = xyz.sum(axis=0) / len(xyz)
     local = xyz - middle
+    square = np.empty((3, 3))
     inside = most_common(local, triples, tolerance)
-    if not inside.any():  # all on a line
-        inside[:] = True
+    inside |= not inside.any()  # all on a line
     for _ in range(2):
         points = local[inside]
         centre = points.sum(axis=0) / len(points)
         points -= centre
-        squares, axes = np.linalg.eigh(np.einsum("ni,nj->ij", points, points))
+        for i in range(3):  # not by BLAS, which sums otherwise with another number of threads
+            for j in range(3):
+                square[i, j] = np.sum(points[:, i] * points[:, j])
+        squares, axes = np.linalg.eigh(square)
         sigma = np.sqrt(max(squares[0], 0.0) / max(len(points) - 3, 1))
         height = np.abs(np.sum((local - centre) * axes[:, 0], axis=1))
         inside = height <= min(max(3 * sigma, 1e-3), tolerance)
-    return Plane(middle + centre, axes.T[::-1].copy(), sigma, inside)
+    return middle + centre, axes.T[::-1].copy(), sigma, inside
