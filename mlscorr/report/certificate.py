@@ -38,7 +38,7 @@ def write_certificate(path: str | Path, report: Mapping[str, Any]) -> None:
     report : mapping
         The document of report.json.
     """
-    fonts = {"pdf.fonttype": 42, "axes.grid": False}  # TrueType: letters stay letters
+    fonts: Any = {"pdf.fonttype": 42}  # TrueType: letters stay letters
     title = f"Certificate of correction: {_title(report)}"
     written = now()
     with (
