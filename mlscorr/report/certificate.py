@@ -38,14 +38,11 @@ def write_certificate(path: str | Path, report: Mapping[str, Any]) -> None:
     report : mapping
         The document of report.json.
     """
-    fonts: dict[str, Any] = {
-        "pdf.fonttype": 42,
-        "axes.grid": False,
-    }  # TrueType: letters stay letters
+    fonts: Any = {"pdf.fonttype": 42}  # TrueType: letters stay letters
     title = f"Certificate of correction: {_title(report)}"
     written = now()
     with (
-        matplotlib.rc_context(style),
+        matplotlib.rc_context({**STYLE, **fonts}),
         PdfPages(path, metadata={"Title": title}) as pdf,
     ):
         for number_of_page, draw in enumerate((_first_page, _second_page), start=1):
@@ -86,7 +83,7 @@ class _Sheet:
         self.text(words, size=11, fontweight="bold")
         self.down(1.25, 11)
 
-    def paragraph(self, words, letters=112, **style):
+    def paragraph(self, words, letters=104, **style):
         """Write words that are broken into lines."""
         for line in textwrap.wrap(words, letters):
             self.text(line, **style)
@@ -117,8 +114,9 @@ def _first_page(sheet, report):
     """Names, what was corrected, by which control, and how accurate it is."""
     sheet.text("Certificate of correction", size=9, color=SOFT)
     sheet.down(1.3, 9)
-    sheet.text(_title(report), size=17, fontweight="bold")
-    sheet.down(1.3, 17)
+    for line in textwrap.wrap(_title(report), 42, max_lines=2, placeholder=" …"):
+        sheet.text(line, size=17, fontweight="bold")
+        sheet.down(1.1, 17)
     sheet.rule()
     sheet.down(0.4)
     project = report["project"]

@@ -25,9 +25,9 @@ from mlscorr.report.render import (
     Easels,
     Picture,
     PictureOptions,
+    colour_scale,
     colour_table,
     draw,
-    percentiles,
     swatches,
     worst_facades,
 )
@@ -251,8 +251,8 @@ def viewer_data(
         "spacing": spacing,
         "before": packed(picked.xyz - origin),
         "after": packed(moved - origin),
-        "intensity": _scaled(picked.intensity),
-        "height": _scaled(moved[:, 2]),
+        "intensity": _shares("intensity", picked.intensity),
+        "height": _shares("height", moved[:, 2]),
         "colours": {name: packed(colour_table(name), "u1") for name in ("intensity", "height")},
         "trajectory": [packed(line - origin) for line in _lines(correction)],
         "targets": [_target(row, origin) for row in recomputed(targets, correction)],
@@ -324,10 +324,9 @@ def _target(row, origin):
     return target
 
 
-def _scaled(values):
-    """Values (n,) between their percentiles as base64 of uint8."""
-    low, high = percentiles(values)
-    return packed(np.round(255 * np.clip((values - low) / max(high - low, 1e-9), 0, 1)), "u1")
+def _shares(colour, values):
+    """Places of values (n,) on the scale of a colour as base64 of uint8."""
+    return packed(np.round(255 * colour_scale(colour, values).share(values)), "u1")
 
 
 def packed(values: np.ndarray, kind: str = "<f4") -> str:

@@ -50,7 +50,7 @@ def locator_map(
         places = array([row for row in rows if row.group == group], "surveyed")
         axes.plot(*places[:, :2].T, linestyle="none", **MARKS[group])
     if marked is not None:
-        place = float(marked.surveyed[0]), float(marked.surveyed[1])
+        place = (float(marked.surveyed[0]), float(marked.surveyed[1]))
         ring: dict[str, Any] = {"marker": "o", "markersize": 13.0, "markerfacecolor": "none"}
         axes.plot(*place, color=MARK, markeredgewidth=2.0, **ring)
         beside: dict[str, Any] = {"xytext": (0, 10), "textcoords": "offset points", "ha": "center"}

@@ -145,8 +145,9 @@ def _stream(survey, chunks, progress):
 def _views(survey, correction, rows, views, options, stream, ties):
     """The views that are to_draw, after a first pass over the cloud."""
     points = survey.surveyed
-    sizes = points.size[[points.name.index(row.name) for row in rows]]
-    scouted = scout(stream, correction, rows, sizes)
+    close = rows if "targets" in views else []  # how the others are turned matters to no view
+    sizes = points.size[[points.name.index(row.name) for row in close]]
+    scouted = scout(stream, correction, close, sizes)
     to_draw = []
     if "overview" in views:
         to_draw.append(overview(scouted, rows, options))

@@ -1,6 +1,7 @@
 """What a picture shows by colour: a number for each point, before and after."""
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 import matplotlib
 import numpy as np
@@ -172,6 +173,7 @@ def paint(colour: str, value: np.ndarray, scale: ColourScale) -> np.ndarray:
     return picture
 
 
+@cache
 def colour_table(colour: str) -> np.ndarray:
     """The colours of a scale from its low to its high end: (256, 3) uint8."""
     highest = 1.0 if colour == "intensity" else 0.85  # beyond it is too pale on white
