@@ -6,6 +6,7 @@ import typer
 
 import mlscorr
 from mlscorr.cli.folders import chosen_out
+from mlscorr.cli.progress import progress_bars
 from mlscorr.cli.terminal import (
     Exit,
     Json,
@@ -44,11 +45,11 @@ def apply(
 ) -> None:
     """Take a clock offset, datum or mounting that was found out of clouds and trajectory."""
     out = chosen_out(out, survey, "apply")
-    import numpy as np
+    with exit_code(Exit.USAGE), progress_bars():
+        import numpy as np
 
-    from mlscorr.pipeline import read_effects
+        from mlscorr.pipeline import read_effects
 
-    with exit_code(Exit.USAGE):
         effects = [read_effects(source) for source in sources]
     with work(out, overwrite, survey) as progress:
         applied = mlscorr.apply(mlscorr.read_survey(survey), effects)

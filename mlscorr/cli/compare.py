@@ -8,6 +8,7 @@ import typer
 import mlscorr
 from mlscorr.cli import terminal
 from mlscorr.cli.folders import chosen_out
+from mlscorr.cli.progress import progress_bars
 from mlscorr.cli.work import print_json, work
 
 RESULT_FILES = ("report.json", "trajectory.csv")  # that are read of a result
@@ -64,13 +65,13 @@ def compare(
     Two folders that mlscorr correct wrote are compared with each other instead:
     mlscorr compare corrected-1 corrected-2 -o compared
     """
-    with terminal.exit_code(terminal.Exit.USAGE):
+    with terminal.exit_code(terminal.Exit.USAGE), progress_bars():
         _check_arguments(survey, second, clouds, exclude)
     if second is not None:
         _compare_results(survey, second, out, overwrite, as_json)
         return
     out = chosen_out(out, survey, "compare")
-    with terminal.exit_code(terminal.Exit.USAGE):
+    with terminal.exit_code(terminal.Exit.USAGE), progress_bars():
         from mlscorr.pipeline import method_named
 
         clouds = list(dict.fromkeys(method_named(name).name for name in clouds))

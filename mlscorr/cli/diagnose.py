@@ -8,6 +8,7 @@ import typer
 import mlscorr
 from mlscorr.cli import terminal
 from mlscorr.cli.folders import chosen_out
+from mlscorr.cli.progress import progress_bars
 from mlscorr.cli.work import print_json, work
 from mlscorr.wording import signed
 
@@ -57,7 +58,7 @@ def diagnose(
 ) -> None:
     """Find where reality and simulation differ, why, and how far the gap can be closed."""
     out = chosen_out(out, survey, "diagnose")
-    with terminal.exit_code(terminal.Exit.USAGE):
+    with terminal.exit_code(terminal.Exit.USAGE), progress_bars():
         from mlscorr.simulate import read_simulator
 
         believed = read_simulator(simulator) if simulator else None

@@ -8,6 +8,7 @@ import typer
 
 import mlscorr
 from mlscorr.cli.folders import chosen_out
+from mlscorr.cli.progress import progress_bars
 from mlscorr.cli.terminal import (
     Exit,
     Json,
@@ -63,7 +64,7 @@ def render(
 ) -> None:
     """Draw a survey before and after its correction; neither a display nor a GPU is needed."""
     out = chosen_out(out, survey, "render")
-    with exit_code(Exit.USAGE):
+    with exit_code(Exit.USAGE), progress_bars():
         pixels = _read_size(size)
     with work(out, overwrite, survey) as progress:
         drawn = mlscorr.render(

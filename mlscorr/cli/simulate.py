@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from mlscorr.cli.folders import chosen_out
+from mlscorr.cli.progress import progress_bars
 from mlscorr.cli.terminal import (
     Effects,
     Exit,
@@ -39,7 +40,7 @@ def simulate(
 ) -> None:
     """Simulate a survey from a scenario: a survey folder, and the truth beside it."""
     out = chosen_out(out, scenario, "simulate", is_by_name=True)
-    with exit_code(Exit.USAGE):
+    with exit_code(Exit.USAGE), progress_bars():
         from mlscorr.simulate import read_scenario, scenario_files
 
         inputs = [scenario, *scenario_files(read_scenario(scenario))]
