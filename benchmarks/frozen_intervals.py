@@ -66,7 +66,11 @@ def frozen(changes: list[tuple[float, str]], end: float) -> list[tuple[float, fl
     intervals = []
     before = 0.0
     line = "(nothing yet)"
+    shown = ""
     for now, text in [*changes, (end, "")]:
+        if now < end and ESCAPES.sub("", text).strip() in ("", shown):
+            continue  # redrawn as it was
+        shown = ESCAPES.sub("", text).strip()
         if now - before > FROZEN:
             intervals.append((before, now - before, line))
         before = now
