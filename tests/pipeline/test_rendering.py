@@ -12,11 +12,11 @@ import mlscorr
 from mlscorr.correction import Correction
 from mlscorr.pipeline import render
 from mlscorr.pipeline.rendering import read_correction
-from tests.beds.places import EXAMPLES
+from tests.beds.places import ROOT
 
 pytestmark = pytest.mark.long
 
-EXAMPLE = EXAMPLES / "render_before_after.py"
+EXAMPLE = ROOT / "benchmarks" / "pictures" / "render_before_after.py"
 
 
 @pytest.fixture(scope="module")
