@@ -156,22 +156,35 @@ def remedy(parts: Iterable[InstalledPart]) -> list[str]:
     return joined + [line for line in lines if not line.startswith(INSTALLERS)]
 
 
-def _package(name):
-    for known in (name, name.removesuffix("-cpu")):  # of Open3D either wheel will do
+def installed_version(name: str) -> str | None:
+    """Version of a package, None where it is not installed; of Open3D either wheel will do.
+
+    Parameters
+    ----------
+    name : str
+    """
+    for known in (name, name.removesuffix("-cpu")):
         try:
-            return InstalledPart(name, True, version(known))
+            return version(known)
         except PackageNotFoundError:
             continue
-    return InstalledPart(name, False, "missing", f"pip install {name}")
+    return None
+
+
+def _package(name):
+    installed = installed_version(name)
+    if installed is None:
+        return InstalledPart(name, False, "missing", f"pip install {name}")
+    return InstalledPart(name, True, installed)
 
 
 def _extra(name, extra):
     """A package that some inputs need: nothing is missing without it."""
-    line = f"pip install 'mlscorr[{extra}]'"
-    try:
-        return InstalledPart(name, True, version(name), needed=False)
-    except PackageNotFoundError:
+    installed = installed_version(name)
+    if installed is None:
+        line = f"pip install 'mlscorr[{extra}]'"
         return InstalledPart(name, False, f"not installed: {line}", needed=False)
+    return InstalledPart(name, True, installed, needed=False)
 
 
 def _library(name, package):

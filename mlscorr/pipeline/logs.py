@@ -8,11 +8,12 @@ import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from importlib.metadata import version
 from pathlib import Path
 
+from mlscorr.pipeline.installation import OPEN3D, installed_version
+
 LOG_FILE = "log.txt"
-LIBRARIES = ("mlscorr", "numpy", "scipy", "numba", "laspy", "pyproj", "open3d")
+LIBRARIES = ("mlscorr", "numpy", "scipy", "numba", "laspy", "pyproj", OPEN3D)
 SECRETS = re.compile(r"(?<=://)[^/@\s]+@|(?<=[?])\S+")  # user and password, query of a URL
 _lines: ContextVar[list[str] | None] = ContextVar("lines", default=None)
 
@@ -65,7 +66,7 @@ def recorded_log(command: Sequence[str]) -> Iterator[None]:
     """
     lines = [
         f"Command: {without_secrets(shlex.join(['mlscorr', *command]))}",
-        f"Versions: {', '.join(f'{name} {version(name)}' for name in LIBRARIES)}, "
+        f"Versions: {', '.join(f'{name} {installed_version(name)}' for name in LIBRARIES)}, "
         f"Python {platform.python_version()}, {platform.platform()}",
     ]
     recorder = _Recorder(lines)
