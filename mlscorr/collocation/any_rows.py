@@ -78,7 +78,7 @@ def collocate_rows(
 
 
 def _is_in_time(rows):
-    """Whether the recursion takes the rows: as many to each observation, few of two epochs."""
+    """True where the recursion takes the rows: as many to each observation, few of two epochs."""
     heights = {part.misclosure.shape[1] for part in rows}
     links = [part for part in rows if _epochs(part) == 2]
     columns = sum(part.misclosure.size for part in links)
@@ -88,7 +88,7 @@ def _is_in_time(rows):
 
 
 def _in_time(rows):
-    """What ``collocate`` takes: all first views, then the second ones of rows of two epochs."""
+    """Input of ``collocate``: all first views, then the second ones of rows of two epochs."""
     links = [part for part in rows if _epochs(part) == 2]
     views = [_view(part, 0) for part in rows] + [_view(part, 1) for part in links]
     gps_time, misclosure, design, own, clocks = (

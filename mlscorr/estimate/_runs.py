@@ -202,7 +202,7 @@ def doubtful_drift(adjustment: Adjustment, screening: Screening) -> np.ndarray:
     adjustment : Adjustment
         Of all targets.
     screening : Screening
-        Of these adjustment.
+        Of these targets.
     """
     deviation = np.zeros((len(adjustment.names), 3))
     for test in screening.outliers:

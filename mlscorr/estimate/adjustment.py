@@ -79,7 +79,7 @@ class Adjustment(Summary):
 
     @property
     def ties(self) -> Factor | None:
-        """What two passes both saw."""
+        """Factor of what two passes both saw, None without any."""
         return self.of_kind(TIE)
 
     def of_kind(self, kind: str) -> Factor | None:
@@ -154,8 +154,13 @@ class Adjustment(Summary):
         for factor in self.factors:
             rows = factor.misclosure.shape
             more = columns.get(factor.kind, np.zeros((*rows, len(sigma))))
-            before = self.unknowns - (0 if factor.columns is None else factor.columns.shape[2])
-            padded = np.concatenate([np.zeros((*rows, before)), more], axis=2)
+            known = 0
+            if factor.columns is not None:
+                known = factor.columns.shape[2]
+            gap = np.zeros(
+                (*rows, self.unknowns - known)
+            )  # of unknowns that the factor does not see
+            padded = np.concatenate([gap, more], axis=2)
             factors.append(factor.with_columns(padded))
         wider = replace(self, factors=tuple(factors))
         is_known = np.isfinite(sigma)
@@ -345,7 +350,7 @@ class Adjustment(Summary):
 
     @property
     def _is_dense(self):
-        """Whether the covariance matrix is the fastest way to a likelihood."""
+        """True where the covariance matrix is the fastest way to a likelihood."""
         size = sum(factor.misclosure.size for factor in self.observing)
         return self.ties is not None and size <= SETTINGS.dense_rows
 
@@ -383,7 +388,7 @@ class Adjustment(Summary):
         return designs
 
     def believed(self, parameters: SignalParameters | None) -> np.ndarray:
-        """What is believed of unknowns and trend, (k, p + 1), as of a Collocation.
+        """Prior of unknowns and trend, (k, p + 1), as of a Collocation.
 
         Parameters
         ----------
@@ -453,7 +458,7 @@ def mounting_adjustment(
     corrected: np.ndarray,
     weak: np.ndarray,
 ) -> Adjustment:
-    """What k mountings lack  (Eq. 16-18), beside the same POS error without a trend.
+    """Adjustment of k mountings  (Eq. 16-18), beside the same POS error without a trend.
 
     Parameters
     ----------

@@ -235,7 +235,7 @@ def tie_factor(
 
 
 def prior_factor(mean: np.ndarray, sigma: np.ndarray) -> Factor:
-    """What is believed of unknowns beside the POS error: of each its value and one sigma.
+    """Prior of unknowns beside the POS error: of each its value and one sigma.
 
     Parameters
     ----------

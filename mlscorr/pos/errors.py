@@ -49,7 +49,7 @@ class PosErrors(Summary):
 
     @property
     def history(self) -> DriftHistory:
-        """When drift starts anew, and when it is said to grow."""
+        """History of the drift: when it starts anew, and when it is said to grow."""
         return drift_history(self.trajectory)
 
     def with_starts(self, starts: np.ndarray) -> PosErrors:
@@ -78,7 +78,7 @@ class PosErrors(Summary):
         return stated_sigma(self.trajectory, self.pos, gps_time, self.starts)
 
     def predictive(self, gps_time: np.ndarray) -> Predictive:
-        """What the position may err by at some times, before anything is observed.
+        """Hypotheses on the position error at some times, before anything is observed.
 
         Parameters
         ----------

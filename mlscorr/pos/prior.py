@@ -49,7 +49,7 @@ def stated_processes() -> Iterator[Process]:
 
 
 class Predictive(NamedTuple):
-    """How a POS may err at n epochs, by m hypotheses of equal weight.
+    """Possible errors of a POS at n epochs, by m hypotheses of equal weight.
 
     Parameters
     ----------

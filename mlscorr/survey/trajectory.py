@@ -195,7 +195,7 @@ class Trajectory(Summary):
         return self.gps_time - WEEK * self.weeks
 
     def derived(self, function: Callable[[Trajectory], Result]) -> Result:
-        """What a function makes of this trajectory, worked out once: a trajectory never changes.
+        """Result of a function of this trajectory, worked out once: a trajectory never changes.
 
         Parameters
         ----------
