@@ -22,7 +22,6 @@ from mlscorr.report.pages import data_uri
 from mlscorr.report.render import (
     LABELS,
     MARK,
-    Easels,
     Picture,
     PictureOptions,
     colour_scale,
@@ -172,8 +171,7 @@ def close_ups(rows: list[TargetRow], limit: int = SETTINGS.close_ups) -> list[st
 
 def cloud_content(views: CloudViews, targets: list[TargetRow]) -> dict:
     """What the templates show of CloudViews."""
-    easels: Easels = {}
-    pictures = [_pair(picture, easels) for picture in views.pictures]
+    pictures = [_pair(picture) for picture in views.pictures]
     kinds = {pair["kind"]: pair for pair in pictures}
     close = [pair for pair in pictures if pair["kind"] == "target"]
     return {
@@ -191,10 +189,10 @@ def cloud_content(views: CloudViews, targets: list[TargetRow]) -> dict:
     }
 
 
-def _pair(picture, easels):
+def _pair(picture):
     """One pair of pictures in words and as addresses of images."""
     view = picture.view
-    before, after = (data_uri(panel, "png") for panel in picture.panels(easels=easels))
+    before, after = (data_uri(panel, "png") for panel in picture.panels())
     times = {mark.text for side in view.marks for mark in side if mark.kind == "residual"}
     return {
         "kind": view.name.partition("-")[0],
