@@ -44,8 +44,8 @@ def target_drawings(
             continue
         note = _doubt(row, target)
         picture = draw_target(target, row.name, row.pass_number, note, bool(note))
-        image = Image.fromarray(picture).quantize(128, dither=Image.Dither.NONE)
-        drawings.append((f"{row.name}, pass {row.pass_number}", png_of(image)))
+        title = f"{row.name}, pass {row.pass_number}"
+        drawings.append((title, png_of(Image.fromarray(picture))))
     return drawings
 
 
