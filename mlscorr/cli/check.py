@@ -165,9 +165,21 @@ def say_dry_run(
     checked = _checked(survey)
     if not checked.faults and chosen:
         with exit_code(Exit.USAGE):
-            mlscorr.read_survey(survey).choosing(**chosen)
+            _check_choice(survey, chosen)
     say_checked(checked)
     say(f"No fault, {counted(len(checked.warnings), 'warning')}. Nothing was written.")
+
+
+def _check_choice(survey, chosen):
+    """Refuse names of control points that a survey or project does not have."""
+    from mlscorr.io.surveys import is_project, read_project
+    from mlscorr.survey import choosing
+
+    if is_project(survey):
+        recording = read_project(survey)
+    else:
+        recording = mlscorr.read_survey(survey)
+    choosing(recording, **chosen)
 
 
 def _with_size(file):
