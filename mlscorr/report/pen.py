@@ -92,14 +92,14 @@ class Pen:
         path = self._finer(points)
         low = np.floor(np.min(path, axis=0)).astype(int) - 1
         high = np.ceil(np.max(path, axis=0)).astype(int) + 1
-        box = (*np.maximum(low, 0), *np.minimum(high, self._image.size))
-        box = tuple(int(edge) for edge in box)
-        if box[0] >= box[2] or box[1] >= box[3]:
+        left, top = np.maximum(low, 0).tolist()
+        right, bottom = np.minimum(high, self._image.size).tolist()
+        if left >= right or top >= bottom:
             return
-        mask = Image.new("L", (box[2] - box[0], box[3] - box[1]))
-        inside = [(column - box[0], row - box[1]) for column, row in path]
+        mask = Image.new("L", (right - left, bottom - top))
+        inside = [(column - left, row - top) for column, row in path]
         ImageDraw.Draw(mask).polygon(inside, round(255 * share))
-        self._image.paste(color, box, mask)
+        self._image.paste(color, (left, top, right, bottom), mask)
 
     def text(
         self,
@@ -115,8 +115,10 @@ class Pen:
         font = _font(bold, round(size * self.fineness))
         at = self._finer(np.array([place]))[0]
         if halo:
-            edge = {"stroke_width": halo * self.fineness, "stroke_fill": "white"}
-            self._draw.text(at, words, "white", font, anchor, **edge)
+            edge = halo * self.fineness
+            self._draw.text(
+                at, words, "white", font, anchor, stroke_width=edge, stroke_fill="white"
+            )
         self._draw.text(at, words, color, font, anchor)
 
     def _finer(self, points):
