@@ -1,6 +1,10 @@
 """What drawing costs: 2 M points at 1920 x 1080 by both engines, and the memory of 50 M points.
 
     python benchmarks/bench_render.py
+    python benchmarks/bench_render.py --report [SURVEY]
+
+With --report, what the report and pictures of a correction take: of a survey.toml, or of the
+simulated drive of examples/scenarios/car.toml, 11 M points.
 
 Times alone mean little on a busy machine; the goals are those of two idle cores.
 """
@@ -8,13 +12,15 @@ Times alone mean little on a busy machine; the goals are those of two idle cores
 import argparse
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, process_time
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+import mlscorr
 from mlscorr.frames import attitude_from_angles as attitude
 from mlscorr.io import SETTINGS
 from mlscorr.report.render import draw
@@ -91,6 +97,52 @@ def pictures(points):
     list(draw(survey(), Moved(), [], PictureOptions(PANEL), chunks=lambda: street(points)))
 
 
+class Stages:
+    """Processor time of each stage of a command. Units: s."""
+
+    def __init__(self):
+        self.seconds = {}
+        self.title = None
+        self.start = process_time()
+
+    def __call__(self, title, _total=None):
+        now = process_time()
+        if self.title is not None:
+            self.seconds[self.title] = self.seconds.get(self.title, 0.0) + now - self.start
+        self.title = title
+        self.start = now
+        return lambda _number: None
+
+
+def report_table(survey):
+    """Processor time of writing a correction without and with its report."""
+    corrected = mlscorr.correct(mlscorr.read_survey(survey))
+    table = Table("processor time, measured in this run", "", "goal")
+    with tempfile.TemporaryDirectory() as folder:
+        totals = []
+        for is_drawn in (False, True):
+            stages = Stages()
+            start = process_time()
+            corrected.write(Path(folder) / f"{is_drawn}", progress=stages, page=is_drawn)
+            totals.append(process_time() - start)
+            stages("")
+        for title, seconds in stages.seconds.items():
+            if title.startswith("Drawing"):
+                table.add_row(title, f"{seconds:.1f} s", "")
+    points = corrected.survey.points / 1e6
+    table.add_row(f"{points:.1f} M points: written without a report", f"{totals[0]:.1f} s", "")
+    table.add_row("report and pictures more", f"{totals[1] - totals[0]:.1f} s", "<= 10 s")
+    return table
+
+
+def simulated(folder):
+    """The survey.toml of the car's drive, simulated in a folder."""
+    scenario = Path(__file__).parents[1] / "examples/scenarios/car.toml"
+    command = [sys.executable, "-m", "mlscorr", "simulate", scenario, "-o", folder]
+    subprocess.run(command, check=True)
+    return Path(folder) / "survey.toml"
+
+
 def memory(millions):
     """Seconds, and peak memory in MB over that after the imports, of a child that draws."""
     command = [sys.executable, __file__, "--task", str(millions)]
@@ -99,7 +151,11 @@ def memory(millions):
     return perf_counter() - start, peak
 
 
-def main():
+def main(is_report=False, survey=None):
+    if is_report:
+        with tempfile.TemporaryDirectory() as folder:
+            Console().print(report_table(survey or simulated(folder)))
+        return
     table = Table("measured in this run", "", "goal")
     one_picture(1000, False)  # compiles
     for by_open3d, name, goal in ((False, "z-buffer", "<= 3 s"), (True, "Open3D", "<= 6 s")):
@@ -121,5 +177,7 @@ if __name__ == "__main__":
         pictures(int(sys.argv[2]) * 1_000_000)
         print(peak_memory() - before)
     else:
-        argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
-        main()
+        parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+        parser.add_argument("--report", dest="is_report", action="store_true")
+        parser.add_argument("survey", nargs="?", type=Path, help="survey.toml, with --report")
+        main(**vars(parser.parse_args()))

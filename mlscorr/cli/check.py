@@ -37,37 +37,26 @@ def check(survey: SurveyArgument, quiet: Quiet = False, verbose: Verbose = 0) ->
         say(f"No fault in what was checked, {number}; no control point was found, see Not checked.")
 
 
-def say_checked(checked: CheckedSurvey) -> None:
+def say_checked(checked: CheckedSurvey, with_amounts: bool = True) -> None:
     """Say what a check found, and end with its exit code where there is a fault.
 
     Parameters
     ----------
     checked : CheckedSurvey
+    with_amounts : bool
+        Say what is read, written and needed, too, not warnings and faults alone.
 
     Raises
     ------
     typer.Exit
         With the code of the first fault.
     """
-    amounts = {"Read": checked.read, "Written": checked.written, "Needed": checked.needed}
-    for title, those in amounts.items():
-        _list(title, [_amount(amount) for amount in those])
-    _list("Worked out", checked.notes)
-    _list("Not checked", checked.unchecked)
-    say_problems(checked)
-
-
-def say_problems(checked: CheckedSurvey) -> None:
-    """Say warnings and faults alone, and end with the exit code of the first fault.
-
-    Parameters
-    ----------
-    checked : CheckedSurvey
-
-    Raises
-    ------
-    typer.Exit
-    """
+    if with_amounts:
+        amounts = {"Read": checked.read, "Written": checked.written, "Needed": checked.needed}
+        for title, those in amounts.items():
+            _list(title, [_amount(amount) for amount in those])
+        _list("Worked out", checked.notes)
+        _list("Not checked", checked.unchecked)
     for sentence in checked.warnings:
         warn(f"Warning: {sentence}")
     for fault in checked.faults:
@@ -107,7 +96,7 @@ def check_first(survey: Path) -> None:
         As say_checked.
     """
     checked = _checked(survey)
-    say_problems(checked)
+    say_checked(checked, with_amounts=False)
     say(f"Checked: no fault, {counted(len(checked.warnings), 'warning')}.")
 
 
@@ -165,9 +154,21 @@ def say_dry_run(
     checked = _checked(survey)
     if not checked.faults and chosen:
         with exit_code(Exit.USAGE):
-            mlscorr.read_survey(survey).choosing(**chosen)
+            _check_choice(survey, chosen)
     say_checked(checked)
     say(f"No fault, {counted(len(checked.warnings), 'warning')}. Nothing was written.")
+
+
+def _check_choice(survey, chosen):
+    """Refuse names of control points that a survey or project does not have."""
+    from mlscorr.io.surveys import is_project, read_project
+    from mlscorr.survey import choosing
+
+    if is_project(survey):
+        recording = read_project(survey)
+    else:
+        recording = mlscorr.read_survey(survey)
+    choosing(recording, **chosen)
 
 
 def _with_size(file):

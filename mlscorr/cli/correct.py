@@ -150,15 +150,11 @@ def correct(
                     "--provenance is of one survey, and a cloud of a project may belong to several "
                     "drives. The report.json of each drive names its inputs and their SHA-256."
                 )
-            if exclude or include:
-                raise ValueError(
-                    "--exclude and --include are of one survey: correct the drive by its "
-                    "survey.toml, or take the points out of the project's control list."
-                )
             if pdf:
                 raise ValueError(
-                    "--pdf is of one survey. Correct each drive by itself for its certificate.pdf; "
-                    "the report.json of each drive has its numbers."
+                    "--pdf makes the certificate of one survey, and a project has no certificate. "
+                    "Correct a drive by its own survey.toml for one; the report.json of each drive "
+                    "states the same numbers."
                 )
             exports = tuple(trajectory), tuple(targets)
             given = order, ties, sigma, not no_report, *exports, displacement, *shared, overwrite
@@ -168,11 +164,12 @@ def correct(
                 f"--workers, --scheduler and --resume are of a project.toml, and {survey} is one "
                 'survey. Two lines make a project of it: [[drive]] and survey = "survey.toml".'
             )
+    chosen = {"exclude": exclude, "include": include}
     if is_of_drives:
         if dry_run:
-            say_dry_run(survey, out, ())
+            say_dry_run(survey, out, (), chosen)
         else:
-            correct_drives(survey, out, options, gates, as_json)
+            correct_drives(survey, out, options, gates, as_json, chosen)
         return
     settings = {
         "sigma": sigma,
@@ -183,7 +180,6 @@ def correct(
         "provenance": provenance,
         "pdf": pdf,
     }
-    chosen = {"exclude": exclude, "include": include}
     with ExitStack() as ends:
         path = survey
         if not has_toml(survey):

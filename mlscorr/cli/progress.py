@@ -17,6 +17,8 @@ from mlscorr.wording import counted, percent
 COMPILING = "compiling loops, once on this machine"
 LOADING = "Loading libraries"
 PATIENCE = 1.0  # s; guard: quicker stages are not shown, as nobody could read them
+# s; guard: Python itself took its time before this stage, in which nothing was shown
+LOADING_PATIENCE = 0.2
 INTERVAL = 60.0  # s between lines on one stage where stderr is no terminal; guard
 
 Progress = Callable[..., Callable[[int], object]]
@@ -230,6 +232,14 @@ def _compilations(stages: Stages) -> Iterator[None]:
         yield
 
 
+def _is_shown(task: Any) -> bool:
+    """Whether a stage has run long enough to be shown."""
+    patience = PATIENCE
+    if task.description.startswith(LOADING) and not task.finished:
+        patience = LOADING_PATIENCE
+    return (task.elapsed or 0.0) >= patience
+
+
 def _rich_bars() -> Any:
     """Bars of rich: what is done, how far, for how long, how long still."""
     from rich import progress
@@ -248,7 +258,7 @@ def _rich_bars() -> Any:
         """Those that take long enough to be read."""
 
         def get_renderables(self):
-            yield self.make_tasks_table([t for t in self.tasks if (t.elapsed or 0.0) >= PATIENCE])
+            yield self.make_tasks_table([task for task in self.tasks if _is_shown(task)])
 
     return Shown(
         progress.SpinnerColumn(finished_text=" "),

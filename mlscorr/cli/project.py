@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,7 +22,12 @@ RESUMPTION = "what was done stays, and the same command with --resume goes on"
 
 
 def correct_drives(
-    project: Path, out: Path, options: Options, gates: list[Gate], as_json: bool
+    project: Path,
+    out: Path,
+    options: Options,
+    gates: list[Gate],
+    as_json: bool,
+    chosen: Mapping[str, Collection[str]],
 ) -> None:
     """Correct all drives of a project and tell what became of them.
 
@@ -34,6 +40,8 @@ def correct_drives(
     gates : list of Gate
         Each drive has to pass them.
     as_json : bool
+    chosen : mapping
+        Names of control points to exclude and to include.
 
     Raises
     ------
@@ -43,6 +51,7 @@ def correct_drives(
     from mlscorr.evaluate import failures
     from mlscorr.io.surveys import read_project, stated_project
     from mlscorr.pipeline.project import check_engine, check_project_output, correct_project
+    from mlscorr.survey import choosing
 
     with terminal.exit_code(terminal.Exit.USAGE):
         stated = stated_project(project)
@@ -50,6 +59,7 @@ def correct_drives(
     with terminal.exit_code(terminal.Exit.BAD_DATA):
         parts = read_project(stated)
     with terminal.exit_code(terminal.Exit.USAGE):
+        parts = choosing(parts, **chosen)
         check_project_output(parts, out, options)
     with terminal.exit_code(terminal.Exit.BAD_DATA, lambda: RESUMPTION):
         result = correct_project(parts, out, options, tell)

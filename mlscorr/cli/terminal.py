@@ -133,7 +133,11 @@ Verbose = Annotated[
 ]
 Exclude = Annotated[
     list[str],
-    typer.Option(metavar="NAME", help="A control point that takes no part. May be repeated."),
+    typer.Option(
+        metavar="NAME",
+        help="A control point that takes no part. May be repeated. Do not choose it by the "
+        "residuals of check points: they would be control points then.",
+    ),
 ]
 NoTies = Annotated[bool, typer.Option("--no-ties", help="Don't use what two passes both saw.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")]

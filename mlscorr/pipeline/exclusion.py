@@ -12,8 +12,8 @@ from mlscorr.estimate import Estimate
 from mlscorr.evaluate import TargetRow, misclosures, target_rows
 from mlscorr.pipeline.estimation import check_score, estimate_together
 from mlscorr.pipeline.finding import MatchedTargets, silent
+from mlscorr.pipeline.wording import CHOICES
 from mlscorr.survey import Matched, Statement, Survey, TieFeatures
-from mlscorr.wording import length_in_words
 
 EXCLUDED = Statement("not matched", values={"why": "excluded by the user"})
 
@@ -41,15 +41,14 @@ class Exclusion:
     without_point: float
 
     @property
+    def statement(self) -> Statement:
+        """Name, residual and both accuracies."""
+        return Statement("excluded", values=vars(self))
+
+    @property
     def sentence(self) -> str:
-        """The same in words."""
-        residual = length_in_words(self.residual)
-        before = length_in_words(self.with_point)
-        after = length_in_words(self.without_point)
-        return (
-            f"{self.name} is excluded by the user; its 3D residual is {residual}. 3D RMSE "
-            f"({self.by}): {before} with it, {after} without it."
-        )
+        """The statement in words."""
+        return self.statement.sentence(CHOICES)
 
     def document(self) -> dict[str, str | float]:
         """The row of ``exclusions[]`` in report.json."""
@@ -146,10 +145,10 @@ def inclusion_warnings(survey: Survey, estimate: Estimate) -> tuple[str, ...]:
     survey : Survey
     estimate : Estimate
     """
-    return tuple(
-        f"{test.name} is used because include names it, and the other control points contradict "
-        f"it: statistic {test.statistic:.1f}, critical value {test.critical:.1f}. It draws the "
-        "cloud towards itself; check its coordinates."
-        for test in estimate.tests
-        if test.name in survey.included and test.excess > 1.0
-    )
+    sentences = []
+    for test in estimate.tests:
+        if test.name in survey.included and test.excess > 1.0:
+            values = {"name": test.name, "statistic": test.statistic, "critical": test.critical}
+            statement = Statement("included, contradicted", "warning", values)
+            sentences.append(statement.sentence(CHOICES))
+    return tuple(sentences)

@@ -23,6 +23,7 @@ from mlscorr.matching import Matches, match
 from mlscorr.pipeline.beams import with_beam_origin
 from mlscorr.pipeline.control_checks import check_control
 from mlscorr.pipeline.settings import SETTINGS
+from mlscorr.pipeline.wording import CHOICES
 from mlscorr.surfaces import FeatureCollector
 from mlscorr.survey import (
     CloudFile,
@@ -802,11 +803,9 @@ def with_included(
             is_its &= left.pass_number == refusal.pass_number
         for row in np.flatnonzero(is_its):
             taken[int(row)] = refusal.name
-        sentence = (
-            f"{refusal.name} is used because include names it. Matching refused it: "
-            f"{refusal.reason}"
-        )
-        warned.append((refusal.name, sentence))
+        values = {"name": refusal.name, "reason": refusal.reason}
+        refused = Statement("included, refused", "warning", values)
+        warned.append((refusal.name, refused.sentence(CHOICES)))
     if not taken:
         return matches, tuple(warned)
     rows = list(taken)

@@ -137,11 +137,13 @@ def _near(survey, file) -> Iterator[PointCloud]:
     place = survey.control.position
     radius = search_radius(survey, survey.control)
     for chunk in read_windows(file, _spans(survey)):
-        apart = np.full(len(chunk), np.inf)
-        for centre, limit in zip(place[:, :2], radius, strict=True):
-            np.minimum(apart, np.hypot(*(chunk.xyz[:, :2] - centre).T) / limit, out=apart)
-        if (apart <= 1.0).any():
-            yield chunk[apart <= 1.0]
+        is_near = np.zeros(len(chunk), bool)
+        for centre, limit in zip(place, radius, strict=True):
+            rows = np.flatnonzero(np.abs(chunk.xyz[:, 0] - centre[0]) <= limit)
+            plan = chunk.xyz[rows, :2] - centre[:2]
+            is_near[rows] |= np.hypot(*plan.T) <= limit
+        if is_near.any():
+            yield chunk[is_near]
 
 
 def _spans(survey):

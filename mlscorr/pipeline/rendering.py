@@ -13,6 +13,7 @@ from mlscorr.evaluate import TargetRow
 from mlscorr.io.store import check_output, document, output_folder
 from mlscorr.io.trajectories import read_trajectory
 from mlscorr.pipeline.correction import correct
+from mlscorr.pipeline.logs import write_log
 from mlscorr.survey import Survey, check_survey
 
 PAGE = (1920, 1080)  # pixels, of a common screen
@@ -94,6 +95,7 @@ def render(
             view = picture.view
             row = {"file": name, "title": view.title, "colour": view.colour}
             pictures.append({**row, "scale": [picture.scale.low, picture.scale.high]})
+        write_log(Path(folder))
     return document("render", {"name": survey.name, "pictures": pictures})
 
 

@@ -8,6 +8,7 @@ from mlscorr.io.store import check_output, document, output_folder
 from mlscorr.io.surveys import read_survey
 from mlscorr.pipeline.correction import correct
 from mlscorr.pipeline.finding import silent
+from mlscorr.pipeline.logs import write_log
 
 
 def demo(out, seed=1, overwrite=False, progress=None):
@@ -39,6 +40,7 @@ def simulate_survey(scenario_path, out, seed=1, overwrite=False, progress=None):
     check_output(out, [scenario_path, *scenario_files(scenario)], overwrite)
     (progress or silent)("Building the scene")
     simulate(scenario, np.random.default_rng(seed)).write(out, progress, overwrite)
+    write_log(Path(out))
     return _simulated(read_survey(out), scenario, seed)
 
 

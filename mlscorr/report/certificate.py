@@ -11,7 +11,9 @@ from matplotlib.figure import Figure
 
 from mlscorr.report.pages import now, versions
 from mlscorr.report.style import STYLE
-from mlscorr.wording import number, percent, thousands
+from mlscorr.report.wording import CERTIFICATE
+from mlscorr.survey import Statement
+from mlscorr.wording import number, thousands
 
 A4 = (8.27, 11.69)  # inch, ISO 216
 POINTS = 72.0  # of an inch
@@ -27,6 +29,7 @@ WARNINGS = 3  # that fit; the report has all
 NAME = 38  # letters of a file's name beside its digits
 NUMBERS = (0.52, 0.64, 0.76, 0.88, 1.0)  # right ends of columns, over the width between margins
 ROLES = ("control", "check")
+TESTED = ("verdict", "statistic", "degrees_of_freedom", "limits", "significance")
 
 
 def write_certificate(path: str | Path, report: Mapping[str, Any]) -> None:
@@ -48,7 +51,8 @@ def write_certificate(path: str | Path, report: Mapping[str, Any]) -> None:
         for number_of_page, draw in enumerate((_first_page, _second_page), start=1):
             sheet = _Sheet()
             draw(sheet, report)
-            sheet.foot(f"Written {written} by {_software()}. Page {number_of_page} of 2")
+            named = {"time": written, "software": _software(), "page": number_of_page}
+            sheet.foot(_words("foot", **named))
             pdf.savefig(sheet.figure)
 
 
@@ -129,13 +133,9 @@ def _first_page(sheet, report):
     sheet.heading("What was corrected")
     points = sum(row.get("points", 0) for row in report["files"])
     coverage = report["coverage"]
-    sheet.paragraph(
-        f"The coordinates of {thousands(points)} points of a mobile laser scan in "
-        f"{len(report['files'])} file{'s' * (len(report['files']) != 1)} were corrected for the "
-        "error of the positioning system by least squares collocation on surveyed targets. "
-        f"{thousands(coverage['points_outside_trajectory'])} points lie outside the trajectory "
-        "and are unchanged. Page 2 lists the files."
-    )
+    outside = coverage["points_outside_trajectory"]
+    files = len(report["files"])
+    sheet.paragraph(_words("corrected points", points=points, files=files, outside=outside))
 
     sheet.heading("Control")
     sheet.row("", ("surveyed", "observed", "used"), NUMBERS[:3], color=SOFT)
@@ -166,40 +166,23 @@ def _first_page(sheet, report):
         values = [*statistics["rmse"], statistics["rmse_horizontal"], statistics["rmse_3d"]]
         sheet.row(words, [number(value) for value in values], fontweight=weight)
     sheet.down(0.3)
-    sheet.paragraph(
-        "Residual = surveyed − observed. Check points took no part in the correction; in the "
-        "leave-one-out, each control point is predicted by the others.",
-        color=SOFT,
-    )
+    sheet.paragraph(_words("residuals"), color=SOFT)
 
     sheet.heading("Accuracy")
     for sentence in _accuracy(report["accuracy"]):
         sheet.paragraph(sentence)
     sigmas = report["check_sigmas"]
     if sigmas is not None:
-        low, high = sigmas["limits"]
-        verdict = {"hold": "The stated sigmas hold"}
-        relation = verdict.get(sigmas["verdict"], f"The stated sigmas are {sigmas['verdict']}")
-        sheet.paragraph(
-            f"{relation}: chi-squared of the check residuals over their sigmas is "
-            f"{sigmas['statistic']:.1f} ({sigmas['degrees_of_freedom']} degrees of freedom, limits "
-            f"{low:.1f} and {high:.1f} at {percent(1 - sigmas['significance'])})."
-        )
+        sheet.paragraph(_words("sigmas tested", **{key: sigmas[key] for key in TESTED}))
 
 
 def _accuracy(accuracy):
     """Sentences on the class of the standard, and whether the test conforms to it."""
     if not accuracy or accuracy["based_on"] is None:
-        return ["Not determined: no point judges the result."]
-    horizontal, vertical = (accuracy[f"class_{axis}_cm"] for axis in ("horizontal", "vertical"))
-    conforms = "does not conform"
-    if accuracy["conformant"]:
-        conforms = "conforms"
-    return [
-        f"Accuracy class: {horizontal} cm horizontal, {vertical} cm vertical. The test {conforms} "
-        f"to the {accuracy['standard']}.",
-        *accuracy["statement"],
-    ]
+        return [_words("no accuracy")]
+    values = {axis: accuracy[f"class_{axis}_cm"] for axis in ("horizontal", "vertical")}
+    values |= {"standard": accuracy["standard"], "conforms": bool(accuracy["conformant"])}
+    return [_words("accuracy class", **values), *accuracy["statement"]]
 
 
 def _second_page(sheet, report):
@@ -209,11 +192,11 @@ def _second_page(sheet, report):
     weak = report["weak"]
     share = report["well_determined"]
     if share is not None:
-        sheet.paragraph(f"{percent(share)} of the driven distance is well determined by control.")
+        sheet.paragraph(_words("well determined", share=share))
     if weak:
         _intervals(sheet, weak)
     else:
-        sheet.paragraph("None: control constrains the whole drive.")
+        sheet.paragraph(_words("all constrained"))
 
     sheet.heading("Files")
     groups = {"Corrected": report["files"], "Read": report["inputs"], "Written": report["outputs"]}
@@ -228,14 +211,14 @@ def _second_page(sheet, report):
         for row in shown:
             _file(sheet, row)
         if len(shown) < len(rows):
-            rest = f"and {len(rows) - len(shown)} more; report.json lists all with their SHA-256"
-            sheet.text(rest, color=SOFT)
+            sheet.text(_words("more files", count=len(rows) - len(shown)), color=SOFT)
             sheet.down()
 
     sheet.heading("Software")
     sheet.paragraph(", ".join(f"{name} {version}" for name, version in versions()))
     for words in (report["model"].get("warnings") or ())[:WARNINGS]:
-        sheet.paragraph(f"Warning: {textwrap.shorten(words, 220, placeholder=' …')}")
+        text = textwrap.shorten(words, 220, placeholder=" …")
+        sheet.paragraph(_words("warning", text=text))
 
     sheet.heading("Signatures")
     sheet.down(3.2)
@@ -255,8 +238,7 @@ def _intervals(sheet, weak):
         values = (number(row[key], digits) for key, digits in COLUMNS.items())
         sheet.row("", list(values), ends)
     if len(worst) < len(weak):
-        rest = f"and {len(weak) - len(worst)} more with smaller sigmas; weak.csv lists all"
-        sheet.text(rest, color=SOFT)
+        sheet.text(_words("more intervals", count=len(weak) - len(worst)), color=SOFT)
         sheet.down()
 
 
@@ -278,6 +260,11 @@ def _file(sheet, row):
     digits: Sequence[str] = row.get("sha256") or "–"
     sheet.text(digits, 0.52, size=MONOSPACE, family="DejaVu Sans Mono")
     sheet.down(1.0)
+
+
+def _words(key, **values):
+    """A sentence of the certificate."""
+    return Statement(key, values=values).sentence(CERTIFICATE)
 
 
 def _title(report):

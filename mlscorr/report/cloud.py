@@ -22,7 +22,6 @@ from mlscorr.report.pages import data_uri
 from mlscorr.report.render import (
     LABELS,
     MARK,
-    Easels,
     Picture,
     PictureOptions,
     colour_scale,
@@ -90,7 +89,8 @@ def view_cloud(
         done = progress("Looking at the cloud", sum(file.points for file in survey.clouds))
         stream = chain.from_iterable(map(read_chunks, survey.clouds))
         sample = gather(_watched(stream, done), near, facades)
-    about = CloudSample(sample.cloud[near_rows(sample.cloud.xyz, near)], sample.step)
+    rows_near = near_rows(sample.cloud.xyz, near)
+    about = CloudSample(sample.cloud[rows_near], sample.step)
     total = 2 * (len(sample.cloud) + len(about.cloud))  # scouted and drawn
     done = progress("Drawing the cloud", total)
 
@@ -106,7 +106,7 @@ def view_cloud(
         drawn = [*pictures(sample, rows, SETTINGS.panel, "overview", "section")]
     if len(about.cloud):
         drawn += pictures(about, near, SETTINGS.close_up, "targets")
-    scene = viewer_data(correction, sample.cloud, targets, near)
+    scene = viewer_data(correction, sample.cloud, targets, near, rows_near)
     return CloudViews(tuple(drawn), scene, sample.step, len(facades) > 0)
 
 
@@ -172,8 +172,7 @@ def close_ups(rows: list[TargetRow], limit: int = SETTINGS.close_ups) -> list[st
 
 def cloud_content(views: CloudViews, targets: list[TargetRow]) -> dict:
     """What the templates show of CloudViews."""
-    easels: Easels = {}
-    pictures = [_pair(picture, easels) for picture in views.pictures]
+    pictures = [_pair(picture) for picture in views.pictures]
     kinds = {pair["kind"]: pair for pair in pictures}
     close = [pair for pair in pictures if pair["kind"] == "target"]
     return {
@@ -191,10 +190,10 @@ def cloud_content(views: CloudViews, targets: list[TargetRow]) -> dict:
     }
 
 
-def _pair(picture, easels):
+def _pair(picture):
     """One pair of pictures in words and as addresses of images."""
     view = picture.view
-    before, after = (data_uri(panel, "png") for panel in picture.panels(easels=easels))
+    before, after = (data_uri(panel, "png") for panel in picture.panels())
     times = {mark.text for side in view.marks for mark in side if mark.kind == "residual"}
     return {
         "kind": view.name.partition("-")[0],
@@ -225,7 +224,11 @@ def _legend(colour, scale=None, visits=()):
 
 
 def viewer_data(
-    correction: Correction, cloud: PointCloud, targets: list[TargetRow], near: list[TargetRow]
+    correction: Correction,
+    cloud: PointCloud,
+    targets: list[TargetRow],
+    near: list[TargetRow],
+    rows_near: np.ndarray | None = None,
 ) -> dict:
     """What the 3D view shows before and after a correction: content of a JSON document.
 
@@ -240,9 +243,13 @@ def viewer_data(
         All of them are drawn.
     near : list of TargetRow
         Those near which the cloud is shown more densely.
+    rows_near : (k,) array, optional
+        ``near_rows`` of them, where they are known.
     """
+    if rows_near is None:
+        rows_near = near_rows(cloud.xyz, near)
     spread, spacing = thin_evenly(cloud.xyz)
-    picked = cloud[np.concatenate([spread, _near_rows(cloud.xyz, near)])]
+    picked = cloud[np.concatenate([spread, _dense_rows(cloud.xyz, near, rows_near)])]
     moved = correction.apply(picked).xyz
     origin = np.round(np.median(picked.xyz, axis=0))
     return {
@@ -288,22 +295,23 @@ def _first_in_cells(local, edge):
     return np.sort(np.unique(number, return_index=True)[1])
 
 
-def _near_rows(xyz, targets):
-    """Rows of points on and about targets, at most so many over all."""
-    rows_near = [np.empty(0, int)]
+def _dense_rows(xyz, targets, candidates):
+    """Rows of points on and about targets, at most so many over all, of the candidates."""
+    dense = [np.empty(0, int)]
     half = max(SETTINGS.viewer_points[1] // max(len(targets), 1) // 2, 1)
     radius = 1.5 * SETTINGS.plan_cell
-    candidates = near_rows(xyz, targets)
+    candidates = candidates[np.argsort(xyz[candidates, 0])]
     easting = xyz[candidates, 0]
     for row in targets:
-        rows = candidates[np.abs(easting - row.observed[0]) <= radius]
+        edges = np.searchsorted(easting, row.observed[0] + np.array([-radius, radius]))
+        rows = np.sort(candidates[slice(*edges)])
         away = np.linalg.norm(xyz[rows] - row.observed, axis=1)
         on_it = rows[away <= radius / 4]
         about = rows[(away > radius / 4) & (away <= radius)]
-        rows_near.append(on_it[:: max(1, -(-len(on_it) // half))])
+        dense.append(on_it[:: max(1, -(-len(on_it) // half))])
         if len(about):
-            rows_near.append(about[thin_evenly(xyz[about], half)[0]])
-    return np.concatenate(rows_near)
+            dense.append(about[thin_evenly(xyz[about], half)[0]])
+    return np.concatenate(dense)
 
 
 def _lines(correction):

@@ -9,15 +9,11 @@ from mlscorr.evaluate import TargetRow
 from mlscorr.io.trajectories import DAY, gps_epoch
 from mlscorr.report import tables
 from mlscorr.report.correction_report import CorrectionReport
-from mlscorr.survey import Survey
+from mlscorr.report.wording import FIRST_SCREEN
+from mlscorr.survey import Statement, Survey
 from mlscorr.wording import number, percent
 
 DAYS = ("Sunday", "Monday", "Tuesday", "Wednesday", "Thursday", "Friday", "Saturday")  # of a week
-RESULTS = {
-    "check": "3D RMSE at check points, before → after",
-    "leave-one-out": "3D RMSE at control points, before → leave-one-out",
-    "fit": "3D RMSE at control points, before → after (fit only)",
-}
 
 
 def recorded_time(survey: Survey) -> dict[str, str | None]:
@@ -36,11 +32,16 @@ def recorded_time(survey: Survey) -> dict[str, str | None]:
     epoch = gps_epoch(survey.trajectory, survey.clouds)
     if epoch is None:
         day, start = divmod(first, DAY)
-        text = f"{DAYS[int(day) % 7]}, {_clock(start)} to {_clock(last % DAY)} GPS time"
-        return {"start": None, "end": None, "text": f"{text} (the files state no date)"}
+        named = {"day": DAYS[int(day) % 7], "start": _clock(start), "end": _clock(last % DAY)}
+        return {"start": None, "end": None, "text": _words("recorded on a weekday", **named)}
     start, end = (epoch + timedelta(seconds=round(time)) for time in (first, last))
-    text = f"{start:%Y-%m-%d}, {start:%H:%M:%S} to {end:%H:%M:%S} GPS time"
+    text = _words("recorded on a date", start=start, end=end)
     return {"start": start.isoformat(), "end": end.isoformat(), "text": text}
+
+
+def _words(key, **values):
+    """Words of the first screen."""
+    return Statement(key, values=values).sentence(FIRST_SCREEN)
 
 
 def _clock(seconds):
@@ -87,15 +88,15 @@ def three_numbers(correction: Correction, report: CorrectionReport) -> list[tupl
     report : CorrectionReport
     """
     before, after, kind = report.judgement
-    accuracy = ("–", "no residual judges the result")
+    accuracy = ("–", _words("nothing judges"))
     if before is not None and after is not None:
         change = f"{number(before.rmse[4])} → {number(after.rmse[4])} m"
-        accuracy = (change, RESULTS[kind])
+        accuracy = (change, _words(f"rmse at {kind}"))
     points, _ = report.count("control")
     surveyed = report.points("control").surveyed
-    control = (f"{points} of {surveyed}", "surveyed control points used")
-    share = well_determined(correction, report)
-    return [accuracy, control, (percent(share), "of the drive is well determined by control")]
+    control = (f"{points} of {surveyed}", _words("control used"))
+    share = (percent(well_determined(correction, report)), _words("well determined"))
+    return [accuracy, control, share]
 
 
 def well_determined(correction: Correction, report: CorrectionReport) -> float:
@@ -125,12 +126,12 @@ def facts(survey: Survey, report: CorrectionReport) -> list[tuple[str, str]]:
     """
     clouds = [row.name for row in report.files] or [file.path.name for file in survey.clouds]
     pairs = list(survey.project.known.items())
-    pairs.append(("Coordinate reference system", survey.crs or "not stated in survey.toml"))
-    pairs.append(("Recorded", str(recorded_time(survey)["text"])))
-    pairs.append(("Cloud files", listed(clouds)))
+    pairs.append((_words("crs"), survey.crs or _words("no crs")))
+    pairs.append((_words("recorded"), str(recorded_time(survey)["text"])))
+    pairs.append((_words("cloud files"), listed(clouds)))
     if report.inputs:
         others = [row.name for row in report.inputs if row.name not in clouds]
-        pairs.append(("Other input files", listed(others)))
+        pairs.append((_words("other files"), listed(others)))
     return pairs
 
 

@@ -33,7 +33,17 @@ class EvenSample:
         self.count += len(cloud)
         while sum(map(len, self.parts)) > 2 * self.limit:
             self.step *= 2
-            self.parts = [PointCloud.concatenate([PointCloud.concatenate(self.parts)[::2]])]
+            self.parts = _every_second(self.parts)
+
+
+def _every_second(parts):
+    """Every second point of parts as if they were one, copied."""
+    halves = []
+    first = 0
+    for part in parts:
+        halves.append(PointCloud.concatenate([part[-first % 2 :: 2]]))
+        first += len(part)
+    return halves
 
 
 @dataclass(frozen=True)
@@ -66,6 +76,7 @@ class CloudSampler:
         self, targets: list[TargetRow], walls: np.ndarray, limit: int = SETTINGS.sample_points
     ):
         self._regions = (_cells(targets), _about(walls, SETTINGS.plan_cell))
+        self._cells = np.unique(np.concatenate(self._regions))
         self._spread = EvenSample(limit)
         self._near = [EvenSample(limit) for _ in self._regions]
 
@@ -73,9 +84,9 @@ class CloudSampler:
         """Take what the sample needs of a further chunk."""
         self._spread.add(chunk)
         number = _cell_numbers(chunk.xyz)
+        rows = np.flatnonzero(_is_in(number, self._cells))
         for cells, sample in zip(self._regions, self._near, strict=True):
-            if len(cells) > 1:
-                sample.add(chunk[_is_in(number, cells)])
+            sample.add(chunk[rows[_is_in(number[rows], cells)]])
 
     @property
     def sample(self) -> CloudSample:

@@ -41,6 +41,7 @@ class Settings:
     darkest_median: float = 0.35  # of a scale, where the darker picture has its median
     strongest_power: float = 4.0  # of the scale, lest noise near zero fill it
     canvas_bytes: float = 400e6  # B: as many views as fit are drawn at once; guard
+    finest_picture: float = 40e6  # pixels of a picture while marks are drawn: 120 MB; guard
     picture_sizes: tuple[int, int] = (64, 8192)  # pixels, least and largest width and height; guard
     page_margins: tuple[float, float, float, float] = (0.012, 0.105, 0.11, 0.045)
     # of width or height: beside the panels, above and below them, between stacked ones

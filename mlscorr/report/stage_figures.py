@@ -16,7 +16,7 @@ from mlscorr.estimate import Estimate
 from mlscorr.evaluate import Score
 from mlscorr.report import style
 from mlscorr.report.settings import SETTINGS
-from mlscorr.report.target_figures import draw_target
+from mlscorr.report.target_figures import draw_grid, scored_picture
 from mlscorr.survey import Matched, Trajectory
 from mlscorr.targets import PassTarget
 
@@ -45,10 +45,11 @@ def targets_figure(targets: Sequence[PassTarget]) -> Figure:
         if len(best) < len(targets):
             title += f" (the {len(best)} with the highest scores)"
         figure.suptitle(title, x=0.01, ha="left", fontsize=10, fontweight="bold")
-        for place, row in enumerate(sorted(best), start=1):
+        pictures = []
+        for row in sorted(best):
             number, target = targets[row]
-            axes = figure.add_subplot(lines, columns, place)
-            draw_target(axes, target, f"row {row}", number, f"score {target.score:.2f}")
+            pictures.append(scored_picture(target, f"row {row}", number))
+        draw_grid(figure, pictures, columns)
     return figure
 
 

@@ -9,10 +9,13 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.artist import Artist
-from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.font_manager import findfont, get_font
 from matplotlib.lines import Line2D
+from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 
 from mlscorr.report.settings import SETTINGS
 
@@ -171,30 +174,49 @@ def draw(figures: Figures, name: str) -> Figure:
 def svg(figure: Figure) -> bytes:
     """The figure as the bytes of an SVG, coordinates cut to 0.01 pt."""
     stream = io.BytesIO()
-    _save(figure, stream, format="svg", metadata={"Date": None})
+    with matplotlib.rc_context(STYLE):
+        _lay_out(figure)
+        FigureCanvasSVG(figure).print_svg(stream, metadata={"Date": None})
     text = stream.getvalue().decode()
     return re.sub(r' d="[^"]*"', lambda d: re.sub(r"(\.\d\d)\d+", r"\1", d[0]), text).encode()
 
 
 def png(figure: Figure) -> bytes:
     """The figure as the bytes of a PNG."""
+    with matplotlib.rc_context(STYLE):
+        _lay_out(figure)
+        figure.dpi = SETTINGS.dots_per_inch
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        pixels = np.asarray(canvas.buffer_rgba())[..., :3]
+    return png_of(Image.fromarray(pixels))
+
+
+def png_of(image: Image.Image) -> bytes:
+    """An image of Pillow as the bytes of a PNG.
+
+    Parameters
+    ----------
+    image : PIL.Image.Image
+    """
     stream = io.BytesIO()
-    software = {"Software": "mlscorr"}
-    _save(figure, stream, format="png", dpi=SETTINGS.dots_per_inch, metadata=software)
+    about = PngInfo()
+    about.add_text("Software", "mlscorr")
+    dots = (SETTINGS.dots_per_inch, SETTINGS.dots_per_inch)
+    image.save(stream, "png", compress_level=6, pnginfo=about, dpi=dots)
     return stream.getvalue()
 
 
-def _save(figure, stream, **options):
-    """Save a figure; its layout, most of the work, is found once and kept for further files."""
-    with matplotlib.rc_context(STYLE):
-        figure.savefig(stream, **options)
+def _lay_out(figure):
+    """Find the layout of a figure, most of the work, once for all its files.
+
+    ``savefig`` draws every figure one time more to find it.
+    """
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        FigureCanvasAgg(figure)
+        engine.execute(figure)
     figure.set_layout_engine("none")
-
-
-def wipe(axes: Axes) -> None:
-    """Remove all that was drawn into axes, which can then be drawn into again."""
-    for artist in [*axes.lines, *axes.patches, *axes.texts]:
-        artist.remove()
 
 
 def thin(

@@ -1,53 +1,31 @@
 """A small figure of each target, so that a surveyor can judge at a glance whether it is one."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import matplotlib
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle, Ellipse, Patch, Polygon
+from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
+from PIL import Image
 
 from mlscorr.evaluate import TargetRow
+from mlscorr.report.pen import Pen
 from mlscorr.report.settings import SETTINGS
-from mlscorr.report.style import BLUE, MARKS, STYLE, VERMILLION, label, png, styled, wipe
+from mlscorr.report.style import BLUE, MARKS, STYLE, VERMILLION, label, png, png_of
 from mlscorr.targets import FittedTarget
 
 BEAMS = ("dark", "bright", "went by")  # 0, 1 and -1 in a TargetView, and so counted as here
+PT = SETTINGS.dots_per_inch / 72  # pixels of a point
+ANGLES = np.linspace(0, 2 * np.pi, 97)
+CIRCLE = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)  # of radius 1
 
 
-@styled
-def target_figure(
-    target: FittedTarget, name: str | None, pass_number: int, note: str = ""
-) -> Figure:
-    """One target as a figure of its own.
-
-    Parameters
-    ----------
-    target : FittedTarget
-    name : str or None
-    pass_number : int
-    note : str
-        What is doubtful about it, written in red.
-    """
-    figure, axes = _blank()
-    _draw(axes, target)
-    _title(axes, target, name, pass_number, note, bool(note))
-    return figure
-
-
-def _blank():
-    """A figure and its axes, with three lines above them.
-
-    A layout that is sought takes a third of the time and cuts the first line.
-    """
-    figure = Figure(SETTINGS.target_figure)
-    return figure, figure.add_axes((0.13, 0.13, 0.85, 0.7))
-
-
-@styled
 def target_drawings(
     rows: list[TargetRow], fitted: dict[tuple[int, float], FittedTarget]
 ) -> list[tuple[str, bytes]]:
@@ -60,34 +38,97 @@ def target_drawings(
         FittedTarget by (pass number, gps_time).
     """
     drawings = []
-    figure, axes = _blank()  # new axes for each would take most of the time
     for row in rows:
         target = fitted.get((row.pass_number, row.gps_time))
         if target is None:
             continue
         note = _doubt(row, target)
-        _draw(axes, target)
-        _title(axes, target, row.name, row.pass_number, note, bool(note))
-        drawings.append((f"{row.name}, pass {row.pass_number}", png(figure)))
-        wipe(axes)
+        picture = draw_target(target, row.name, row.pass_number, note, bool(note))
+        title = f"{row.name}, pass {row.pass_number}"
+        drawings.append((title, png_of(Image.fromarray(picture))))
     return drawings
 
 
 def draw_target(
-    axes: Axes, target: FittedTarget, name: str | None, pass_number: int, note: str
-) -> None:
-    """Draw a target into axes of a larger figure; a low score is red.
+    target: FittedTarget, name: str | None, pass_number: int, note: str, is_doubtful: bool
+) -> np.ndarray:
+    """Pixels of one target in its plane: up is up, seen by the scanner.
 
     Parameters
     ----------
-    axes : matplotlib.axes.Axes
     target : FittedTarget
     name : str or None
     pass_number : int
     note : str
+        Beside the name.
+    is_doubtful : bool
+        The words are red then.
+
+    Returns
+    -------
+    (h, w, 3) array of uint8
+        RGB, of the size of ``SETTINGS.target_figure``.
     """
-    _draw(axes, target)
-    _title(axes, target, name, pass_number, note, target.score < SETTINGS.low_score)
+    width, height = np.round(np.array(SETTINGS.target_figure) * SETTINGS.dots_per_inch).astype(int)
+    frame = Frame.within(width, height, _half_width(target))
+    pen = Pen(np.full((height, width, 3), 255, np.uint8))
+    _axes(pen, frame)
+    _beams(pen, frame, target)
+    _fit(pen, frame, target)
+    pen.line(frame.corners[[0, 1, 2]], "#555555", 0.8 * PT)
+    _title(pen, target, name, pass_number, note, is_doubtful)
+    return pen.pixels
+
+
+def draw_grid(figure: Figure, pictures: Sequence[np.ndarray], columns: int) -> None:
+    """Put pictures of targets into a figure, row by row.
+
+    Parameters
+    ----------
+    figure : Figure
+    pictures : sequence of (h, w, 3) arrays
+    columns : int
+    """
+    lines = max(1, -(-len(pictures) // columns))
+    for place, picture in enumerate(pictures, start=1):
+        axes = figure.add_subplot(lines, columns, place)
+        axes.imshow(picture, interpolation="antialiased")
+        axes.set_axis_off()
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Where the axes of a target's picture are: pixels of what is in its plane, in cm.
+
+    Parameters
+    ----------
+    middle : (2,) array
+        Units: pixels.
+    half : float
+        Half of a side. Units: pixels.
+    half_width : float
+        The same in the plane. Units: cm.
+    """
+
+    middle: np.ndarray
+    half: float
+    half_width: float
+
+    @classmethod
+    def within(cls, width: int, height: int, half_width: float) -> Frame:
+        """The axes of a picture of a size in pixels, with three lines above them."""
+        half = min(0.85 * width, 0.7 * height) / 2
+        middle = np.array([0.13 * width + 0.425 * width, height * (0.17 + 0.35)])
+        return cls(middle, half, half_width)
+
+    def place(self, plane: np.ndarray) -> np.ndarray:
+        """Pixels (n, 2) of points (n, 2) in the plane, in cm to the right and up."""
+        return self.middle + np.asarray(plane) * [1, -1] * self.half / self.half_width
+
+    @property
+    def corners(self) -> np.ndarray:
+        """Upper left, lower left, lower right: pixels (3, 2)."""
+        return self.middle + self.half * np.array([[-1, -1], [-1, 1], [1, 1]])
 
 
 def _doubt(row, target):
@@ -130,12 +171,28 @@ def write_contact_sheet(
         figure.suptitle(title, x=0.01, ha="left", fontsize=11, fontweight="bold")
         if best:
             figure.legend(handles=_legend(), loc="outside lower left", ncols=6)
-        for i, row in enumerate(best):
-            axes = figure.add_subplot(lines, columns, i + 1)
-            target = fitted[row["pass"], row["gps_time"]]
-            name = row["name"] or f"row {rows.index(row) + 1}"
-            draw_target(axes, target, name, row["pass"], f"score {target.score:.2f}")
+        draw_grid(figure, [_sheet_picture(row, rows, fitted) for row in best], columns)
     Path(path).write_bytes(png(figure))
+
+
+def _sheet_picture(row, rows, fitted):
+    """The picture of a row of targets.json."""
+    target = fitted[row["pass"], row["gps_time"]]
+    name = row["name"] or f"row {rows.index(row) + 1}"
+    return scored_picture(target, name, row["pass"])
+
+
+def scored_picture(target: FittedTarget, name: str | None, pass_number: int) -> np.ndarray:
+    """Pixels of a target with its score, in red where that is low.
+
+    Parameters
+    ----------
+    target : FittedTarget
+    name : str or None
+    pass_number : int
+    """
+    is_low = target.score < SETTINGS.low_score
+    return draw_target(target, name, pass_number, f"score {target.score:.2f}", is_low)
 
 
 def _legend():
@@ -152,29 +209,56 @@ def _legend():
     ]
 
 
-def _draw(axes, target):
-    """Points in the plane, outline, centre and its covariance; up is up, seen by the scanner."""
-    view = target.view
-    outline = target.view.outline
-    turn = _upright(target) * 100.0  # cm
-    points = (view.points - outline.centre) @ turn.T
+def _half_width(target):
+    """Half of what the axes show: its board and what is beside it. Units: cm."""
     is_round = target.kind in ("circle", "hole")
-    half = 75.0 * outline.size * (1.0 if is_round else 1.15)  # cm: its board and what is beside it
-    rows = np.flatnonzero(np.abs(points).max(axis=1) < half)
+    return 75.0 * target.view.outline.size * (1.0 if is_round else 1.15)
+
+
+def _axes(pen, frame):
+    """A grid with its numbers."""
+    edge = frame.half_width
+    ticks = MaxNLocator(4, steps=[1, 2, 5, 10]).tick_values(-edge, edge)
+    digits = max(0, -int(np.floor(np.log10(ticks[1] - ticks[0]))))
+    size = 6 * PT
+    down = np.array([0.0, 2 * PT])
+    for tick in ticks[np.abs(ticks) <= edge]:
+        words = f"{tick:.{digits}f}".replace("-", "\N{MINUS SIGN}")
+        across = frame.place([[-edge, tick], [edge, tick]])
+        up = frame.place([[tick, edge], [tick, -edge]])
+        for line in (across, up):
+            pen.line(line, "#e4e4e4", 0.6 * PT)
+        left, foot = across[0], up[1]
+        pen.line(np.stack([left, left - [2 * PT, 0]]), "black", 0.8 * PT)
+        pen.line(np.stack([foot, foot + down]), "black", 0.8 * PT)
+        pen.text(tuple(left - [3.2 * PT, 0]), words, size, anchor="rm")
+        pen.text(tuple(foot + 1.6 * down), words, size, anchor="mt")
+    pen.text(tuple(frame.place([[0, -edge]])[0] + [0, 9.5 * PT]), "cm", size, anchor="mt")
+
+
+def _beams(pen, frame, target):
+    """Where the beams met the plane, by what they met."""
+    view = target.view
+    points = (view.points - view.outline.centre) @ (100.0 * _upright(target)).T  # cm
+    rows = np.flatnonzero(np.abs(points).max(axis=1) < frame.half_width)
     # so many make a figure of some 20 kB
     rows = rows[np.linspace(0, len(rows) - 1, min(len(rows), 350)).astype(int)]
     names = np.array(BEAMS)[view.state[rows].astype(int)]
     for name in ("bright", "dark", "went by"):
-        axes.plot(*points[rows[names == name]].T, linestyle="", **MARKS[name])
-    for patch in _outline(target, turn):
-        axes.add_patch(patch)
-    axes.add_patch(_ellipse(turn @ outline.covariance @ turn.T))
-    axes.plot(0.0, 0.0, "+", color=BLUE, markersize=8)
-    axes.set(xlim=(-half, half), ylim=(-half, half), aspect="equal")
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
-    axes.tick_params(labelsize=6, length=2, pad=1)
-    axes.set_xlabel("cm", fontsize=6, labelpad=0)
+        mark = MARKS[name]
+        size = mark["markersize"] * PT
+        pen.dots(frame.place(points[rows[names == name]]), mark["color"], size)
+
+
+def _fit(pen, frame, target):
+    """The fitted outline, its centre and that one's covariance."""
+    turn = 100.0 * _upright(target)  # cm
+    for line in _outline(target, turn):
+        pen.line(frame.place(line), BLUE, 1.1 * PT)
+    ellipse = _ellipse(turn @ target.view.outline.covariance @ turn.T)
+    pen.tint(frame.place(ellipse), VERMILLION, 0.35)
+    for arm in 4 * PT * np.eye(2):
+        pen.line(np.stack([frame.middle - arm, frame.middle + arm]), BLUE, 1.0 * PT)
 
 
 def _upright(target):
@@ -190,41 +274,44 @@ def _upright(target):
 
 
 def _outline(target, turn):
-    """Patches of the fitted outline, (0, 0) its centre."""
+    """Lines (n, 2) of the fitted outline, (0, 0) its centre. Units: cm."""
     outline = target.view.outline
-    style = {"fill": False, "edgecolor": BLUE, "linewidth": 1.1}
     radius = 50.0 * outline.size  # cm
     if target.kind in ("circle", "hole"):
+        radii = [radius]
         if outline.inner > 0:
-            inner = [Circle((0, 0), radius * outline.inner, **style)]
-        else:
-            inner = []
-        return [Circle((0, 0), radius, **style), *inner]
+            radii.append(radius * outline.inner)
+        return [size * CIRCLE for size in radii]
     cos = np.cos(outline.turn)
     sin = np.sin(outline.turn)
     edges = outline.size / 2 * np.array([[cos, sin], [-sin, cos]]) @ turn.T  # cm, half edges
-    corners = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]]) @ edges
-    crossing = [Polygon([-edge, edge], closed=False, **style) for edge in edges]
-    return [Polygon(corners, **style), *(crossing if target.kind == "checkerboard" else [])]
+    corners = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1], [1, 1]]) @ edges
+    lines = [corners]
+    if target.kind == "checkerboard":
+        lines += [np.stack([-edge, edge]) for edge in edges]
+    return lines
 
 
 def _ellipse(covariance):
-    """One sigma of the centre (covariance in cm^2), enlarged."""
+    """Outline (n, 2) of one sigma of the centre (covariance in cm^2), enlarged. Units: cm."""
     values, axes = np.linalg.eigh(covariance)
-    low, high = 2 * SETTINGS.ellipse_scale * np.sqrt(np.maximum(values, 0.0))
-    angle = np.degrees(np.arctan2(axes[1, 1], axes[0, 1]))
-    return Ellipse((0, 0), high, low, angle=angle, color=VERMILLION, alpha=0.35, linewidth=0)
+    half = SETTINGS.ellipse_scale * np.sqrt(np.maximum(values, 0.0))
+    return (half * CIRCLE) @ axes.T
 
 
-def _title(axes, target, name, pass_number, note, is_doubtful):
+def _title(pen, target, name, pass_number, note, is_doubtful):
     """Name, note, kind and size; pass, points and sigma; what is doubtful in red."""
     sigma = 1e3 * np.sqrt(np.trace(target.covariance))
     about = "about " if target.size_sigma > 0 else ""
-    above = {"transform": axes.transAxes, "color": VERMILLION if is_doubtful else "black"}
-    axes.text(0, 1.15, label(name, 12), fontweight="bold", fontsize=8, **above)
-    axes.text(1, 1.15, note, fontsize=6.2, ha="right", **above)
-    axes.set_title(
-        f"{target.kind} {about}{100 * target.size:.0f} cm, pass {pass_number}\n"
+    color = VERMILLION if is_doubtful else "black"
+    width, height = pen.size
+    left = 0.149 * width
+    small = 6.2 * PT
+    pen.text((left, 0.065 * height), label(name, 12), 8 * PT, color, "ls", bold=True)
+    pen.text((0.98 * width, 0.065 * height), note, small, color, "rs")
+    lines = (
+        f"{target.kind} {about}{100 * target.size:.0f} cm, pass {pass_number}",
         f"{target.points} points, 3D sigma {sigma:.1f} mm",
-        **{"fontsize": 6.2, "loc": "left", "pad": 2, "linespacing": 1.1},
     )
+    for words, foot in zip(lines, (0.11, 0.155), strict=True):
+        pen.text((left, foot * height), words, small, anchor="ls")

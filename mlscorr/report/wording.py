@@ -709,3 +709,161 @@ def in_words(statements: Iterable[Statement]) -> list[str]:
         Of keys of SENTENCES.
     """
     return [statement.sentence(SENTENCES) for statement in statements]
+
+
+# The first screen and the certificate of a correction
+
+FIRST_SCREEN: dict[str, Wording] = {
+    "rmse at check": "3D RMSE at check points, before → after",
+    "rmse at leave-one-out": "3D RMSE at control points, before → leave-one-out",
+    "rmse at fit": "3D RMSE at control points, before → after (fit only)",
+    "nothing judges": "no residual judges the result",
+    "control used": "surveyed control points used",
+    "well determined": "of the drive is well determined by control",
+    "crs": "Coordinate reference system",
+    "no crs": "not stated in survey.toml",
+    "recorded": "Recorded",
+    "recorded on a date": "{start:%Y-%m-%d}, {start:%H:%M:%S} to {end:%H:%M:%S} GPS time",
+    "recorded on a weekday": "{day}, {start} to {end} GPS time (the files state no date)",
+    "cloud files": "Cloud files",
+    "other files": "Other input files",
+}
+
+
+def _corrected_points(points: int, files: int, outside: int) -> str:
+    return (
+        f"The coordinates of {thousands(points)} points of a mobile laser scan in "
+        f"{counted(files, 'file')} were corrected for the error of the positioning system by least "
+        f"squares collocation on surveyed targets. {thousands(outside)} points lie outside the "
+        "trajectory and are unchanged. Page 2 lists the files."
+    )
+
+
+def _tested_sigmas(
+    verdict: str,
+    statistic: float,
+    degrees_of_freedom: int,
+    limits: Sequence[float],
+    significance: float,
+) -> str:
+    relation = f"The stated sigmas are {verdict}"
+    if verdict == "hold":
+        relation = "The stated sigmas hold"
+    low, high = limits
+    return (
+        f"{relation}: chi-squared of the check residuals over their sigmas is {statistic:.1f} "
+        f"({degrees_of_freedom} degrees of freedom, limits {low:.1f} and {high:.1f} at "
+        f"{percent(1 - significance)})."
+    )
+
+
+def _accuracy_class(horizontal: float, vertical: float, standard: str, conforms: bool) -> str:
+    verb = "conforms" if conforms else "does not conform"
+    return (
+        f"Accuracy class: {horizontal} cm horizontal, {vertical} cm vertical. The test {verb} to "
+        f"the {standard}."
+    )
+
+
+CERTIFICATE: dict[str, Wording] = {
+    "corrected points": _corrected_points,
+    "residuals": "Residual = surveyed − observed. Check points took no part in the correction; in "
+    "the leave-one-out, each control point is predicted by the others.",
+    "accuracy class": _accuracy_class,
+    "no accuracy": "Not determined: no point judges the result.",
+    "sigmas tested": _tested_sigmas,
+    "well determined": lambda share: (
+        f"{percent(share)} of the driven distance is well determined by control."
+    ),
+    "all constrained": "None: control constrains the whole drive.",
+    "more files": "and {count} more; report.json lists all with their SHA-256",
+    "more intervals": "and {count} more with smaller sigmas; weak.csv lists all",
+    "warning": "Warning: {text}",
+    "foot": "Written {time} by {software}. Page {page} of 2",
+}
+
+MEANINGS = {  # key of the model in report.json -> name, unit, meaning
+    "method": ("Method", "", "lsc: least squares collocation (Mao et al. 2015)"),
+    "order": (
+        "Order of the trend",
+        "",
+        "degree of the polynomial in time on each axis; none: the drift alone",
+    ),
+    "estimated_by": ("Parameters estimated by", "", "criterion and data that chose them"),
+    "log_likelihood": (
+        "Log-likelihood",
+        "",
+        "of the observations under this model; only differences between models count",
+    ),
+    "sigma0": ("sigma0", "1", "square root of the variance of unit weight; 1: stated sigmas hold"),
+    "covariance.family": (
+        "Covariance function",
+        "",
+        "process of the position's drift: exponential, Matérn 3/2 or 5/2, or integrated walk",
+    ),
+    "covariance.correlation_time": (
+        "Correlation time of the drift",
+        "s",
+        "time after which the position error has forgotten most of its value",
+    ),
+    "covariance.scale": (
+        "Scale of the drift",
+        "1",
+        "factor on the stated sigma of the position; 1: the POS states it correctly",
+    ),
+    "covariance.jitter_correlation_time": (
+        "Correlation time of the fast part",
+        "s",
+        "of position errors that change faster than the drift",
+    ),
+    "covariance.jitter_scale": (
+        "Scale of the fast part",
+        "1",
+        "factor on the stated sigma of the position for this part",
+    ),
+    "covariance.bias_correlation_time": (
+        "Correlation time of the slow part",
+        "s",
+        "of position errors that last longer than the drift",
+    ),
+    "covariance.bias_scale": (
+        "Scale of the slow part",
+        "1",
+        "factor on the stated sigma of the position for this part",
+    ),
+    "covariance.level_scale": (
+        "Scale of the level",
+        "1",
+        "factor on the stated sigma for an offset that stays within a segment",
+    ),
+    "covariance.attitude_scale": (
+        "Scale of the attitude",
+        "1",
+        "factor on the stated sigmas of roll, pitch and heading",
+    ),
+    "global_test.statistic": (
+        "Global test: statistic",
+        "1",
+        "weighted sum of squared residuals of the adjustment",
+    ),
+    "global_test.redundancy": (
+        "Global test: redundancy",
+        "1",
+        "observations that are not needed to determine the correction",
+    ),
+    "global_test.limits": ("Global test: limits", "1", "the statistic must lie between them"),
+    "global_test.passed": ("Global test: passed", "", "whether model and sigmas fit the residuals"),
+    "determined": ("Determined by control", "", "components of the pose that control determines"),
+    "variance_ratio": (
+        "Variance ratio",
+        "1",
+        "posterior over prior variance: near 0 control determines the component, near 1 the POS",
+    ),
+    "longest_gap": ("Longest interval without control", "s", "its start and end, gps_time"),
+    "passes_without_control": (
+        "Passes without control",
+        "s",
+        "start and end of each, gps_time",
+    ),
+    "warnings": ("Warnings", "", "of the estimate"),
+}

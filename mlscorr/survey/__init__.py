@@ -35,6 +35,7 @@ from mlscorr.survey.recording import (
     SurveyFileError,
     check_rng,
     check_survey,
+    choosing,
 )
 from mlscorr.survey.statement import Severity, Statement, Wording
 from mlscorr.survey.summary import Summary

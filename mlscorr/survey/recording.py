@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -348,33 +349,7 @@ class Survey(Summary):
         ValueError
             For a name that is no control point, with the nearest, and one that is given as both.
         """
-        points = self.control + self.excluded
-        for key, names in (("exclude", exclude), ("include", include)):
-            for name in names:
-                self._check_choice(key, name, points)
-        if both := sorted(set(exclude) & set(include)):
-            raise SurveyFileError(f"exclude and include both name {', '.join(both)}: choose one.")
-        out = (set(self.excluded.name) | set(exclude)) - set(include)
-        is_out = np.isin(np.array(points.name, dtype=str), list(out))
-        kept_in = (set(self.included) | set(include)) - set(exclude)
-        included = tuple(name for name in points.name if name in kept_in)
-        return replace(self, control=points[~is_out], excluded=points[is_out], included=included)
-
-    def _check_choice(self, key, name, points):
-        """Refuse a name that is no control point."""
-        if name in points.name:
-            return
-        if name in self.check.name:
-            raise SurveyFileError(
-                f"{key} names {name}, which is a check point and takes no part in any estimate. "
-                "Give names of control points, or change its role in the control list."
-            )
-        near = get_close_matches(name, points.name, n=1, cutoff=0.0)
-        hint = f"; the nearest name is {near[0]}" if near else ""
-        raise SurveyFileError(
-            f"{key} names {name}, which is none of the {counted(len(points), 'control point')}"
-            f"{hint}."
-        )
+        return choosing(self, exclude, include)
 
     @property
     def cloud_paths(self) -> tuple[Path, ...]:
@@ -590,3 +565,47 @@ def check_rng(value: object) -> None:
             f"rng = {str(value)[:60]!r} is no random generator: numpy.random.default_rng(seed) "
             "makes one of a seed."
         )
+
+
+def choosing(recording: Any, exclude: Collection[str], include: Collection[str]) -> Any:
+    """A survey or project with some control points kept out of the estimate, others kept in it.
+
+    Parameters
+    ----------
+    recording : Survey or ProjectParts
+        With ``control``, ``check``, ``excluded`` and ``included``.
+    exclude, include : collection of str
+        As of ``Survey.choosing``.
+
+    Raises
+    ------
+    ValueError
+        As ``Survey.choosing``.
+    """
+    points = recording.control + recording.excluded
+    for key, names in (("exclude", exclude), ("include", include)):
+        for name in names:
+            _check_choice(key, name, points, recording.check)
+    if both := sorted(set(exclude) & set(include)):
+        raise SurveyFileError(f"exclude and include both name {', '.join(both)}: choose one.")
+    out = (set(recording.excluded.name) | set(exclude)) - set(include)
+    is_out = np.isin(np.array(points.name, dtype=str), list(out))
+    kept_in = (set(recording.included) | set(include)) - set(exclude)
+    included = tuple(name for name in points.name if name in kept_in)
+    return replace(recording, control=points[~is_out], excluded=points[is_out], included=included)
+
+
+def _check_choice(key, name, points, check):
+    """Refuse a name that is no control point."""
+    if name in points.name:
+        return
+    if name in check.name:
+        raise SurveyFileError(
+            f"{key} names {name}, which is a check point and takes no part in any estimate. "
+            "Give names of control points, or change its role in the control list."
+        )
+    near = get_close_matches(name, points.name, n=1, cutoff=0.0)
+    hint = f"; the nearest name is {near[0]}" if near else ""
+    raise SurveyFileError(
+        f"{key} names {name}, which is none of the {counted(len(points), 'control point')}{hint}."
+    )

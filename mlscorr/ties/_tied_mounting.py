@@ -15,6 +15,7 @@ from mlscorr.estimate import (
     previewed_mounting,
 )
 from mlscorr.frames import georeferenced_anew, mounting_partials, partials_by_scanner
+from mlscorr.surfaces import SETTINGS as SURFACES
 from mlscorr.survey import PAINTED, Matched, Mounting, Survey, TieFeatures, Trajectory
 from mlscorr.ties.agreement import narrowest_gate, placed_sigma, widest_gate
 from mlscorr.ties.pairing import candidate_pairs, pair_features
@@ -61,7 +62,7 @@ def tie_mounting(
     def corrected(place, gps_time):
         return place + increments_by_scanner(corrections, place, gps_time, features.scanner)
 
-    sigma = np.hypot(sigma, SETTINGS.roughest)
+    sigma = np.hypot(sigma, SURFACES.roughest)
     radius = min(widest_gate(sigma), survey.search_radius)
     while True:
         moved = increments_by_scanner(corrections, *views)
@@ -118,7 +119,7 @@ def coarse_mounting(
     state = np.zeros(len(prior))
     width = radius / 2
     at = tuple(mountings)
-    while width > SETTINGS.roughest:
+    while width > SURFACES.roughest:
         angle = SETTINGS.parallel + 2 * turn_sigma * 2 * width / radius
         for _ in range(3):
             moved = remounted(planes, trajectory, mountings, at)
@@ -190,7 +191,7 @@ def turned_directions(features: TieFeatures, move: Callable) -> np.ndarray:
     centre = move(features.centre, features.gps_time)
 
     def tangent(unit):
-        way = SETTINGS.narrowest * unit
+        way = SURFACES.narrowest * unit
         return move(features.centre + way, features.time_beside(rows, way)) - centre
 
     up = np.array([0.0, 0.0, 1.0])

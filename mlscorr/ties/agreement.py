@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mlscorr.correction import Correction, PointSigma
+from mlscorr.surfaces import SETTINGS as SURFACES
 from mlscorr.survey import Survey, TieFeatures, Ties
 from mlscorr.ties.settings import SETTINGS
 
@@ -149,7 +150,7 @@ def weigh_by_time(ties: Ties) -> Ties:
     """
     factor = np.ones(len(ties))
     for side in (0, 1):
-        group = group_by_time(ties, side, SETTINGS.moment)
+        group = group_by_time(ties, side, SURFACES.moment)
         held = information(ties, group)[group]
         held = np.einsum("ni,nij,nj->n", ties.direction, held, ties.direction)
         factor = np.maximum(factor, held * SETTINGS.best_second**2)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from mlscorr.surfaces import SETTINGS as SURFACES
 from mlscorr.surfaces import direction_class
 from mlscorr.survey import TieFeatures
 from mlscorr.ties.settings import SETTINGS
@@ -54,7 +55,7 @@ def coarse_correction(features: TieFeatures, radius: float) -> np.ndarray:
     passes = np.split(order, np.flatnonzero(np.diff(features.pass_number[order])) + 1)
     low, high = np.empty((2, len(passes), 3))
     for number, rows in enumerate(passes):
-        lowest, highest = _edges(features.centre[rows], np.hypot(radius, SETTINGS.cell))
+        lowest, highest = _edges(features.centre[rows], np.hypot(radius, SURFACES.cell))
         near = ((low[:number] <= highest) & (high[:number] >= lowest)).all(axis=1)
         before = np.concatenate([order[:0], *(passes[i] for i in np.flatnonzero(near))])
         before = before[is_plane[before]]
@@ -66,7 +67,7 @@ def coarse_correction(features: TieFeatures, radius: float) -> np.ndarray:
         for part in np.unique(stretch):
             inside = rows[(stretch == part) & is_plane[rows]]
             votes = _votes(features, inside, before, tree, radius)
-            if len(votes.misfit) >= SETTINGS.feature_points:
+            if len(votes.misfit) >= SURFACES.feature_points:
                 times.append((part + 0.5) * SETTINGS.pause)
                 motions.append(_motion(votes, radius))
                 middles.append(features.centre[inside].mean(axis=0))
@@ -90,7 +91,7 @@ def _edges(place, margin=0.0):
 
 def _votes(features, inside, before, tree, radius):
     """The Votes of planes (k,) with those before, whose places the tree holds."""
-    limit = np.hypot(radius, SETTINGS.cell)
+    limit = np.hypot(radius, SURFACES.cell)
     count = min(4 * SETTINGS.neighbours, len(before))
     if count == 0 or len(inside) == 0:
         return Votes(np.empty((0, 3)), np.empty((0, 3)), np.empty(0))
@@ -107,7 +108,7 @@ def _votes(features, inside, before, tree, radius):
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     apart = tree.data[near] - features.centre[row]
     misfit = np.einsum("ni,ni->n", normal, apart)
-    beside = np.linalg.norm(apart - misfit[:, None] * normal, axis=1) <= SETTINGS.cell
+    beside = np.linalg.norm(apart - misfit[:, None] * normal, axis=1) <= SURFACES.cell
     arm = features.centre[row] - features.centre[inside].mean(axis=0)
     return Votes(arm[beside], normal[beside], misfit[beside])
 
@@ -118,7 +119,7 @@ def _motion(votes, radius):
     prior = np.repeat([radius, SETTINGS.parallel], 3) ** -2.0
     motion = np.append(_most_votes(votes, radius), np.zeros(3))
     width = radius / 2
-    while width > SETTINGS.roughest:
+    while width > SURFACES.roughest:
         for _ in range(3):
             left = votes.misfit - design @ motion
             weight = width**2 / (width**2 + left**2) ** 2  # Geman-McClure
@@ -136,7 +137,7 @@ def _most_votes(votes, radius):
     sign = np.where(opposite, -1.0, 1.0)
     total = 1e-6 * np.eye(3)
     right = np.zeros(3)
-    width = 2 * SETTINGS.roughest
+    width = 2 * SURFACES.roughest
     for number in np.unique(bins):
         misfit = (votes.misfit * sign)[bins == number]
         edges = np.arange(-radius - width, radius + 2 * width, width)

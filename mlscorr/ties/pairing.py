@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mlscorr.compiled_loops import loop
+from mlscorr.surfaces import SETTINGS as SURFACES
 from mlscorr.surfaces import direction_class, integer_hash, kind_number
 from mlscorr.survey import PAINTED, TIE_KINDS, TieFeatures, Ties
 from mlscorr.ties.settings import SETTINGS
@@ -91,7 +92,7 @@ def _beyond_chance(features, search, pairs):
     """
     correction, sigma, radius, _, pause = search
     radius = max(radius, SETTINGS.least_gate)
-    sigma = np.maximum(sigma, SETTINGS.roughest)
+    sigma = np.maximum(sigma, SURFACES.roughest)
     widest = _largest_near(features.centre + correction, sigma, radius)
     variance = 2 * (widest**2 + features.variance + SETTINGS.surface_sigma**2)
     gate = np.minimum(radius, SETTINGS.gate_sigmas * np.sqrt(variance))
@@ -123,7 +124,7 @@ def _is_unique(features, place, sigma):
     is_painted = np.isin(features.kind, PAINTED)
     unique = ~is_painted | (width <= 2 * SETTINGS.least_gate)
     painted = np.flatnonzero(is_painted)
-    edge = 2 * SETTINGS.least_gate + SETTINGS.cell
+    edge = 2 * SETTINGS.least_gate + SURFACES.cell
     # visits lie farther apart than any pair, as one more coordinate
     points = np.column_stack([place, 2 * edge * visit_number(features)])[painted]
     pairs = painted[cKDTree(points).query_pairs(edge, output_type="ndarray")]
@@ -132,8 +133,8 @@ def _is_unique(features, place, sigma):
     first, second = _directions(features, pairs)
     along = np.abs(np.einsum("ni,ni->n", apart, first))
     beside = np.sqrt(np.maximum((apart**2).sum(axis=1) - along**2, 0.0))
-    like = (along > SETTINGS.widest_paint) & (along <= width[pairs[:, 0]])
-    like &= (beside <= SETTINGS.cell) & (features.kind[pairs[:, 0]] == features.kind[pairs[:, 1]])
+    like = (along > SURFACES.widest_paint) & (along <= width[pairs[:, 0]])
+    like &= (beside <= SURFACES.cell) & (features.kind[pairs[:, 0]] == features.kind[pairs[:, 1]])
     like &= np.einsum("ni,ni->n", first, second) >= np.cos(SETTINGS.parallel)
     unique[pairs[like, 0]] = False
     return unique
@@ -240,7 +241,7 @@ def candidate_pairs(
     place = features.centre + correction
     sigmas = SETTINGS.gate_sigmas
     noise = features.variance.max(initial=0.0)
-    limit = np.hypot(min(radius, 2 * sigmas * sigma.max(initial=0.0)), SETTINGS.cell)
+    limit = np.hypot(min(radius, 2 * sigmas * sigma.max(initial=0.0)), SURFACES.cell)
     limit = np.hypot(limit, sigmas * np.sqrt(2 * (noise + SETTINGS.surface_sigma**2)))
     edge = np.sqrt(2) * limit
     cell = np.floor(place[:, :2] / edge) @ [1 << CELL_BITS, 1]
@@ -270,7 +271,7 @@ def candidate_pairs(
         float(radius),
         np.cos(angle),
         pause,
-        SETTINGS.cell,
+        SURFACES.cell,
         SETTINGS.gate_sigmas,
         2 * SETTINGS.surface_sigma**2,
     )

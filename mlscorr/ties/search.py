@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mlscorr.pos import PosErrors
+from mlscorr.surfaces import SETTINGS as SURFACES
 from mlscorr.survey import Survey, TieFeatures, Ties, time_spans
 from mlscorr.ties.agreement import (
     NORMAL_SCATTER,
@@ -80,18 +81,18 @@ def least_pause(survey: Survey, features: TieFeatures) -> float:
     survey : Survey
     features : TieFeatures
     """
-    cells = np.column_stack([np.floor(features.centre / SETTINGS.cell), visit_number(features)])
+    cells = np.column_stack([np.floor(features.centre / SURFACES.cell), visit_number(features)])
     cell = np.unique(cells, axis=0, return_inverse=True)[1].ravel()
     first, last = time_spans(cell, features.gps_time)
     began, ended = (survey.trajectory.at(time).position for time in (first, last))
     # a slow profile takes longer for a cell than a moment, too, but has hardly left it then
-    is_left = np.linalg.norm(ended - began, axis=1) > SETTINGS.cell
-    is_again = (is_left & (last - first > SETTINGS.moment))[cell]
-    moments = np.floor(features.gps_time / SETTINGS.moment)
+    is_left = np.linalg.norm(ended - began, axis=1) > SURFACES.cell
+    is_again = (is_left & (last - first > SURFACES.moment))[cell]
+    moments = np.floor(features.gps_time / SURFACES.moment)
     is_most = 2 * len(np.unique(moments[is_again])) > len(np.unique(moments))
     is_known = survey.mounting is not None or survey.trajectory.session is None
     if is_most and is_known and not survey.scanners:
-        return SETTINGS.moment
+        return SURFACES.moment
     return SETTINGS.pause
 
 

@@ -1,8 +1,7 @@
-"""Numbers that the search for ties rests on."""
+"""Numbers of the search for ties; those of its features are in ``mlscorr.surfaces``."""
 
 from dataclasses import dataclass
 
-from mlscorr.surfaces import SETTINGS as SURFACES
 from mlscorr.survey import PAUSE
 
 
@@ -11,14 +10,7 @@ class Settings:
     """Limits and sizes, each with its unit and reason."""
 
     # Features
-    cell: float = SURFACES.cell  # m
-    moment: float = SURFACES.moment  # s
-    feature_points: int = SURFACES.feature_points
-    roughest: float = SURFACES.roughest  # m
-    narrowest: float = SURFACES.narrowest  # m
-    widest_paint: float = SURFACES.widest_paint  # m
     ties: int = 6  # of a second, direction and pass: 10 mm each make 4 mm, two may be wrong
-    thinning_block: float = SURFACES.thinning_block  # m
     coarse_features: int = 6000  # for six unknowns of a mounting; more cost time alone
     # Pairs
     pause: float = PAUSE  # s between two visits of one pass

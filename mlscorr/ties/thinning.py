@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from mlscorr.surfaces import SETTINGS as SURFACES
 from mlscorr.surfaces import direction_class, first_of_groups, integer_hash
 from mlscorr.survey import TieFeatures, Ties
 from mlscorr.ties.settings import SETTINGS
@@ -17,7 +18,7 @@ def some_blocks(features: TieFeatures, number: int) -> TieFeatures:
     """
     if len(features) <= number:
         return features
-    chance = integer_hash(np.floor(features.centre / SETTINGS.thinning_block).astype(np.int64))
+    chance = integer_hash(np.floor(features.centre / SURFACES.thinning_block).astype(np.int64))
     return features[chance <= np.partition(chance, number)[number]]
 
 
@@ -37,10 +38,10 @@ def thinned_ties(ties: Ties, number: int = SETTINGS.ties) -> Ties:
         Of each second of a pass, direction and other scanner.
     """
     ties = ties[np.argsort(ties.gps_time[:, 0], kind="stable")]
-    moment = np.floor(ties.gps_time[:, 0] / SETTINGS.moment).astype(np.int64)
+    moment = np.floor(ties.gps_time[:, 0] / SURFACES.moment).astype(np.int64)
     bins = direction_class(ties.direction)
     earlier, later = ties.pass_number.T
     group = np.column_stack([earlier, ties.scanner[:, 1], moment, np.minimum(bins, 26 - bins)])
-    cell = np.floor(ties.place[:, 0] / SETTINGS.cell).astype(np.int64)
+    cell = np.floor(ties.place[:, 0] / SURFACES.cell).astype(np.int64)
     chance = integer_hash(np.column_stack([cell, later]))
     return ties[first_of_groups(group, [ties.gps_time[:, 0], chance], number)]

@@ -19,6 +19,7 @@ from mlscorr.io.surveys import read_project
 from mlscorr.pipeline.project import Options, check_project, correct_project, project_status
 from mlscorr.pipeline.project.stages import tile_tasks
 from mlscorr.pipeline.project.tasks import carry_out
+from mlscorr.survey import choosing
 from tests.beds import project_street as bed
 from tests.beds.documents import undocumented
 from tests.beds.made_once import copied_once
@@ -464,3 +465,16 @@ def test_results_are_of_the_paths_and_the_crs_that_are_asked_for(project, tmp_pa
     with warnings.catch_warnings(action="ignore"):  # of the other zone
         correct_project(folder, out, Options(page=False, resume=True))
     assert json.loads((out / "first" / "report.json").read_text())["crs"] == "EPSG:32649"
+
+
+def test_an_excluded_control_point_of_a_project_takes_no_part_in_any_drive(project, tmp_path):
+    "Its residual is reported by each drive that observed it, and no drive uses it"
+    parts = read_project(project)
+    name = parts.control.name[1]
+    result = correct_project(choosing(parts, [name], []), tmp_path / "out", QUICK)
+    rows = [row for report in result.reports.values() for row in report["targets"]]
+    own = [row for row in rows if row["name"] == name]
+    assert own and not any(row["used"] for row in own)
+    assert any(row["after"] is not None for row in own)
+    assert {row["reason"] for row in own} == {"excluded by the user"}
+    assert any(row["used"] for row in rows if row["role"] == "control")

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from mlscorr.surfaces import SETTINGS as SURFACES
 from mlscorr.ties import (
     SETTINGS,
     consistent_ties,
@@ -113,7 +114,7 @@ def test_no_second_is_better_than_its_bound():
     "Whatever their number, the ties of a second know a shift to 5 mm per axis at best"
     ties, _ = ties_of(street.features())
     for side in (0, 1):
-        group = group_by_time(ties, side, SETTINGS.moment)
+        group = group_by_time(ties, side, SURFACES.moment)
         sigma = np.linalg.eigvalsh(information(weigh_by_time(ties), group))[:, -1] ** -0.5
         assert sigma.min() > 0.0049
         assert np.linalg.eigvalsh(information(ties, group))[:, -1].max() ** -0.5 < 0.0008

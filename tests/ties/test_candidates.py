@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mlscorr.surfaces import SETTINGS as SURFACES
 from mlscorr.survey import TIE_KINDS
 from mlscorr.ties import SETTINGS
 from mlscorr.ties.pairing import candidate_pairs, visit_number
@@ -52,7 +53,7 @@ def all_pairs(features, place, sigma, radius, shift):
     gate = np.where(kind[first] == "pole", of_pole, gate)
     longer = np.abs(features.extent[first] - features.extent[second]) * np.sqrt(12)
     good = (kind[first] == kind[second]) & (cosine * sign >= np.cos(SETTINGS.parallel))
-    good &= (misfit <= gate) & (beside <= SETTINGS.cell)
+    good &= (misfit <= gate) & (beside <= SURFACES.cell)
     good &= (kind[first] != "dash") | (longer <= 6 * np.sqrt(noise))
     good &= (np.abs(features.gps_time[first] - features.gps_time[second]) > SETTINGS.pause) | (
         features.scanner[first] != features.scanner[second]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from mlscorr.surfaces import SETTINGS as SURFACES
 from mlscorr.survey import Mounting, Pos
 from mlscorr.ties import SETTINGS, feature_sigma, least_pause, residuals, search_ties
 from tests.beds import tie_streets as street
@@ -47,12 +48,12 @@ def test_a_scanner_that_spins_is_tied_to_itself():
     assert least_pause(survey, once) == SETTINGS.pause
     later = replace(once, gps_time=once.gps_time + 1.5)
     twice = type(once).concatenate([once, later])
-    assert least_pause(survey, twice) == SETTINGS.moment
+    assert least_pause(survey, twice) == SURFACES.moment
     session = np.zeros(len(survey.trajectory), int)
     joined = replace(survey, trajectory=replace(survey.trajectory, session=session))
     assert least_pause(joined, twice) == SETTINGS.pause  # of vehicles that may differ
     same = replace(joined, mounting=Mounting(np.zeros(3), Rotation.identity()))
-    assert least_pause(same, twice) == SETTINGS.moment
+    assert least_pause(same, twice) == SURFACES.moment
     ties = search_ties(survey, twice).ties
     assert len(ties) > 100
     assert ties.is_of_visit.all()

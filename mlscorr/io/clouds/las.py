@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from mlscorr.io.clouds._time_order import in_time_order
 from mlscorr.io.clouds.las_checks import read_layout
 from mlscorr.io.clouds.las_layout import LasLayout, decoding_points, read_records
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.store import as_path, open_file
+from mlscorr.io.store import as_path, file_state, open_file
 from mlscorr.io.trajectories import lacks_time
 from mlscorr.survey import CloudFile, CloudInMemory, PointCloud
 
@@ -282,6 +283,15 @@ def spread_records(layout: LasLayout) -> tuple[np.ndarray, np.ndarray]:
     places : (65 or fewer,) int array
     records : structured array of the same length
     """
+    places, records = _spread_records(layout, file_state(layout.path))
+    return places.copy(), records.copy()
+
+
+@lru_cache(maxsize=64)
+def _spread_records(
+    layout: LasLayout, _state: tuple[int, int | str]
+) -> tuple[np.ndarray, np.ndarray]:
+    """As spread_records, of a file in a state: several stages look at the same points."""
     places = np.unique(np.linspace(0, layout.points - 1, SETTINGS.sampled_points).astype(np.int64))
     chunks = places[:-1] // layout.chunk_size
     is_first = np.append(True, np.diff(chunks) > 0)[: len(chunks)]

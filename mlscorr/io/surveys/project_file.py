@@ -40,7 +40,7 @@ from mlscorr.io.surveys.survey_paths import (
 from mlscorr.io.surveys.survey_sections import CloudSection, SurveyFile
 from mlscorr.io.tables import NOTHING_SURVEYED
 from mlscorr.io.trajectories import check_crs, check_systems
-from mlscorr.survey import ControlPoints, InputFile, SurveyFileError, Trajectory
+from mlscorr.survey import ControlPoints, InputFile, SurveyFileError, Trajectory, choosing
 
 FOLDER_NAME = re.compile(r"[^\\/:*?\"<>|\x00-\x1f.][^\\/:*?\"<>|\x00-\x1f]*")  # on any system
 SHARED_TILES = "tiles"  # folder of the corrected files of more than one drive
@@ -185,6 +185,10 @@ class ProjectParts:
         How the list of these was understood.
     inputs : tuple of InputFile
         project.toml and the control list.
+    excluded : ControlPoints
+        Control points that the user keeps out of the estimate.
+    included : tuple of str
+        Names of those that are used though matching or the other points contradict them.
     """
 
     name: str
@@ -195,6 +199,8 @@ class ProjectParts:
     check: ControlPoints
     layout: str | None
     inputs: tuple[InputFile, ...]
+    excluded: ControlPoints = NOTHING_SURVEYED.control[[]]
+    included: tuple[str, ...] = ()
 
     @property
     def files(self) -> list[Path]:
@@ -249,7 +255,6 @@ def read_project(project: str | Path | StatedProject) -> ProjectParts:
     inputs = [input_file("project", path)]
     surveyed = NOTHING_SURVEYED
     if settings.control is not None:
-        _refuse_choice(path, settings.control)
         file = existing(path, "control.file", settings.control.file)
         inputs.append(input_file("control", file))
         try:
@@ -258,7 +263,13 @@ def read_project(project: str | Path | StatedProject) -> ProjectParts:
             error.args = (str(error).replace("survey.toml", path.name),)
             raise
     name = settings.name or path.parent.name
-    return ProjectParts(name, path, crs, drives, *surveyed, tuple(inputs))
+    project = ProjectParts(name, path, crs, drives, *surveyed, tuple(inputs))
+    if settings.control is None:
+        return project
+    try:
+        return choosing(project, settings.control.exclude, settings.control.include)
+    except SurveyFileError as error:
+        raise SurveyFileError(f"{path}: {error}") from None
 
 
 def stated_project(path: str | Path) -> StatedProject:
@@ -406,12 +417,3 @@ def _everywhere(drives):
     position = np.concatenate([w.position[some] for w, some in zip(ways, rows, strict=True)])
     number = np.arange(len(position), dtype=float)
     return Trajectory(number, position, Rotation.identity(len(position)))
-
-
-def _refuse_choice(path, section):
-    """Refuse exclude and include, which are of one survey."""
-    if section.exclude or section.include:
-        raise SurveyFileError(
-            f"{path}: exclude and include under [control] are of one survey. Give its survey.toml "
-            "a [control] of its own, or take the points out of the project's list."
-        )

@@ -92,7 +92,7 @@ def _check_control(project, checked, faults):
         if not len(survey.surveyed):
             faults.warn(NO_CONTROL.format(survey.name))
     near = {name for survey, _ in checked for name in survey.surveyed.name}
-    names = [*project.control.name, *project.check.name]
+    names = [*project.control.name, *project.check.name, *project.excluded.name]
     held = near.intersection(project.control.name)
     faults.warn(*sentences_of(few_targets(len(held))))
     faults.of("data", stages.check_control_near, project, [survey for survey, _ in checked])

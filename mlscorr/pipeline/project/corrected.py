@@ -175,7 +175,8 @@ def bare_survey(survey: Survey) -> Survey:
     survey : Survey
     """
     none = survey.control[[]]
-    return replace(survey, control=none, check=none, notes=(), layouts=(), inputs=())
+    survey = replace(survey, control=none, check=none, excluded=none, included=())
+    return replace(survey, notes=(), layouts=(), inputs=())
 
 
 def motion_of(corrected: CorrectedSurvey, with_sigma: bool) -> MovedClouds:

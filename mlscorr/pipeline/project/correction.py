@@ -230,7 +230,7 @@ class _Work:
         planned[:] = [d for drive in planned if (d := drive.without(lost)).survey.clouds]
         files = [task.key for task in every]
         surveys = [d.survey for d in planned]  # what results keep of them, paths and notes too
-        kept = [(s.control, s.check, s.crs, s.notes, _contents(s), s.clouds) for s in surveys]
+        kept = [(*_points(s), s.crs, s.notes, _contents(s), s.clouds) for s in surveys]
         key = digest(VERSION, files, kept, self.options.order, self.ties, self.options.sigma)
         keys = {d.survey.name: digest(key, d.survey.name) for d in planned}
         if not all(_is_there(store, own) for own in keys.values()):
@@ -297,6 +297,15 @@ class _Work:
 def _path(task):
     """Path of the cloud that a task reads."""
     return task.arguments[0].path
+
+
+def _points(survey):
+    """Surveyed points by their use; those that are excluded or included where there are any."""
+    points = survey.control, survey.check
+    chosen = survey.excluded, survey.included
+    if any(map(len, chosen)):
+        return (*points, *chosen)
+    return points
 
 
 def _contents(survey):

@@ -138,6 +138,8 @@ def planned_drive(
         survey,
         control=near_boxes(survey, project.control, boxes.values()),
         check=near_boxes(survey, project.check, boxes.values()),
+        excluded=near_boxes(survey, project.excluded, boxes.values()),
+        included=project.included,
         notes=tuple(notes),
         inputs=(*survey.inputs, *project.inputs),
     )

@@ -48,8 +48,8 @@ def scout(
     centres = np.array([row.observed for row in targets]).reshape(-1, 3)
     for cloud in chunks:
         sample.add(cloud)
-        low = cloud.xyz.min(axis=0, initial=np.inf)
-        high = cloud.xyz.max(axis=0, initial=-np.inf)
+        low = np.array([column.min(initial=np.inf) for column in cloud.xyz.T])
+        high = np.array([column.max(initial=-np.inf) for column in cloud.xyz.T])
         apart = np.maximum(low - centres, centres - high).max(axis=1)
         for k in np.flatnonzero(apart <= radii):  # not every target in every chunk
             near[k].append(_around(cloud, centres[k], radii[k]))

@@ -82,10 +82,11 @@ def _side(view, canvas, other, scale):
     pixels = np.full((*canvas.pixels.shape, 3), 255, np.uint8)
     if view.colour == "state":
         pixels[other.drawn] = rgb(GHOST)[0]
-    colours = paint(view.colour, canvas.value, scale)
+    drawn = canvas.drawn
+    colours = paint(view.colour, canvas.value[drawn], scale)
     if np.isinf(view.half_depth) and view.colour not in PAIRS:  # in a thin slice edges of single
-        colours = np.round(colours * canvas.light[..., None]).astype(np.uint8)  # points are noise
-    pixels[canvas.drawn] = colours[canvas.drawn]
+        colours = np.round(colours * canvas.light[drawn][:, None]).astype(np.uint8)  # points: noise
+    pixels[drawn] = colours
     return pixels
 
 

@@ -5,19 +5,21 @@ from dataclasses import dataclass
 
 import matplotlib
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
+from mlscorr.report.pen import Pen
 from mlscorr.report.render import symbols
 from mlscorr.report.render.quantities import ColourScale
 from mlscorr.report.render.view import View
 from mlscorr.report.settings import SETTINGS
-from mlscorr.report.style import STYLE, label, wipe
+from mlscorr.report.style import STYLE, label
 
 GAP, HEAD, FOOT, STACK_GAP = SETTINGS.page_margins
-Easels = dict[tuple[int, int], tuple[Figure, Axes]]
+PT = symbols.PT
+HALO = 1.2  # pixels of white on either side of a mark
+FRAME = (187, 187, 187)  # RGB
 
 
 @dataclass(frozen=True)
@@ -42,35 +44,27 @@ class Picture:
         """A name for a file, without suffix."""
         return "".join(c if c.isalnum() or c in "-_." else "_" for c in self.view.name)
 
-    def panels(self, decorated: bool = True, easels: Easels | None = None) -> tuple[bytes, ...]:
+    def panels(self, decorated: bool = True) -> tuple[bytes, ...]:
         """The bytes of two PNGs, before and after, for one to be laid over the other.
 
         Parameters
         ----------
         decorated : bool
             Without, they are the points alone, pixel by pixel.
-        easels : dict, optional
-            Figures to draw on by their size, which many pictures share: a new one takes longer
-            than what is drawn on it.
         """
         pair = [self.before, self.after]
         if decorated:
-            corner = symbols.free_corner(*pair)
-            height, width = self.before.shape[:2]
-            easels = {} if easels is None else easels
-            if (width, height) not in easels:
-                figure = _blank(width, height)
-                easels[width, height] = (figure, _panel_axes(figure, (width, height), (0, 0)))
-            figure, axes = easels[width, height]
-            for k in (0, 1):
-                _panel(axes, self.view, k, pair[k], (0, 0), corner)
-                pair[k] = _drawn(figure)
-                wipe(axes)
-                figure.images.clear()
+            pair = self._marked(self.before.shape[0])
         both = _few_colours(np.concatenate(pair))  # the same colours in both
         width = both.width
         half = both.height // 2
         return tuple(_png(both.crop((0, k * half, width, (k + 1) * half))) for k in (0, 1))
+
+    def _marked(self, height):
+        """Both sides under their marks, with letters for a page of some height in pixels."""
+        corner = symbols.free_corner(self.before, self.after)
+        sides = (self.before, self.after)
+        return [_panel(self.view, k, pixels, corner, height) for k, pixels in enumerate(sides)]
 
     def page(self, size: tuple[int, int]) -> bytes:
         """The bytes of a PNG: before and after side by side under a title, with a legend.
@@ -81,12 +75,14 @@ class Picture:
             Width and height. Units: pixels.
         """
         figure = _blank(*size)
-        corner = symbols.free_corner(self.before, self.after)
         corners = _panel_corners(self.view.camera.size, size)
-        for k, words in enumerate(("Before the correction", "After the correction")):
-            axes = _panel_axes(figure, self.view.camera.size, corners[k])
-            _panel(axes, self.view, k, (self.before, self.after)[k], corners[k], corner)
-            axes.set_title(words, fontsize=symbols.letter(axes, 1.0), color="#333333", loc="left")
+        titles = ("Before the correction", "After the correction")
+        for pixels, corner, title in zip(self._marked(size[1]), corners, titles, strict=True):
+            bottom = figure.bbox.height - corner[1] - pixels.shape[0]
+            figure.figimage(pixels, corner[0], bottom, origin="upper")
+            letters = symbols.points_of(figure, 1.0)
+            place = (corner[0] / size[0], 1 - (corner[1] - 8) / size[1])
+            figure.text(*place, title, fontsize=letters, color="#333333", va="bottom")
         _words(figure, self.view, corners[0][0] / size[0])
         symbols.legend(figure, self.view, self.scale, (GAP, FOOT))
         return _png(_few_colours(_drawn(figure)))
@@ -138,78 +134,69 @@ def _drawn(figure):
     return np.asarray(figure.canvas.buffer_rgba())[..., :3].copy()
 
 
-def _panel_axes(figure, size, corner):
-    """Axes in pixels for a panel whose upper left corner is there on the figure."""
-    width, height = size
-    wide = figure.bbox.width
-    high = figure.bbox.height
-    bottom = high - corner[1] - height
-    axes = figure.add_axes((corner[0] / wide, bottom / high, width / wide, height / high))
-    axes.set(xlim=(0, width), ylim=(height, 0), xticks=[], yticks=[], facecolor="none")
-    axes.spines[:].set(visible=True, color="#bbbbbb", linewidth=0.8)
-    return axes
-
-
-def _panel(axes, view, k, pixels, corner, free):
-    """Draw the points of one side, pixel by pixel, under its marks, with scale and compass."""
-    figure = axes.figure
-    bottom = figure.bbox.height - corner[1] - pixels.shape[0]
-    figure.figimage(pixels, corner[0], bottom, origin="upper", zorder=-1)
+def _panel(view, k, pixels, corner, height):
+    """The points of one side, pixel by pixel, under its marks, with scale and compass."""
+    pen = Pen(pixels)
     for mark in view.marks[k]:
-        _mark(axes, mark, view.camera)
-    _names(axes, view.marks[k], view.camera)
-    symbols.scale_bar(axes, view.camera)
-    symbols.compass(axes, view.camera, free)
+        _mark(pen, mark, view.camera)
+    _names(pen, view.marks[k], view.camera, symbols.letter(height, 0.62))
+    symbols.scale_bar(pen, view.camera, symbols.letter(height, 0.9))
+    symbols.compass(pen, view.camera, corner, symbols.letter(height, 0.8))
+    marked = pen.pixels
+    marked[[0, -1]] = marked[:, [0, -1]] = FRAME
+    return marked
 
 
-def _mark(axes, mark, camera):
+def _mark(pen, mark, camera):
     pixel = camera.project(mark.points)[0]
     if mark.kind == "surveyed":
-        axes.plot(*pixel.T, color=symbols.MARK, linewidth=2.2, path_effects=symbols.HALO)
+        pen.line(pixel, symbols.MARK, 2.2 * PT, HALO)
         if len(pixel) > 5:
             middle = pixel.mean(axis=0)
         else:
             middle = pixel[:4].mean(axis=0)
-        axes.plot(*middle, marker="+", markersize=15, markeredgewidth=2, color=symbols.MARK)
+        for arm in 7.5 * PT * np.eye(2):
+            pen.line(np.stack([middle - arm, middle + arm]), symbols.MARK, 2 * PT)
     elif mark.kind == "offset":
-        _arrow(axes, pixel, 2.4)
+        _arrow(pen, pixel, 2.4 * PT)
     elif mark.kind == "residual":
-        _arrow(axes, pixel, 2.0)
+        _arrow(pen, pixel, 2.0 * PT)
     else:
-        axes.plot(*pixel.T, markersize=6, markeredgewidth=1.3, **symbols.SYMBOLS[mark.kind])
+        symbols.symbol(pen, mark.kind, pixel[0])
 
 
-def _arrow(axes, pixel, width):
+def _arrow(pen, pixel, width):
     if np.hypot(*(pixel[1] - pixel[0])) < 14.0:  # pixels: the head would be longer
-        axes.plot(*pixel.T, color=symbols.MARK, linewidth=width, path_effects=symbols.HALO)
-        return
-    arrow = {"arrowstyle": "-|>,head_width=0.28,head_length=0.55", "shrinkA": 0, "shrinkB": 0}
-    arrow |= {"color": symbols.MARK, "linewidth": width, "path_effects": symbols.HALO}
-    axes.annotate("", xy=pixel[1], xytext=pixel[0], arrowprops=arrow)
+        pen.line(pixel, symbols.MARK, width, HALO)
+    else:
+        pen.arrow(pixel, symbols.MARK, width, (9.0, 5.0), HALO)
 
 
-def _names(axes, marks, camera):
+def _names(pen, marks, camera, size):
     """Names beside their symbols, left out where one would cover another."""
-    size = symbols.letter(axes, 0.62)
     taken = []
     for mark in marks:
         if mark.kind not in symbols.SYMBOLS:
             continue
         text = label(mark.text)
         x, y = camera.project(mark.points)[0][0]
-        box = np.array([x + 7, y - size, x + 7 + size * len(text), y + size])
+        width = size * 72 / 100 * len(text)
+        box = np.array([x + 7, y - size * 0.72, x + 7 + width, y + size * 0.72])
         if any((box[:2] < b[2:]).all() and (b[:2] < box[2:]).all() for b in taken):
             continue
         taken.append(box)
-        axes.text(
-            x + 7, y, text, fontsize=size, va="center", parse_math=False, path_effects=symbols.HALO
-        )
+        pen.text((x + 7, y), text, size, halo=2 * PT)
 
 
 def _words(figure, view, left):
     """The title, and the note in the foot."""
     figure.text(
-        left, 0.982, view.title, va="top", fontsize=symbols.letter(figure, 1.55), parse_math=False
+        left,
+        0.982,
+        view.title,
+        va="top",
+        fontsize=symbols.points_of(figure, 1.55),
+        parse_math=False,
     )
     below = {"ha": "right", "va": "bottom", "color": "#444444", "parse_math": False}
-    figure.text(1 - left, 0.018, view.note, fontsize=symbols.letter(figure, 0.85), **below)
+    figure.text(1 - left, 0.018, view.note, fontsize=symbols.points_of(figure, 0.85), **below)

@@ -158,12 +158,12 @@ def colour_scale(colour: str, *values: np.ndarray) -> ColourScale:
 
 
 def paint(colour: str, value: np.ndarray, scale: ColourScale) -> np.ndarray:
-    """RGB (h, w, 3) uint8 of values, grey where the value is NaN.
+    """RGB (..., 3) uint8 of values, grey where the value is NaN.
 
     Parameters
     ----------
     colour : str
-    value : (h, w) array
+    value : (...) array
     scale : ColourScale
     """
     if colour in PAIRS:

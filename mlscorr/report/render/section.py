@@ -96,16 +96,20 @@ def _places(scouted, cells):
 
 def _tied(scouted, residuals):
     """Rows of the sample about each of the worst facades, of every pass."""
-    plan = scouted.before.xyz[:, :2]
     time = scouted.before.gps_time
     facades = worst_facades(residuals)
-    half = SETTINGS.plan_cell / 2
     for places, times in zip(facades.place, facades.gps_time, strict=True):
-        at_first = (np.abs(plan - places[0, :2]) < half).all(axis=1)
-        at_first &= np.abs(time - times[0]) < TIES.pause / 2
-        if at_first.any():
-            middle = np.median(scouted.after.xyz[at_first, :2], axis=0)
-            yield np.flatnonzero((np.abs(scouted.after.xyz[:, :2] - middle) < half).all(axis=1))
+        rows = _about(scouted.before.xyz, places[0, :2])
+        at_first = rows[np.abs(time[rows] - times[0]) < TIES.pause / 2]
+        if len(at_first):
+            yield _about(scouted.after.xyz, np.median(scouted.after.xyz[at_first, :2], axis=0))
+
+
+def _about(xyz, middle):
+    """Rows of points (n, 3) in the cell about a place in plan."""
+    half = SETTINGS.plan_cell / 2
+    rows = np.flatnonzero(np.abs(xyz[:, 0] - middle[0]) < half)
+    return rows[np.abs(xyz[rows, 1] - middle[1]) < half]
 
 
 def _cells(scouted):
@@ -130,11 +134,13 @@ def _wall(scouted, rows):
     if len(rows) < SETTINGS.normal_points:
         return None
     xyz = scouted.after.xyz[rows]
+    if np.ptp(xyz[:, 2]) < SETTINGS.wall_height:
+        return None
     middle = np.median(xyz, axis=0)
-    variance, vectors = np.linalg.eigh(np.cov((xyz - middle)[:, :2].T))
+    plan = xyz[:, :2] - xyz[:, :2].mean(axis=0)
+    variance, vectors = np.linalg.eigh(plan.T @ plan / (len(plan) - 1))
     length = np.sqrt(12 * variance[1])  # of an evenly covered wall
-    is_flat = variance[0] <= SETTINGS.wall_flatness**2 and length >= SETTINGS.plan_cell / 2
-    if not is_flat or np.ptp(xyz[:, 2]) < SETTINGS.wall_height:
+    if variance[0] > SETTINGS.wall_flatness**2 or length < SETTINGS.plan_cell / 2:
         return None
     normal = np.append(vectors[:, 0], 0.0)
     foot = float(np.percentile(xyz[:, 2], 5))

@@ -4,32 +4,71 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Rectangle
-from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
+from mlscorr.report.pen import Pen
 from mlscorr.report.render.quantities import LABELS, ColourScale, colour_table, swatches
 from mlscorr.report.render.view import Camera
 from mlscorr.report.style import mark_handle, nice
 
 MARK = "#E6007E"  # what was surveyed: a colour that no scale has
-HALO = (withStroke(linewidth=4.0, foreground="white"),)
+PT = 100 / 72  # pixels of a point: pictures have 100 dots an inch
 SYMBOLS: dict[str, dict[str, Any]] = {
     "control": {"marker": "o", "color": "black"},
     "check": {"marker": "D", "color": "black", "markerfacecolor": "white"},
     "unused": {"marker": "x", "color": "black"},
 }
+SYMBOL = 6 * PT  # pixels, the diameter of a symbol
+EDGE = 1.3 * PT  # pixels, the width of its line
 POINTS = ("N", "NE", "E", "SE", "S", "SW", "W", "NW")
 WORDS = {"control": "Control point", "check": "Check point", "unused": "Not used"}
 
 
-def letter(where: Axes | Figure, factor: float) -> float:
-    """Font size in points: a share of the figure's height, and no less than can be read."""
-    figure = where.get_figure()
-    return factor * max(figure.bbox.height / 58, 14.0) * 72 / figure.dpi
+def letter(height: float, factor: float) -> float:
+    """Size of letters: a share of a picture's height, and no less than can be read.
+
+    Parameters
+    ----------
+    height : float
+        Units: pixels.
+    factor : float
+
+    Returns
+    -------
+    float
+        Units: pixels.
+    """
+    return factor * max(height / 58, 14.0)
+
+
+def points_of(figure: Figure, factor: float) -> float:
+    """Size of the same letters on a figure. Units: pt."""
+    return letter(figure.bbox.height, factor) * 72 / figure.dpi
+
+
+def symbol(pen: Pen, kind: str, middle: np.ndarray) -> None:
+    """Draw the symbol of a target: a dot, a diamond or a cross.
+
+    Parameters
+    ----------
+    pen : Pen
+    kind : str
+        Of SYMBOLS.
+    middle : (2,) array
+        Units: pixels.
+    """
+    half = SYMBOL / 2
+    if kind == "control":
+        pen.dots(middle[None], "black", SYMBOL + EDGE)
+    elif kind == "check":
+        corners = middle + half * np.sqrt(2) * np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])
+        pen.polygon(corners, "white")
+        pen.line(corners, "black", EDGE, closed=True)
+    else:
+        for arm in half * np.array([[1, 1], [1, -1]]):
+            pen.line(np.stack([middle - arm, middle + arm]), "black", EDGE)
 
 
 def _unit(size):
@@ -37,25 +76,37 @@ def _unit(size):
     return 0.05 * np.sqrt(size[0] * size[1])
 
 
-def scale_bar(axes: Axes, camera: Camera) -> None:
-    """A bar of round length at the lower left, true at the middle of the picture."""
+def bar_length(camera: Camera) -> float:
+    """Length of the scale bar: a round number at the middle of the picture. Units: m."""
     width, height = camera.size
+    return nice(0.25 * min(width, 1.5 * height) / camera.scale)
+
+
+def scale_bar(pen: Pen, camera: Camera, size: float) -> None:
+    """Draw a bar of round length at the lower left, true at the middle of the picture.
+
+    Parameters
+    ----------
+    pen : Pen
+    camera : Camera
+    size : float
+        Of its letters. Units: pixels.
+    """
+    height = camera.size[1]
     unit = _unit(camera.size)
-    length = nice(0.25 * min(width, 1.5 * height) / camera.scale)
+    length = bar_length(camera)
     left = 0.6 * unit
     foot = height - 0.5 * unit
     right = left + length * camera.scale
-    _paper(axes, 0.3 * unit, height - 1.45 * unit, right + 0.3 * unit, height - 0.2 * unit)
-    axes.plot([left, right], [foot, foot], color="black", linewidth=4, solid_capstyle="butt")
-    above: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": letter(axes, 0.9)}
-    axes.text((left + right) / 2, foot - 0.2 * unit, f"{length:g} m", **above)
+    _paper(pen, 0.3 * unit, height - 1.45 * unit, right + 0.3 * unit, height - 0.2 * unit)
+    pen.line(np.array([[left, foot], [right, foot]]), "black", 4 * PT)
+    pen.text(((left + right) / 2, foot - 0.25 * unit), f"{length:g} m", size, anchor="mb")
 
 
-def _paper(axes, left, top, right, bottom):
+def _paper(pen, left, top, right, bottom):
     """A white patch, on which symbols can be read before any points."""
-    axes.add_patch(
-        Rectangle((left, top), right - left, bottom - top, color="white", alpha=0.92, lw=0)
-    )
+    corners = np.array([[left, top], [right, top], [right, bottom], [left, bottom]])
+    pen.tint(corners, "white", 0.92)
 
 
 def free_corner(*pictures: np.ndarray) -> tuple[int, int]:
@@ -77,32 +128,51 @@ def free_corner(*pictures: np.ndarray) -> tuple[int, int]:
     return min(((1, 1), (1, 0), (0, 0)), key=drawn)
 
 
-def compass(axes: Axes, camera: Camera, corner: tuple[int, int]) -> None:
-    """North and east in a corner; in a level view what is up and what is right."""
-    arm = _unit(camera.size)
-    middle = np.array(camera.size) * corner + 2.0 * arm * (1 - 2 * np.array(corner))
+def directions(camera: Camera) -> dict[str, np.ndarray]:
+    """North and east in a picture (right, up); in a level view what is up and what is right.
+
+    Parameters
+    ----------
+    camera : Camera
+
+    Returns
+    -------
+    dict of (2,) arrays
+        By their names.
+    """
     right, up, away = camera.axes
     if abs(away[2]) < 0.35:
         point = round(np.degrees(np.arctan2(right[0], right[1])) / 45) % 8
-        arrows = {"up": up[[0, 2]] * [0, 1], POINTS[point]: np.array([1.0, 0.0])}
-    else:
-        arrows = {"E": camera.axes[:2, 0], "N": camera.axes[:2, 1]}
-    tips = np.array([[0, 0], *(1.35 * d for d in arrows.values())]) * [1, -1] * arm + middle
-    _paper(axes, *(tips.min(axis=0) - 0.4 * arm), *(tips.max(axis=0) + 0.4 * arm))
-    line: dict[str, Any] = {"arrowstyle": "<|-", "linewidth": 1.4, "shrinkA": 1, "shrinkB": 0}
-    for name, direction in arrows.items():
-        color = "#777777" if name in ("E", "up") else "black"
-        axes.annotate(
-            name,
-            xy=middle,
-            xytext=middle + 1.35 * arm * direction * [1, -1],
-            ha="center",
-            va="center",
-            color=color,
-            fontsize=letter(axes, 0.8),
-            fontweight="normal" if name in ("E", "up") else "bold",
-            arrowprops={**line, "color": color},
-        )
+        return {"up": up[[0, 2]] * [0, 1], POINTS[point]: np.array([1.0, 0.0])}
+    return {"E": camera.axes[:2, 0], "N": camera.axes[:2, 1]}
+
+
+def compass(pen: Pen, camera: Camera, corner: tuple[int, int], size: float) -> None:
+    """Draw the directions in a corner.
+
+    Parameters
+    ----------
+    pen : Pen
+    camera : Camera
+    corner : (int, int)
+        Column and row, 0 or 1.
+    size : float
+        Of its letters. Units: pixels.
+    """
+    arm = _unit(camera.size)
+    middle = np.array(camera.size) * corner + 2.0 * arm * (1 - 2 * np.array(corner))
+    arrows = {name: 1.35 * arm * d * [1, -1] for name, d in directions(camera).items()}
+    tips = np.array([[0, 0], *arrows.values()]) + middle
+    _paper(pen, *(tips.min(axis=0) - 0.4 * arm), *(tips.max(axis=0) + 0.4 * arm))
+    for name, way in arrows.items():
+        is_second = name in ("E", "up")
+        color = "#777777" if is_second else "black"
+        length = float(np.hypot(*way))
+        if length > 0.9 * size:  # else it points to the eye
+            shaft = way * (1 - 0.75 * size / length)  # ends before its letter
+            ends = np.stack([middle, middle + shaft])
+            pen.arrow(ends, color, 1.4 * PT, (0.4 * size, 0.25 * size))
+        pen.text(tuple(middle + way), name, size, color, "mm", bold=not is_second)
 
 
 def legend(figure: Figure, view: Any, scale: ColourScale, margins: tuple[float, float]) -> None:
@@ -128,7 +198,7 @@ def legend(figure: Figure, view: Any, scale: ColourScale, margins: tuple[float, 
             **place,
             ncols=len(handles),
             frameon=False,
-            fontsize=letter(figure, 0.85),
+            fontsize=points_of(figure, 0.85),
             handletextpad=0.5,
             columnspacing=1.4,
         )
@@ -139,7 +209,7 @@ def _colour_bar(figure, colour, scale, place):
     axes = figure.add_axes(place)
     axes.imshow(colour_table(colour)[None], aspect="auto", extent=(0, 1, 0, 1))
     axes.set_yticks([])
-    size = letter(figure, 0.85)
+    size = points_of(figure, 0.85)
     axes.tick_params(labelsize=size, length=3)
     values = MaxNLocator(6).tick_values(scale.low, scale.high)
     values = values[(values >= scale.low) & (values <= scale.high)]

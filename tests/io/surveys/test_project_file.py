@@ -202,3 +202,19 @@ def test_drives_of_two_systems_are_refused(city):
     (city / "b" / "way.csv").write_text(TRAJECTORY.replace("\n357", "\n1234357"))
     with pytest.raises(ValueError, match="one time system"):
         read_project(write(city, *both))
+
+
+def test_control_of_a_project_is_excluded_and_included_by_name(city):
+    "P1 takes no part, P2 does in any case; a name that is none of the list is refused by its file"
+    (city / "control.csv").write_text(
+        "name,easting,northing,height,sigma_horizontal,sigma_vertical,kind,size,role\n"
+        + "".join(f"P{k},{532000 + k},3374000,40,0.01,0.01,circle,0.6,control\n" for k in (1, 2))
+    )
+    drives = [DRIVE.format(name) for name in ("a", "b")]
+    control = '[control]\nfile = "control.csv"\nexclude = ["{}"]\ninclude = ["P2"]\n'
+    project = read_project(write(city, control.format("P1"), *drives))
+    assert project.control.name == ("P2",)
+    assert project.excluded.name == ("P1",)
+    assert project.included == ("P2",)
+    with pytest.raises(ValueError, match=r"project.toml: exclude names P3, .* nearest name is P"):
+        read_project(write(city, control.format("P3"), *drives))
