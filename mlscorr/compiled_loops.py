@@ -38,9 +38,6 @@ def _njit():
 
     By default numba stores them by the path of their module, so that a second environment compiles
     all again and may load modules that have moved.
-
-    By itself it keeps them by the place of their module, so that a second environment compiles
-    all again, and loads by the names of modules that may have moved.
     """
     from numba import njit
     from numba.core import caching

@@ -124,8 +124,6 @@ def _postorder(row, column):
     longest column comes directly before its parent. The factor is the same, but children and
     parents can form fronts.
 
-    A node's parent is the first one below it. Of several children that with the longest column
-    stands next to its parent. The factor is the same, but children and parents can be fronts.
     """
     below = np.diff(column)
     # root of all
@@ -146,8 +144,6 @@ def _ends_front(row, column, first):
     The cost counts multiplications and moved values: those of a front's product are written and
     read, and so are those of the matrix from which it is subtracted.
 
-    What counts are multiplications, and values moved: those of a front's product are written and
-    read, and so are those of the matrix from which it is subtracted.
     """
     ends = np.ones(column.size - 1, np.bool_)
     begin = 0
@@ -178,7 +174,6 @@ def _fill_in(pointer, index):
 
     They are the nodes of the matrix and of the columns whose first node this column is.
 
-    A column's nodes are those of the matrix and those of the columns whose first node it is.
     """
     count = pointer.size - 1
     row = np.empty(4 * index.size + count, dtype=np.int64)

@@ -362,7 +362,6 @@ class InformationSolver:
 
         If both are needed, the factor is computed again, because it takes most of the memory.
 
-        Who needs both has the factor worked out again: it is most of the memory.
         """
         values = self._factor
         _ = self._own_solution
@@ -516,7 +515,6 @@ def _information(rows, number):
 
     The information is the squared sigma of the signal in a row over that of the row's noise.
 
-    The first is the square of the signal's sigma in a row over that of the row's noise.
     """
     signal = rows.signals[number]
     variance = np.einsum("nii->ni", rows.noise.separate)

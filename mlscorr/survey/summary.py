@@ -42,7 +42,6 @@ position_sigma=None, attitude_sigma=None, session=None, scanned=None, weeks=None
 
         None if the fields are shown instead.
 
-        None where the fields say it.
         """
         return None
 
