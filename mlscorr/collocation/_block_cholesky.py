@@ -93,7 +93,7 @@ def _run_end(pattern, front, k):
 
 @loop
 def _find_row(pattern, front, node, at):
-    """Row of a front's panel at which a node begins, and position in ``row`` for the next search."""
+    """Row of a front's panel at which a node begins, and start of the next search in ``row``."""
     begin = pattern.node[front]
     end = pattern.node[front + 1]
     if node < end:

@@ -123,7 +123,6 @@ def _postorder(row, column):
     A node's parent is the first node below it in the factor. Of several children, the one with the
     longest column comes directly before its parent. The factor is the same, but children and
     parents can form fronts.
-
     """
     below = np.diff(column)
     # root of all
@@ -143,7 +142,6 @@ def _ends_front(row, column, first):
 
     The cost counts multiplications and moved values: those of a front's product are written and
     read, and so are those of the matrix from which it is subtracted.
-
     """
     ends = np.ones(column.size - 1, np.bool_)
     begin = 0
@@ -173,7 +171,6 @@ def _fill_in(pointer, index):
     """Nodes below the diagonal of each column of the factor, and start of each column.
 
     They are the nodes of the matrix and of the columns whose first node this column is.
-
     """
     count = pointer.size - 1
     row = np.empty(4 * index.size + count, dtype=np.int64)

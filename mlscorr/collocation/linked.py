@@ -245,9 +245,7 @@ class InformationSolver:
         return [part.reshape(*shape, columns.shape[1]) for part, shape in parts]
 
     def whiten(self, columns: np.ndarray) -> np.ndarray:
-        """Whiten columns to few rows with W^T W = c^T V^-1 c: residuals and prior steps,
-        triangular.
-        """
+        """Whiten columns to few triangular rows with W^T W = c^T V^-1 c."""
         states, residuals = self._solved(columns)
         parts = chain(residuals, self._prior_steps(states))
         triangles = [np.linalg.qr(p.reshape(-1, columns.shape[1]), mode="r") for p in parts]
@@ -273,9 +271,7 @@ class InformationSolver:
         return np.concatenate([part.reshape(-1, part.shape[2]) for part in weights])
 
     def precision(self, rows: np.ndarray) -> np.ndarray:
-        """Return a block of V^-1: for one observation by the selected inverse, otherwise by
-        solving.
-        """
+        """Return a block of V^-1, for one observation from the selected inverse."""
         ends = np.cumsum([part.sigma.size for part in self.sides])
         of_part = np.searchsorted(ends, rows, side="right")
         number, row = np.divmod(rows - ends[of_part], self._heights[of_part])  # from the end
@@ -311,7 +307,7 @@ class InformationSolver:
         return white.swapaxes(1, 2) @ (np.eye(white.shape[1]) - known) @ white
 
     def predictor(self, _: np.ndarray, trend: np.ndarray, trend_root: np.ndarray) -> Callable:
-        """Make the predictor of the rows' own columns, whatever is given; see Collocation.predict."""
+        """Make the predictor of the rows' own columns; the argument is ignored."""
         states = self._own_solution[0].copy()
         states[:, -1] -= states[:, :-1] @ trend
         inverse = np.empty(0) if trend_root is None else self._inverse
@@ -361,7 +357,6 @@ class InformationSolver:
         """Values of the selected inverse of L, in the place of its factor.
 
         If both are needed, the factor is computed again, because it takes most of the memory.
-
         """
         values = self._factor
         _ = self._own_solution
@@ -514,7 +509,6 @@ def _information(rows, number):
     """Mean information of a view on a signal, and number of views per unit of its clock.
 
     The information is the squared sigma of the signal in a row over that of the row's noise.
-
     """
     signal = rows.signals[number]
     variance = np.einsum("nii->ni", rows.noise.separate)
