@@ -440,7 +440,9 @@ class Survey(Summary):
 
     @property
     def assumed_mounting(self) -> Mounting:
-        """Mounting, or an assumed one: body axes at the estimated beam origin or the navigation
+        """Mounting, or an assumed one if none is known.
+
+        Assumed are body axes at the beam origin estimated from the cloud, or else at the navigation
         centre.
         """
         if self.beam_origin is None:
