@@ -1,4 +1,4 @@
-"""A small figure of each target, so that a surveyor can judge at a glance whether it is one."""
+"""Small figure of each target, for a quick visual check by a surveyor."""
 
 from pathlib import Path
 
@@ -22,7 +22,7 @@ BEAMS = ("dark", "bright", "went by")  # 0, 1 and -1 in a TargetView, and so cou
 def target_figure(
     target: FittedTarget, name: str | None, pass_number: int, note: str = ""
 ) -> Figure:
-    """One target as a figure of its own.
+    """Draw one target as a separate figure.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def target_figure(
     name : str or None
     pass_number : int
     note : str
-        What is doubtful about it, written in red.
+        Doubts about it, written in red.
     """
     figure, axes = _blank()
     _draw(axes, target)
@@ -51,7 +51,7 @@ def _blank():
 def target_drawings(
     rows: list[TargetRow], fitted: dict[tuple[int, float], FittedTarget]
 ) -> list[tuple[str, bytes]]:
-    """Pairs (title, PNG, some 20 kB) of the rows that hold an observation.
+    """Pairs (title, PNG of about 20 kB) of the rows with an observation.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def draw_target(
 
 
 def _doubt(row, target):
-    """Words where a target was not used, or is hardly like one."""
+    """Phrase on an unused target, or on one with a low score."""
     if row.role == "check":
         return ""
     if not row.used:
@@ -104,14 +104,14 @@ def _doubt(row, target):
 def write_contact_sheet(
     path: str | Path, rows: list[dict], fitted: dict[tuple[int, float], FittedTarget]
 ) -> None:
-    """Write one picture of all targets, those with the highest scores, in order of pass and time.
+    """Write one picture of the targets with the highest scores, sorted by pass and time.
 
     Parameters
     ----------
     path : path
-        The PNG file.
+        PNG file.
     rows : list of dict
-        Of targets.json. Those without a name are called by their row in targets.csv.
+        Rows of targets.json. Targets without a name are labeled by their row in targets.csv.
     fitted : dict
         FittedTarget by (pass number, gps_time).
     """
@@ -153,15 +153,17 @@ def _legend():
 
 
 def _draw(axes, target):
-    """Points in the plane, outline, centre and its covariance; up is up, seen by the scanner."""
+    """Draw points in the plane, outline, centre and its covariance; up is up, seen from the
+    scanner.
+    """
     view = target.view
     outline = target.view.outline
     turn = _upright(target) * 100.0  # cm
     points = (view.points - outline.centre) @ turn.T
     is_round = target.kind in ("circle", "hole")
-    half = 75.0 * outline.size * (1.0 if is_round else 1.15)  # cm: its board and what is beside it
+    half = 75.0 * outline.size * (1.0 if is_round else 1.15)  # cm: its board and surroundings
     rows = np.flatnonzero(np.abs(points).max(axis=1) < half)
-    # so many make a figure of some 20 kB
+    # this number gives a figure of about 20 kB
     rows = rows[np.linspace(0, len(rows) - 1, min(len(rows), 350)).astype(int)]
     names = np.array(BEAMS)[view.state[rows].astype(int)]
     for name in ("bright", "dark", "went by"):
@@ -178,7 +180,9 @@ def _draw(axes, target):
 
 
 def _upright(target):
-    """Plane axes (2, 2) to right and up as the scanner sees them; of a flat one, up is north."""
+    """Plane axes (2, 2) to the right and up as seen from the scanner; for a flat target, up is
+    north.
+    """
     normal = target.normal
     if normal[2] ** 2 < 0.5:
         up = np.array([0.0, 0.0, 1.0])
@@ -217,7 +221,7 @@ def _ellipse(covariance):
 
 
 def _title(axes, target, name, pass_number, note, is_doubtful):
-    """Name, note, kind and size; pass, points and sigma; what is doubtful in red."""
+    """Write name, note, kind and size; pass, points and sigma; doubts in red."""
     sigma = 1e3 * np.sqrt(np.trace(target.covariance))
     about = "about " if target.size_sigma > 0 else ""
     above = {"transform": axes.transAxes, "color": VERMILLION if is_doubtful else "black"}

@@ -1,4 +1,4 @@
-"""Pictures: what the cloud looks like before and after, and how each is laid out on paper."""
+"""Pictures of the cloud before and after, and their layout on paper."""
 
 import io
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ Easels = dict[tuple[int, int], tuple[Figure, Axes]]
 
 @dataclass(frozen=True)
 class Picture:
-    """One view before and after, by the same camera and colour scale.
+    """One view before and after, with the same camera and color scale.
 
     Parameters
     ----------
@@ -39,19 +39,18 @@ class Picture:
 
     @property
     def name(self) -> str:
-        """A name for a file, without suffix."""
+        """File name, without suffix."""
         return "".join(c if c.isalnum() or c in "-_." else "_" for c in self.view.name)
 
     def panels(self, decorated: bool = True, easels: Easels | None = None) -> tuple[bytes, ...]:
-        """The bytes of two PNGs, before and after, for one to be laid over the other.
+        """Return the bytes of two PNGs, before and after, for overlay.
 
         Parameters
         ----------
         decorated : bool
-            Without, they are the points alone, pixel by pixel.
+            False for only the points, pixel by pixel.
         easels : dict, optional
-            Figures to draw on by their size, which many pictures share: a new one takes longer
-            than what is drawn on it.
+            Reusable figures by size, because a new one takes longer than drawing on it.
         """
         pair = [self.before, self.after]
         if decorated:
@@ -67,13 +66,13 @@ class Picture:
                 pair[k] = _drawn(figure)
                 wipe(axes)
                 figure.images.clear()
-        both = _few_colours(np.concatenate(pair))  # the same colours in both
+        both = _few_colours(np.concatenate(pair))  # the same colors in both
         width = both.width
         half = both.height // 2
         return tuple(_png(both.crop((0, k * half, width, (k + 1) * half))) for k in (0, 1))
 
     def page(self, size: tuple[int, int]) -> bytes:
-        """The bytes of a PNG: before and after side by side under a title, with a legend.
+        """Return the bytes of a PNG: before and after side by side under a title, with a legend.
 
         Parameters
         ----------
@@ -105,7 +104,7 @@ def panel_size(page: tuple[int, int], stacked: bool = False) -> tuple[int, int]:
 def _panel_corners(panel, page):
     """Column and row of the upper left corner of both panels on their page.
 
-    They stand one above the other where there is no room side by side.
+    They are stacked if there is no room side by side.
     """
     top = round(HEAD * page[1])
     if 2 * panel[0] > page[0]:
@@ -122,7 +121,7 @@ def _png(image):
 
 
 def _few_colours(pixels):
-    """An image of 256 colours: a third of the bytes, and no difference to the eye."""
+    """Reduce an image to 256 colors: a third of the bytes, and no visible difference."""
     return Image.fromarray(pixels).quantize(256, dither=Image.Dither.NONE)
 
 
@@ -139,7 +138,7 @@ def _drawn(figure):
 
 
 def _panel_axes(figure, size, corner):
-    """Axes in pixels for a panel whose upper left corner is there on the figure."""
+    """Axes in pixels for a panel with a given upper left corner on the figure."""
     width, height = size
     wide = figure.bbox.width
     high = figure.bbox.height
@@ -189,7 +188,7 @@ def _arrow(axes, pixel, width):
 
 
 def _names(axes, marks, camera):
-    """Names beside their symbols, left out where one would cover another."""
+    """Write names next to their symbols, unless one would cover another."""
     size = symbols.letter(axes, 0.62)
     taken = []
     for mark in marks:
@@ -207,7 +206,7 @@ def _names(axes, marks, camera):
 
 
 def _words(figure, view, left):
-    """The title, and the note in the foot."""
+    """Write the title, and the note at the bottom."""
     figure.text(
         left, 0.982, view.title, va="top", fontsize=symbols.letter(figure, 1.55), parse_math=False
     )

@@ -1,4 +1,4 @@
-"""What stands beside the points: scale bar, compass and legend."""
+"""Symbols of a picture: scale bar, compass and legend."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -15,7 +15,7 @@ from mlscorr.report.render.quantities import LABELS, ColourScale, colour_table, 
 from mlscorr.report.render.view import Camera
 from mlscorr.report.style import mark_handle, nice
 
-MARK = "#E6007E"  # what was surveyed: a colour that no scale has
+MARK = "#E6007E"  # surveyed targets: a color that no scale has
 HALO = (withStroke(linewidth=4.0, foreground="white"),)
 SYMBOLS: dict[str, dict[str, Any]] = {
     "control": {"marker": "o", "color": "black"},
@@ -27,7 +27,7 @@ WORDS = {"control": "Control point", "check": "Check point", "unused": "Not used
 
 
 def letter(where: Axes | Figure, factor: float) -> float:
-    """Font size in points: a share of the figure's height, and no less than can be read."""
+    """Font size in points: a share of the figure's height, and at least readable."""
     figure = where.get_figure()
     return factor * max(figure.bbox.height / 58, 14.0) * 72 / figure.dpi
 
@@ -38,7 +38,7 @@ def _unit(size):
 
 
 def scale_bar(axes: Axes, camera: Camera) -> None:
-    """A bar of round length at the lower left, true at the middle of the picture."""
+    """Draw a bar of round length at the lower left, true in the middle of the picture."""
     width, height = camera.size
     unit = _unit(camera.size)
     length = nice(0.25 * min(width, 1.5 * height) / camera.scale)
@@ -52,14 +52,14 @@ def scale_bar(axes: Axes, camera: Camera) -> None:
 
 
 def _paper(axes, left, top, right, bottom):
-    """A white patch, on which symbols can be read before any points."""
+    """Draw a white patch, on which symbols are readable over points."""
     axes.add_patch(
         Rectangle((left, top), right - left, bottom - top, color="white", alpha=0.92, lw=0)
     )
 
 
 def free_corner(*pictures: np.ndarray) -> tuple[int, int]:
-    """The corner (column, row; 0 or 1) other than the scale bar's with the least points."""
+    """Corner (column, row; 0 or 1) with the least points, except the scale bar's."""
     height, width = pictures[0].shape[:2]
     side = round(4 * _unit((width, height)))
 
@@ -78,7 +78,7 @@ def free_corner(*pictures: np.ndarray) -> tuple[int, int]:
 
 
 def compass(axes: Axes, camera: Camera, corner: tuple[int, int]) -> None:
-    """North and east in a corner; in a level view what is up and what is right."""
+    """Draw north and east in a corner; in a horizontal view, up and right."""
     arm = _unit(camera.size)
     middle = np.array(camera.size) * corner + 2.0 * arm * (1 - 2 * np.array(corner))
     right, up, away = camera.axes
@@ -106,7 +106,7 @@ def compass(axes: Axes, camera: Camera, corner: tuple[int, int]) -> None:
 
 
 def legend(figure: Figure, view: Any, scale: ColourScale, margins: tuple[float, float]) -> None:
-    """What colours and marks mean, in the foot of the page.
+    """Explain colors and marks at the bottom of the page.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def legend(figure: Figure, view: Any, scale: ColourScale, margins: tuple[float, 
     view : View
     scale : ColourScale
     margins : (float, float)
-        Beside the panels and below them, over width and height of the page.
+        Margins next to and below the panels, relative to width and height of the page.
     """
     gap, foot = margins
     place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (gap, 0.01)}
@@ -143,7 +143,7 @@ def _colour_bar(figure, colour, scale, place):
     axes.tick_params(labelsize=size, length=3)
     values = MaxNLocator(6).tick_values(scale.low, scale.high)
     values = values[(values >= scale.low) & (values <= scale.high)]
-    if scale.exponent < 1:  # where even steps would crowd at the end
+    if scale.exponent < 1:  # even steps would crowd at the end
         values = np.array([scale.low, *_quarters(scale), scale.high])
     axes.set_xticks(scale.share(values), [f"{value:.2g}" for value in values])
     if unit:
@@ -152,14 +152,14 @@ def _colour_bar(figure, colour, scale, place):
 
 
 def _quarters(scale):
-    """Values at a quarter, the half and three quarters of a scale."""
+    """Values at one quarter, one half and three quarters of a scale."""
     return scale.low + (scale.high - scale.low) * np.array([0.25, 0.5, 0.75]) ** (
         1 / scale.exponent
     )
 
 
 def _handles(view) -> Iterator[Line2D]:
-    """Legend entries of what is drawn in a view."""
+    """Yield legend entries of items drawn in a view."""
     marks = [mark for side in view.marks for mark in side]
     kinds = {mark.kind for mark in marks}
     arrow = r"$\rightarrow$"
