@@ -1,4 +1,4 @@
-"""What commands do with a project of several drives, and the one that tells how far it is."""
+"""Commands on a project of several drives, and the one that shows its progress."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ RESUMPTION = "what was done stays, and the same command with --resume goes on"
 def correct_drives(
     project: Path, out: Path, options: Options, gates: list[Gate], as_json: bool
 ) -> None:
-    """Correct all drives of a project and tell what became of them.
+    """Correct all drives of a project, and print the results.
 
     Parameters
     ----------
@@ -32,13 +32,13 @@ def correct_drives(
     out : Path
     options : Options
     gates : list of Gate
-        Each drive has to pass them.
+        Gates that each drive must pass.
     as_json : bool
 
     Raises
     ------
     typer.Exit
-        Where something failed.
+        If something failed.
     """
     from mlscorr.evaluate import failures
     from mlscorr.io.surveys import read_project, stated_project
@@ -66,7 +66,7 @@ def correct_drives(
 
 
 def tell(statement: Statement) -> None:
-    """Say a statement on the way; warnings and failures in any case.
+    """Print a progress statement; warnings and failures even in quiet mode.
 
     Parameters
     ----------
