@@ -1,4 +1,4 @@
-"""What the collocation reaches over many simulated surveys, and on real drift.
+"""Accuracy of the collocation over many simulated surveys, and on real drift.
 
     python benchmarks/lsc_study.py windows SERIES.err
     python benchmarks/lsc_study.py STUDY [--seeds 25] [--first 0]
@@ -59,7 +59,7 @@ def by_scenario(rows, statistic):
 
 
 def inside(survey, found):
-    """Which epochs (n,) lie within the control span."""
+    """Mask (n,) of the epochs within the control span."""
     time = survey.recorded.gps_time
     return (time >= found.span[0]) & (time <= found.span[1])
 

@@ -1,4 +1,4 @@
-"""Whether the stretch that a diagnosis points at is the one in which an effect acts.
+"""Agreement of the interval that a diagnosis names with the one in which an effect acts.
 
     OMP_NUM_THREADS=1 python benchmarks/where_study.py [--seeds 6] [--seed 9000] [--size 4]
 
@@ -35,7 +35,7 @@ EVENTS = ("position_bump", "position_step", "worse POS for a while")
 
 
 def confined(bed, name, rng, m):
-    """Shift (m,) of rows, covariate and its true stretch."""
+    """Shift (m,) of rows, covariate and its true interval."""
     g = bed.g
     if name in ("position_bump", "position_step"):
         shift, _, fixed = sized(g, bed.signs, name, m, rng, bed.size)
@@ -68,7 +68,7 @@ def confined(bed, name, rng, m):
 
 
 def overlap(extent, truth):
-    """Intersection over union of two stretches."""
+    """Intersection over union of two intervals."""
     if extent is None:
         return 0.0
     shares = []
@@ -106,7 +106,7 @@ def case(bed, rng, kind, name, m):
 
 
 def run(seeds, seed, m, beds=2):
-    """Yields names and their results."""
+    """Yield names and their results."""
     ground = [Bed.of(seed + 2 * i) for i in range(beds)]
     for number, name in enumerate((*EVENTS, *BANDS)):
         results = []

@@ -29,7 +29,7 @@ def main():
     with tempfile.TemporaryDirectory() as scratch:
         path = arguments.survey or (DRIVE if DRIVE.exists() else simulated(Path(scratch)))
 
-        # Two lines do the work.
+        # The whole task takes two lines.
         compared = mlscorr.compare(mlscorr.read_survey(path))
         report = compared.write(arguments.out or Path(scratch) / "compared")
 
