@@ -3,7 +3,7 @@
     python benchmarks/bench_compile.py [survey.toml ...]
 
 By default the survey of `mlscorr demo`, which is simulated first, untimed. Each survey is corrected
-twice in processes of their own: with an empty folder for compiled loops, and again with the folder
+twice in separate processes: with an empty folder for compiled loops, and again with the folder
 that the first left. The difference is the delay for a new user; seconds are processor time.
 """
 

@@ -2,7 +2,7 @@
 
     OMP_NUM_THREADS=1 python benchmarks/closure_study.py [--cases 36] [--seed 8000]
 
-Made-up surveys of features: two opposite passes, 40 targets, of which 6 are check points, and 200
+Synthetic surveys of features: two opposite passes, 40 targets, of which 6 are check points, and 200
 patches, with one effect of 3 to 8 minimal detectable biases. The truth is free of noise: the share
 of the squared shift of all rows by the effect that a prediction removes, in the metric of the
 simulated drift. It is compared with the stated share.

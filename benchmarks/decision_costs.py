@@ -3,7 +3,7 @@
     python benchmarks/decision_costs.py [--records FOLDER] [--worlds N] [--picture FILE]
 
 Synthetic surveys of features, whose evidence is kept in FOLDER (as by ``train_decision.py``; a
-missing world takes minutes), are labelled at costs from a tenth to a hundred times the default, by
+missing world takes minutes), are labeled at costs from a tenth to a hundred times the default, by
 probabilities learned on other worlds.
 """
 

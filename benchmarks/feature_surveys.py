@@ -16,7 +16,7 @@ from mlscorr.simulate import DEMO, read_scenario, simulate
 from mlscorr.simulate.scenario import DriveScenario, PosScenario
 from mlscorr.survey import ControlPoints, Matched, TargetObservations, Trajectory
 
-EXTRACTION = 0.004  # m, one sigma of a target's centre, as extraction reaches it
+EXTRACTION = 0.004  # m, one sigma of a target's center, as extraction reaches it
 REACH = 40.0  # m, beyond which no target is extracted
 RATE = 10.0  # Hz of the trajectory; the POS's errors change more slowly
 FOLDER = Path(__file__).parents[1] / "examples" / "scenarios"

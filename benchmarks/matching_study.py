@@ -50,7 +50,7 @@ CAUSES = ("outages", "sinusoids", "mems", "real")
 class Made:
     """A simulated survey: the input of match, and the truth of each observation and control point.
 
-    truth (n,) is the row of the target seen, -1 for a look-alike; whole (k,) tells the control
+    truth (n,) is the row of the target seen, -1 for a look-alike; whole (k,) marks the control
     points whose position and appearance are those of their target, moved (k,) how far others were
     moved (m), 0 for mis-numbered ones.
     """

@@ -30,9 +30,7 @@ LIMIT = 0.2  # m/s: 2 mm from one epoch to the next at 100 Hz, less than a scann
 
 
 class Rates(NamedTuple):
-    """Largest rate (m/s), its time (s), epochs beyond LIMIT, excess at steps (m and sigmas),
-    residual
-    """
+    """Rate (m/s), its time, epochs beyond LIMIT, excess at steps, error, share in 1.96 sigma."""
 
     largest: float
     at: float

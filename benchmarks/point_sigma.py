@@ -20,7 +20,7 @@ import mlscorr
 from mlscorr.io.clouds import CorrectedPart, write_parts
 from mlscorr.simulate import DEMO, simulate
 
-EVERY = 20  # points; neighbours have the same pose and hardly tell more
+EVERY = 20  # points; neighbors have the same pose and hardly tell more
 REPEATS = 3
 
 

@@ -96,7 +96,7 @@ def matching(seeds):
 
 
 def targets(seeds):
-    """Recall, centre errors and false targets."""
+    """Recall, center errors and false targets."""
     return target_study.figures(seeds)
 
 

@@ -4,8 +4,9 @@ python benchmarks/scanners_study.py [--seeds 12] [--first 1] [--control 8]
 
 RMS errors (mm, mdeg) of both mountings and of the second relative to the first, the median of their
 sigmas, and the share within two; distance between both images of a wall seen on one pass, by these
-errors and as stated by ``fit_sigma``; processor time of both. The scanners look to the left and to
-the right alike, and what their recorded mountings lack is drawn evenly up to 3 cm and 0.5 deg.
+errors and as stated by ``fit_sigma``; processor time of both. The scanners face left and right
+symmetrically, and the errors of their recorded mountings are drawn uniformly up to 3 cm and 0.5
+deg.
 """
 
 import argparse

@@ -3,16 +3,16 @@
 python benchmarks/ties_files_study.py [--seeds 4] [--control 0 3 6 12] [--scanners 2] [--elsewhere]
     [--spinning] [--passes 1] [--road [--without-paint]]
 
-RMS in 3D of the whole trajectory by control alone and with ties, the shares within 2 sigma, and how
-far apart the trajectories of both passes are left in a place, with the share of that within 2 sigma
-of their difference. Without control the latter two are claimed, and of the error common to both
-passes only that it is as large as the POS's sigmas and the ties imply: a survey has few independent
-values of it, so that its share within 2 sigma is meaningful only over many surveys. Drives are the
-simulator's canyon by a MEMS unit that has GNSS for 5 s at both ends of each pass of 150 s alone:
-its smoothed drift is 0.6 to 1 m. With --elsewhere each pass loses it once, for 70 to 120 s from a
-random moment. A second scanner is turned to the other side. With --spinning it has 16 rings and an
-axis that leans back by 30 deg, so that a pass sees a thing for seconds. With --road it sees the
-road alone, which has a dashed middle line and lines along the kerbs.
+RMS in 3D of the whole trajectory by control alone and with ties, the shares within 2 sigma, and the
+difference that remains between both passes at one place, with its share within 2 sigma. Without
+control the latter two are claimed, and of the error common to both passes only that it is as large
+as the POS's sigmas and the ties imply: a survey has few independent values of it, so that its share
+within 2 sigma is meaningful only over many surveys. Drives are the simulator's canyon by a MEMS
+unit that has GNSS for 5 s at both ends of each pass of 150 s alone: its smoothed drift is 0.6 to 1
+m. With --elsewhere each pass loses it once, for 70 to 120 s from a random moment. A second scanner
+is turned to the other side. With --spinning it has 16 rings and an axis that leans back by 30 deg,
+so that a pass sees a thing for seconds. With --road it sees the road alone, which has a dashed
+middle line and lines along the curbs.
 """
 
 import argparse

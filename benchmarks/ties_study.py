@@ -5,7 +5,7 @@ python benchmarks/ties_study.py [--seeds 6] [--control 3 6 12] [--streets canyon
 RMS in 3D of the whole trajectory by control alone and with ties, and the shares within 2 sigma.
 Drives, drift and sigmas are the simulator's canyon; ties are facades, road and cross walls at
 random places along the street, observed in both passes with 10 mm of noise, a share of them wrong.
-Other streets have kerbs and eaves too, or road, poles, kerbs and markings alone; all by --streets
+Other streets have curbs and eaves too, or road, poles, curbs and markings alone; all by --streets
 without a name. With --preview parameters are those of control alone, in a tenth of the time.
 """
 

@@ -2,11 +2,11 @@
 
     OMP_NUM_THREADS=1 python benchmarks/where_study.py [--seeds 6] [--seed 9000] [--size 4]
 
-Made-up surveys of features in which something acts in one stretch of time, way,
-range, incidence or scan angle alone: events of the library, a POS that is worse for a while, and
-mechanisms that no library knows. Of each the stretch that is told of that covariate is compared
-with the true one, in which it is half as large as at its largest or larger: intersection over
-union, zero where nothing is told.
+Synthetic surveys of features in which something acts in one interval of time, distance, range,
+incidence or scan angle alone: events of the library, a POS that is worse for a while, and
+mechanisms that no library knows. For each the interval reported for that covariate is compared with
+the true one, in which the effect is at least half of its maximum: intersection over union, zero if
+none is reported.
 """
 
 import argparse

@@ -125,7 +125,7 @@ class Street:
         return np.where((here & (number == 1))[:, None], WINDOW * forward, 0.0)
 
     def lorry(self, number, points, scanner):
-        """Put lorries on the right in the first pass, which the beams meet before facades."""
+        """Put trucks on the right in the first pass, which the beams meet before facades."""
         length, beside, height = LORRY
         s, lateral, up, _, _ = self.local(points)
         from_s, from_lateral, from_up, _, _ = self.local(scanner)

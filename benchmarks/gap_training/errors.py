@@ -12,7 +12,7 @@ from mlscorr.gap.residuals import SETTINGS, Rows
 from mlscorr.survey import Scanner
 
 ODD_SHARE = 0.12  # at most, estimated: of 5 surveys by ray casting 2 have more than a twentieth
-ODD_DEPTH = 0.02  # m from the plane, mode, estimated: a kerb of 10 cm along the edge of a patch
+ODD_DEPTH = 0.02  # m from the plane, mode, estimated: a curb of 10 cm along the edge of a patch
 
 
 def process(rng: Generator, time: np.ndarray, kind: str) -> np.ndarray:

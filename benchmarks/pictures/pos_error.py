@@ -32,7 +32,7 @@ OUTAGE = 60.0
 SETTLED = 65.0, 145.0  # s after an outage began: GNSS is back
 STEP = 0.1  # s
 LAGS = np.arange(0.0, 50.0, STEP)  # s
-KINDS = {  # label of a simulated unit -> its scenario, colour
+KINDS = {  # label of a simulated unit -> its scenario, color
     "simulated, real time with odometer": (
         {"processing": "filtered", "odometer": True},
         "#0072b2",
