@@ -1,13 +1,13 @@
-"""Refused control points beside which the POS drifts, and doesn't say so.
+"""Rejected control points near which the POS has an unstated drift.
 
-A misread control point stands alone. Where neighbours in time are all rejected and deviate the same
-way, the error is the POS's: its sigma is raised there as it grows between two places where
-GNSS holds it, and everything is estimated anew. Where another pass sees them deviate likewise, it
-is the points', as by one setup of the instrument: no POS drifts twice alike.
+A misread control point is isolated. If neighbors in time are all rejected with similar deviations,
+the error is the POS's: its sigma is inflated there, as it grows between two places with GNSS, and
+the estimation is repeated. If they deviate equally in another pass, the points are wrong, for
+example by one setup of the instrument: no POS drifts twice in the same way.
 
-What is refused after that may still be drift that comes and goes between two points. But a wrong
-point is wrong in all its passes alike, what was seen within a second drifted together, and control
-points are seldom wrong in great numbers: the odds of both decide.
+Points rejected after that may still show drift that comes and goes between two points. But a wrong
+point has the same error in all its passes, observations within a second share their drift, and
+control points are seldom wrong in great numbers: the odds of both hypotheses decide.
 """
 
 from collections.abc import Collection
@@ -29,16 +29,16 @@ from mlscorr.survey import Statement, Trajectory
 
 @dataclass(frozen=True)
 class DriftWindow:
-    """A stretch of drift that the POS doesn't state.
+    """An interval of drift that the POS doesn't state.
 
     Parameters
     ----------
     first, last : float
-        Between the control points that hold it; the pass's end where there is none. Units: s.
+        Times of the control points that bound it; the pass's end if there is none. Units: s.
     size : float
-        One sigma per axis in its middle. Units: m.
+        One sigma per axis at its center. Units: m.
     is_open : bool
-        Whether nothing holds its end.
+        True if no control point bounds its end.
     names : tuple of str
         The control points in it.
     """
@@ -50,7 +50,7 @@ class DriftWindow:
     names: tuple[str, ...]
 
     def sigma(self, gps_time: np.ndarray) -> np.ndarray:
-        """One sigma (n,) of an integrated random walk that is held at its ends. Units: m.
+        """One sigma (n,) of an integrated random walk with fixed ends. Units: m.
 
         Parameters
         ----------
@@ -64,13 +64,13 @@ class DriftWindow:
 
     @property
     def statement(self) -> Statement:
-        """That the POS drifts there by more than it states."""
+        """Statement that the POS drifts there by more than its sigmas."""
         values = {"names": self.names, "size": self.size, "first": self.first, "last": self.last}
         return Statement("unstated drift", "warning", values)
 
 
 def find_windows(adjustment: Adjustment, screening: Screening) -> tuple[DriftWindow, ...]:
-    """Stretches in which neighbours in time were rejected and deviate the same way.
+    """Find intervals in which neighbors in time were rejected with similar deviations.
 
     Parameters
     ----------
@@ -92,11 +92,11 @@ def find_windows(adjustment: Adjustment, screening: Screening) -> tuple[DriftWin
         deviations = [_Deviation.of(adjustment, rejected[name], rows) for name in run]
         if _is_drift(deviations):
             windows.append(_window(adjustment.trajectory, times, start, end, deviations))
-    return tuple(w for w in windows if w.first < w.last)  # others passed there at the same time
+    return tuple(w for w in windows if w.first < w.last)  # others were passed at the same time
 
 
 class _Deviation(NamedTuple):
-    """What a rejected target is off in a run (i, 3), with its sigma, and beyond the run (o, 3)."""
+    """Deviations of a rejected target in a run (i, 3), with sigma, and outside of it (o, 3)."""
 
     name: str
     inside: np.ndarray
@@ -110,9 +110,7 @@ class _Deviation(NamedTuple):
 
 
 def _is_drift(run):
-    """Whether a run is drift: two that differ, or three and more, of about one direction, which are
-    not as far off the same way where they were seen beyond it.
-    """
+    """True if a run of targets agrees in direction, and does not deviate likewise elsewhere."""
     ways = np.array([deviation.inside.mean(axis=0) for deviation in run])
     if len(ways) < 2:
         return False
@@ -140,12 +138,12 @@ def _window(trajectory, times, start, end, run):
 
 
 def with_windows(trajectory: Trajectory, windows: tuple[DriftWindow, ...]) -> Trajectory:
-    """The trajectory with its position's sigma raised in windows of drift.
+    """Return the trajectory with its position sigma inflated in windows of drift.
 
     Parameters
     ----------
     trajectory : Trajectory
-        Without sigmas it is given those of a POS that GNSS holds.
+        Without sigmas it gets those of a POS with GNSS.
     windows : tuple of DriftWindow
     """
     sigma = trajectory.position_sigma
@@ -160,18 +158,18 @@ def with_windows(trajectory: Trajectory, windows: tuple[DriftWindow, ...]) -> Tr
 def weighed_refusals(
     adjustment: Adjustment, plain: Adjustment, screening: Screening, windows: int
 ) -> Screening:
-    """A Screening that refuses no more targets than are likely to be wrong.
+    """Return a Screening that rejects no more targets than are probably wrong.
 
     Parameters
     ----------
     adjustment : Adjustment
         Of all targets.
     plain : Adjustment
-        The same before anything was raised in windows, of a POS that drifts without stating it.
+        The same before any inflation in windows, for a POS with unstated drift.
     screening : Screening
         Of the former.
     windows : int
-        Number of the stretches that are known to be drift that nothing states.
+        Number of intervals of known unstated drift.
     """
     rejected = screening.outliers
     refused = {test.name for test in rejected}
@@ -193,9 +191,9 @@ def weighed_refusals(
 def doubtful_drift(adjustment: Adjustment, screening: Screening) -> np.ndarray:
     """One sigma (n, 3) at every epoch of the drift that refused targets may show. Units: m.
 
-    With the probability p that they are right, the POS is off there by what they deviate by, d:
-    p d d^T beside the covariance of the estimate without them. Between targets it is linear in
-    time, and zero at those in use.
+    With the probability p that they are correct, the POS error there is their deviation d: p d d^T
+    is added to the covariance of the estimate without them. Between targets it is linear in time,
+    and zero at those in use.
 
     Parameters
     ----------
@@ -217,21 +215,21 @@ def doubtful_drift(adjustment: Adjustment, screening: Screening) -> np.ndarray:
 def drift_odds(
     adjustment: Adjustment, names: Collection[str], parameters: SignalParameters, windows: int
 ) -> float:
-    """Log odds of drift beside each of some targets against a gross error of each.
+    """Log odds of drift at each of some targets against a gross error of each.
 
-    Before the data are seen both are as probable; a share of gross_share of the targets is wrong,
-    known by its mean alone, and any share of the observations sees drift that nothing states.
+    Both are equally probable a priori: a fraction of the targets is wrong, with mean gross_share,
+    and any fraction of the observations is affected by unstated drift.
 
     Parameters
     ----------
     adjustment : Adjustment
         Of all targets.
     names : collection of str
-        Of those that were refused.
+        Names of rejected ones.
     parameters : SignalParameters
-        That the others chose.
+        Chosen by the other targets.
     windows : int
-        Number of the stretches that are known to be such drift.
+        Number of intervals of known drift of this kind.
     """
     odds = 0.0
     drifts = windows
@@ -244,19 +242,19 @@ def drift_odds(
         drift = _positive(solved, {number: _rows(_beside(others, number)) for number in passes})
         odds += sum(drift) - max(misread, sum(mistaken))
         drifts += len(drift)
-    if windows:  # with none the POS may as well never drift so
+    if windows:  # without any, the POS may never drift so
         odds -= log_share(windows, len(adjustment.names), 0.5)
     odds += log_share(drifts, len(adjustment.names), 0.5)
     return odds - log_share(len(names), len(adjustment.target_rows), SETTINGS.gross_share)
 
 
 def _positive(solved, rows_of):
-    """The evidence of those errors that are more probable than none."""
+    """Evidence of those errors that are more probable than no error."""
     return [gain for gain in gross_evidence(solved, rows_of).values() if gain > 0.0]
 
 
 def _beside(adjustment, number):
-    """Numbers of all observations within a second of one."""
+    """Indices of all observations within a second of one."""
     times = adjustment.observed
     return np.flatnonzero(np.abs(times - times[number]) <= POS_SETTINGS.sigma_interval)
 
