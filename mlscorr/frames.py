@@ -76,7 +76,7 @@ def scanner_position(
     ----------
     trajectory : Trajectory
     mounting : Mounting or None
-        If None, the navigation centre is used.
+        If None, the navigation center is used.
     gps_time : (n,) array
         Units: s.
 

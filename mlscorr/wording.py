@@ -186,7 +186,7 @@ def scale(value: float, sigma: float | None, unit: str) -> tuple[float, str]:
 def column(values: Sequence[float | None], unit: str) -> tuple[list[str], str]:
     """Format numbers of a table in the unit that suits the largest, and return that unit.
 
-    Lengths below a metre are all in mm, so that rows can be compared.
+    Lengths below a meter are all in mm, so that rows can be compared.
 
     Parameters
     ----------

@@ -41,7 +41,7 @@ class Registration(Transformation):
 def fit_icp(matched: Matched, cloud: PointCloud, pass_number: np.ndarray) -> Registration:
     """Fit a rigid motion by iterative closest points, from targets' points to surveyed surfaces.
 
-    A surveyed surface is a disc or plate of the target's kind and size at the surveyed centre and
+    A surveyed surface is a disc or plate of the target's kind and size at the surveyed center and
     normal (the observed one if none was surveyed). Partners are searched coarse to fine: first
     within twice the largest misclosure of a control point, then within half of that, down to 0.05
     m. Each distance starts from the motion of the previous one, by point-to-point, followed by
@@ -185,7 +185,7 @@ def _axes(normal):
 
 
 def _points_on(observations, i, axes, tree, cloud, pass_number):
-    """Bright points (n, 2) of one target in its plane, relative to its observed centre. Units:
+    """Bright points (n, 2) of one target in its plane, relative to its observed center. Units:
     m.
     """
     size = observations.size[i]

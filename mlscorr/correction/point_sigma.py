@@ -72,7 +72,7 @@ class PointSigma:
             With a covariance, or with sigmas in its corrected trajectory.
         scanner : Scanner
         mounting : Mounting, optional
-            Without one, beams are assumed to start at the navigation centre.
+            Without one, beams are assumed to start at the navigation center.
 
         Raises
         ------

@@ -49,7 +49,7 @@ def beam_origin(cloud: PointCloud, trajectory: Trajectory) -> np.ndarray | None:
     Returns
     -------
     (3,) array or None
-        Right, forward, up from the navigation centre. None if the points are not in a plane, no
+        Right, forward, up from the navigation center. None if the points are not in a plane, no
         rate is significant or the beams do not meet in a point: an oscillating mirror, several
         beams, or a narrow view. Units: m.
     """

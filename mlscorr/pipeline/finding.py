@@ -250,7 +250,7 @@ class FoundTargets(Summary):
 
     @cached_property
     def observations(self) -> TargetObservations:
-        """Centres with covariances, kinds and sizes, a row for each target and pass."""
+        """Centers with covariances, kinds and sizes, a row for each target and pass."""
         return as_observations(self.targets)
 
     @property

@@ -18,7 +18,7 @@ SECTIONS = {  # in order; empty ones are omitted
     "methods": "The methods",
     "unseen": "Not seen",
 }
-KINDS = {  # colour, mark and words
+KINDS = {  # color, mark and words
     "none": (style.GREY, "x", "as recorded"),
     "one move": (style.VERMILLION, "s", "one move of the whole cloud, blind to time"),
     "over time": (style.GREEN, "^", "polynomials and interpolation over time"),

@@ -152,7 +152,7 @@ def path_lines(
 
 
 def _outline(observations, row):
-    """Corners (k, 3) of a target's outline, relative to its centre. Units: m."""
+    """Corners (k, 3) of a target's outline, relative to its center. Units: m."""
     normal = observations.normal[row]
     up = np.array([0.0, 0.0, 1.0])
     if abs(normal @ up) > np.sqrt(0.5):

@@ -153,7 +153,7 @@ def _legend():
 
 
 def _draw(axes, target):
-    """Draw points in the plane, outline, centre and its covariance; up is up, seen from the
+    """Draw points in the plane, outline, center and its covariance; up is up, seen from the
     scanner.
     """
     view = target.view
@@ -194,7 +194,7 @@ def _upright(target):
 
 
 def _outline(target, turn):
-    """Patches of the fitted outline, (0, 0) its centre."""
+    """Patches of the fitted outline, (0, 0) its center."""
     outline = target.view.outline
     style = {"fill": False, "edgecolor": BLUE, "linewidth": 1.1}
     radius = 50.0 * outline.size  # cm
@@ -213,7 +213,7 @@ def _outline(target, turn):
 
 
 def _ellipse(covariance):
-    """One sigma of the centre (covariance in cm^2), enlarged."""
+    """One sigma of the center (covariance in cm^2), enlarged."""
     values, axes = np.linalg.eigh(covariance)
     low, high = 2 * SETTINGS.ellipse_scale * np.sqrt(np.maximum(values, 0.0))
     angle = np.degrees(np.arctan2(axes[1, 1], axes[0, 1]))

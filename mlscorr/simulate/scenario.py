@@ -32,7 +32,7 @@ class SceneScenario(_Part):
     kind: Literal["street", "river", "mesh"] = "street"
     file: Path | None = None  # PLY or OBJ in map coordinates, for kind = "mesh"
     reflectance: Share = 0.3  # of a mesh: asphalt 0.2 to plaster 0.5 at 905-1550 nm
-    house_height: tuple[Positive, Positive] = (6.0, 11.0)  # two to three storeys
+    house_height: tuple[Positive, Positive] = (6.0, 11.0)  # two to three stories
     gaps: Share = 0.4  # of the houses, followed by a gap in which a cross wall is visible
     trees: NotNegative = 4.0  # per 100 m of street
     cars: NotNegative = 5.0  # parked, per 100 m of street
@@ -60,10 +60,10 @@ class TargetScenario(_Part):
 
 
 class PassScenario(_Part):
-    """One pass along the way: forward or back, off the centre line, after a pause."""
+    """One pass along the way: forward or back, off the center line, after a pause."""
 
     direction: Literal["forward", "back"] = "forward"
-    lateral: float = 0.0  # to the right of the centre line as seen forward
+    lateral: float = 0.0  # to the right of the center line as seen forward
     pause: Positive = 30.0  # before this pass; the trajectory has a gap there
     speed: Positive | None = None  # by default the drive's
 

@@ -24,7 +24,7 @@ class Settings:
     margin: float = 40.0  # m of way before the start and after the end of the drive
     comfort: float = 2.0  # m/s^2, limit for sideways acceleration and braking
     cornering: float = 1.5  # m/s^2 sideways in a U-turn, at walking pace
-    lateral_limit: float = 100.0  # m beside the centre line, beyond which there is no scene
+    lateral_limit: float = 100.0  # m beside the center line, beyond which there is no scene
     path_quiet: float = 0.08  # s, smoothing of a recorded path: vehicles move below 2 Hz
     course_speed: float = 1.0  # m/s, below which course does not give the heading
     course_time: float = 0.3  # s, over which a heading from the course is smoothed

@@ -151,7 +151,7 @@ class Stripes(Columns):
     along : (n, 3) array
         Unit vector, level.
     ends : (n, 2) array
-        How far it reaches along that from the centre. Units: m.
+        How far it reaches along that from the center. Units: m.
     begin, end : (n,) array
         When it was first and last seen. Units: s.
     length, width : (n,) array

@@ -26,7 +26,7 @@ ALONG = 2 / 3 - np.pi**2 / 16
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Shapes(Columns):
-    """Planes or poles of cells: fields of TieFeatures, and shifts to their centres.
+    """Planes or poles of cells: fields of TieFeatures, and shifts to their centers.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class Shapes(Columns):
     direction : (n, 3) array
     variance, tilt, extent : (n,) array
     shift : (n, 3) array
-        From the mean of the points to the centre. Units: m.
+        From the mean of the points to the center. Units: m.
     """
 
     rows: np.ndarray

@@ -443,7 +443,7 @@ class Survey(Summary):
         """Mounting, or an assumed one if none is known.
 
         Assumed are body axes at the beam origin estimated from the cloud, or else at the navigation
-        centre.
+        center.
         """
         if self.beam_origin is None:
             origin = np.zeros(3)

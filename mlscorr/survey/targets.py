@@ -144,7 +144,7 @@ class TargetObservations(Columns):
     gps_time : (n,) array
         Units: s.
     position : (n, 3) array
-        Observed centre. Units: m.
+        Observed center. Units: m.
     covariance : (n, 3, 3) array
         Units: m^2.
     normal : (n, 3) array

@@ -33,7 +33,7 @@ class TieFeatures(Columns):
         Unit normal of a plane, toward the scanner; axis of a pole, upward; horizontal, across a
         painted line or along a dash, with either sign.
     variance : (n,) array
-        Of the centre along the direction; for a pole, along any direction across the axis. Units:
+        Of the center along the direction; for a pole, along any direction across the axis. Units:
         m^2.
     tilt : (n,) array
         Variance of the direction about each perpendicular axis. Units: rad^2.
@@ -59,13 +59,13 @@ class TieFeatures(Columns):
     sweep: np.ndarray
 
     def time_beside(self, rows: np.ndarray, way: np.ndarray) -> np.ndarray:
-        """Times at which points near the centres of some features were measured. Units: s.
+        """Times at which points near the centers of some features were measured. Units: s.
 
         Parameters
         ----------
         rows : int array
         way : (*rows.shape, 3) array
-            Offset of the points from each centre. Units: m.
+            Offset of the points from each center. Units: m.
 
         Returns
         -------
@@ -138,7 +138,7 @@ class Ties(Columns):
             Units: m^2.
         correction : (m, 3) array, optional
             Correction at each feature. With it, both views are compared midway between their
-            centres, at the times when each measured that point; otherwise each at its own centre.
+            centers, at the times when each measured that point; otherwise each at its own center.
             Units: m.
 
         Returns

@@ -29,7 +29,7 @@ SAME_EPOCH = 1.0  # s; control points closer in time give the same information o
 
 @dataclass(frozen=True, repr=False)
 class Trajectory(Summary):
-    """Positions and attitudes of the POS navigation centre over time.
+    """Positions and attitudes of the POS navigation center over time.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ class Trajectory(Summary):
         gps_time : (n,) array
             Strictly increasing. Units: s.
         position : (n, 3) array
-            Easting, northing, height of the navigation centre. Units: m.
+            Easting, northing, height of the navigation center. Units: m.
         attitude : (n, 3) array
             Roll (right side down), pitch (nose up), heading (clockwise from grid north). Units:
             deg.
@@ -456,7 +456,7 @@ class Mounting:
         Parameters
         ----------
         lever_arm : (3,) array
-            Right, forward, up from the navigation centre to the scanner's origin. Units: m.
+            Right, forward, up from the navigation center to the scanner's origin. Units: m.
         boresight : (3,) array
             [a, b, c] of R_L^P = Rz(c) Ry(b) Rx(a). Units: deg.
 

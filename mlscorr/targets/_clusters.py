@@ -3,7 +3,7 @@
 A target is brighter than what surrounds it, but intensity falls with range and incidence, so no
 single threshold works. Each component at each level is a candidate; the shape decides. Levels are
 absolute, and a component is judged by itself: other objects, such as a bright wall some meters
-away, do not hide it (Najman and Couprie 2006). Neighbours are found by voxels in a hash table.
+away, do not hide it (Najman and Couprie 2006). Neighbors are found by voxels in a hash table.
 """
 
 from collections.abc import Iterator

@@ -1,6 +1,6 @@
-"""Centre of an outline from beams that each fell on a known side of it.
+"""Center of an outline from beams that each fell on a known side of it.
 
-The centre is the mean of its posterior under a uniform prior: each beam gives the side of the
+The center is the mean of its posterior under a uniform prior: each beam gives the side of the
 outline on which it fell, blurred by footprint and angle noise. The mean of the bright points would
 be biased toward dense areas. The spread of the posterior is the covariance.
 """
@@ -39,7 +39,7 @@ class Outline:
     centre : (2,) array
         Units: m.
     covariance : (2, 2) array
-        Of the centre. Units: m^2.
+        Of the center. Units: m^2.
     turn, size, inner : float
         See ``shapes``: rad, m, share.
     size_sigma : float

@@ -30,7 +30,7 @@ class Seed:
     extent : float
         Approximate longest extent of the visible part. Units: m.
     middle : (2,) array
-        Approximate centre, in the plane. Units: m.
+        Approximate center, in the plane. Units: m.
     bloomed : bool
         True if the receiver was saturated, so that the outline may be larger than the size.
     mesh : float
@@ -234,7 +234,7 @@ def _extent(points, kind, size, guess, bloom=1.0):
 def _gaps(echoes, plane, points, size):
     """Middle (2,), radius and spacing (m) of the largest empty circles on or before a patch.
 
-    They are circumcircles of the Delaunay triangles (centres are Voronoi vertices).
+    They are circumcircles of the Delaunay triangles (centers are Voronoi vertices).
     """
     height = plane.coordinates(echoes.xyz)[:, 2]
     beam = echoes.sight(slice(None)) @ plane.axes[2]
@@ -275,7 +275,7 @@ def _surrounded(points, middle):
 
 
 def _circumcircles(a, b, c):
-    """Centre (n, 2) and radius (n,) of the circles through three points each."""
+    """Center (n, 2) and radius (n,) of the circles through three points each."""
     b = b - a
     c = c - a
     twice = 2 * (b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0])

@@ -1,6 +1,6 @@
 """Fit of a target at a seed: a rough fit, which rejects most seeds, then an exact one.
 
-Each fit is assessed by the criteria that a surveyor would apply before trusting its centre.
+Each fit is assessed by the criteria that a surveyor would apply before trusting its center.
 """
 
 from dataclasses import dataclass, replace
@@ -74,7 +74,7 @@ class ShapeFit:
 
     @property
     def position(self) -> np.ndarray:
-        """Centre (3,) in the coordinates of the echoes. Units: m."""
+        """Center (3,) in the coordinates of the echoes. Units: m."""
         return self.seed.plane.origin + self.outline.centre @ self.seed.plane.axes[:2]
 
     @property
@@ -122,7 +122,7 @@ def rough_fit(echoes: Echoes, seed: Seed, kind: str, size: float | None) -> Shap
 
 
 def exact_fit(echoes: Echoes, fit: ShapeFit, scanner: Scanner) -> ShapeFit | None:
-    """Fit the outline exactly; None if it does not fit or does not determine the centre.
+    """Fit the outline exactly; None if it does not fit or does not determine the center.
 
     Parameters
     ----------
@@ -210,7 +210,7 @@ def _size(seed, size, footprint):
 
 
 def _dark_inside(points, state, outline):
-    """True if the centre of a disc is dark, so that it is a ring."""
+    """True if the center of a disc is dark, so that it is a ring."""
     about = np.linalg.norm(points - outline.centre, axis=1) < SETTINGS.core * outline.size
     return (about & (state == DARK)).sum() > max(3, 0.5 * about.sum())
 

@@ -43,7 +43,7 @@ class TargetView:
 
 @dataclass(frozen=True)
 class Centre:
-    """Position and time at which a beam meets the centre of an outline in a plane.
+    """Position and time at which a beam meets the center of an outline in a plane.
 
     Parameters
     ----------
@@ -282,8 +282,8 @@ def _best(fits):
 
 
 def _as_target(echoes, fit, origin):
-    """Convert a fit to the map: centre, covariance, normal toward the scanner, time at the
-    centre.
+    """Convert a fit to the map: center, covariance, normal toward the scanner, time at the
+    center.
     """
     points, state, rows = fit.beams
     plane = fit.seed.plane
@@ -309,7 +309,7 @@ def _as_target(echoes, fit, origin):
 
 
 def centre_of(echoes: Echoes, plane: Plane, outline: Outline, rows: np.ndarray) -> Centre:
-    """Centre of an outline in space from the points on the target.
+    """Center of an outline in space from the points on the target.
 
     Parameters
     ----------
@@ -319,8 +319,8 @@ def centre_of(echoes: Echoes, plane: Plane, outline: Outline, rows: np.ndarray) 
     rows : (k,) int array
         Points on the target.
 
-    Height and time at the centre follow by regression, because the points may be on one side of it.
-    A plane that is too far moves the centre along the beam. Range noise may be correlated from
+    Height and time at the center follow by regression, because the points may be on one side of it.
+    A plane that is too far moves the center along the beam. Range noise may be correlated from
     point to point, which simple sigmas of a fit ignore; the residuals show by how much.
     """
     crossing = plane.crossing(echoes.xyz[rows], echoes.sight(rows))

@@ -9,7 +9,7 @@ from mlscorr.survey import COORDINATE_ROUNDING
 class Settings:
     """Limits, resolutions and sigmas; sizes are a target's diameter or edge.
 
-    If no source is given, ``benchmarks/ablation.py targets`` shows the effect on recall, centre
+    If no source is given, ``benchmarks/ablation.py targets`` shows the effect on recall, center
     errors and false targets.
     """
 
@@ -36,7 +36,7 @@ class Settings:
     rough_rounds: int = 5  # rounds; to detect an outline; the exact fit needs five times as many
     least_effective_share: float = 0.1  # trials; below it the likelihood is flattened
     proposal_width: float = 1.35  # sigma; of the posterior, for the next trials
-    hidden_share: float = 0.45  # size; from the seed to the centre: half of it may be hidden
+    hidden_share: float = 0.45  # size; from the seed to the center: half of it may be hidden
     first_blur: float = 8.0  # size over blur; wide at first, so that no outline is lost
     rough_blur: float = 0.025  # size; of a rough fit
     wrong_side: float = 0.01  # beams; on the wrong side at any distance (mixed returns)
@@ -46,14 +46,14 @@ class Settings:
     same_surface: float = 0.7  # dark over bright; from this ratio they may be one
     outside_middle: float = 0.65  # diameter; from a seed's middle, itself off by a seventh of it
     contradiction: float = 0.05  # beams; share of those without a return, well inside the outline
-    core: float = 0.2  # size; around the centre: in the dark disc of a ring of at least 0.4
+    core: float = 0.2  # size; around the center: in the dark disc of a ring of at least 0.4
 
     # Assessment
     smallest_overlap: float = 0.8  # Jaccard index; of outline and beams
     close_overlap: float = 0.93  # Jaccard index; settles the position, or hides a part
     smallest_support: float = 0.35  # outline; with beams on both sides: half may be hidden
     hole_support: float = 0.75  # outline; of a hole: other gaps are open or have corners
-    largest_sigma: float = 0.08  # size; beyond it the centre is free in one direction
+    largest_sigma: float = 0.08  # size; beyond it the center is free in one direction
     good_support: float = 0.6  # outline; above it a target is beyond doubt
     good_contrast: float = 0.3  # bright to dark; difference over sum, beyond doubt
     bush: float = 0.8  # tolerance; sigma about the plane: as thick as a bush

@@ -1,6 +1,6 @@
 """Shapes of targets: the side of the outline on which a beam is expected to fall.
 
-A trial outline is a row of u, v (centre, m), turn (rad), size (m) and inner (dark inner disc of a
+A trial outline is a row of u, v (center, m), turn (rad), size (m) and inner (dark inner disc of a
 ring as a share of the size, 0 for none).
 """
 

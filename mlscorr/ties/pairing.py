@@ -35,7 +35,7 @@ def pair_features(
     ----------
     features : TieFeatures
     correction : (n, 3) array
-        Assumed correction of each feature: corrected = centre + correction. Units: m.
+        Assumed correction of each feature: corrected = center + correction. Units: m.
     sigma : (n,) array
         One sigma of the correction, along any direction. Units: m.
     radius : float
@@ -67,7 +67,7 @@ def pair_features(
     is_pole = features.kind[pairs[:, 0]] == "pole"
     across = np.maximum((apart**2).sum(axis=1) - along**2, 0.0)
     lever = np.where(is_pole, along**2, across)
-    # each direction is transferred to the middle between both centres
+    # each direction is transferred to the middle between both centers
     variance = features.variance[pairs].sum(axis=1) + lever * features.tilt[pairs].sum(axis=1) / 4
     variance += 2 * SETTINGS.surface_sigma**2
     sides = _across(direction[is_pole], _wall_normals(features, pairs, is_pole))

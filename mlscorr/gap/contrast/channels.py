@@ -333,7 +333,7 @@ def paired_cells(survey: Survey, real: ChannelSample, simulated: ChannelSample) 
 
 
 def _sight(survey, cells):
-    """Vectors from the scanner to the centres of cells (c, 3), at the mean time of the points.
+    """Vectors from the scanner to the centers of cells (c, 3), at the mean time of the points.
     m.
     """
     segment = survey.trajectory.segment(cells.gps_time)

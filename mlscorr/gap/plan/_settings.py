@@ -13,7 +13,7 @@ class Settings:
     smallest_fall: float = 0.05  # of the squared correlation, that makes an addition worthwhile
     farthest_target: float = 40.0  # m from the scanner: farther, 0.6 m have too few points
     facets: int = 400  # of a reference surface, at most
-    centre_sigma: float = 0.002  # m, one sigma of a target's centre (target_study)
+    centre_sigma: float = 0.002  # m, one sigma of a target's center (target_study)
     facet_points: int = 80  # of a patch of a reference surface: several hundred in a street
     brightness: float = 20000.0  # counts of 16 bits, as of targets
 

@@ -192,7 +192,7 @@ def _near(matched, candidates):
 
 
 def _target_pulses(survey, matched, i, cloud):
-    """Pulses on one observed target, evenly sampled; only its centre if no point is near."""
+    """Pulses on one observed target, evenly sampled; only its center if no point is near."""
     if len(cloud) == 0:
         xyz = matched.position[[i]]
         time = matched.gps_time[[i]]

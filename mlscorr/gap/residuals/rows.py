@@ -272,7 +272,7 @@ def _reference_of(survey: Survey) -> Reference:
 
 
 def scanner_origin(survey: Survey, gps_time: np.ndarray) -> np.ndarray:
-    """Position of the scanner, or of the navigation centre if the mounting is unknown.
+    """Position of the scanner, or of the navigation center if the mounting is unknown.
 
     Parameters
     ----------

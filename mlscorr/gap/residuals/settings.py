@@ -51,7 +51,7 @@ class Settings:
     # covariates
     beside: float = 50.0  # m from the first pass, up to which it defines the location
     motion_step: float = 0.25  # s to each side, over which speed and turn rate are computed
-    on_target: float = 0.45  # of a target's size from its centre: on a disc, and on a plate
+    on_target: float = 0.45  # of a target's size from its center: on a disc, and on a plate
 
     @property
     def pool(self) -> int:

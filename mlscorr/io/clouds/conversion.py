@@ -99,7 +99,7 @@ def converted(path: Path) -> Converted:
     ValueError
         If a file cannot be read, or has no times.
     OSError
-        When the disk refuses.
+        If the disk refuses.
     """
     return _converted(path.absolute(), *file_state(path), looked_points())
 

@@ -14,7 +14,7 @@ from mlscorr.io.clouds.las_layout import COPC, LasLayout, decoding
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.store import as_path, file_state, is_there, open_file
 
-INFO = struct.Struct("<5d2Q2d88x")  # centre, half edge, spacing; root page; first and last time
+INFO = struct.Struct("<5d2Q2d88x")  # center, half edge, spacing; root page; first and last time
 ENTRY = np.dtype([("key", "(4,)<i4"), ("start", "<u8"), ("size", "<i4"), ("points", "<i4")])
 HEADER_SIZES = (227, 227, 227, 235, 375, 393)  # bytes, of LAS 1.0 to 1.5
 COPC_FORMATS = (6, 7, 8)  # COPC 1.0

@@ -68,7 +68,7 @@ def cloud_writer(
     ValueError
         If no points were written.
     OSError
-        When the disk refuses.
+        If the disk refuses.
     """
     path = Path(path)
     header = _header(corner, crs, scale, created, 7 if has_colours else 6)
@@ -276,7 +276,7 @@ class PlainWriter:
         Raises
         ------
         OSError
-            Where the disk refuses.
+            If the disk refuses.
         """
         self._output.write(self.head)
         if self._is_laz:

@@ -44,7 +44,7 @@ class FileIdentity:
         Raises
         ------
         OSError
-            Where it can't be read.
+            If it can't be read.
         """
         size, changed = file_state(path)
         hashed = hashlib.sha256()

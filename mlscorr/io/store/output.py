@@ -51,7 +51,7 @@ def check_output(
     ValueError
         If the folder is unsuitable.
     OSError
-        When it can't be written.
+        If it can't be written.
     """
     if is_remote(out):
         raise ValueError(
@@ -158,7 +158,7 @@ def output_folder(
     ValueError
         As check_output.
     OSError
-        When an input has changed, another run has written into the folder, or the disk refuses.
+        If an input has changed, another run has written into the folder, or the disk refuses.
     """
     check_output(out, [file.path for file in inputs], overwrite, folders)
     check_unchanged(inputs)

@@ -213,7 +213,7 @@ def locked_in_store(lock: Any, beat: float = SETTINGS.beat) -> Iterator[None]:
     Raises
     ------
     ValueError
-        Where another run is at work.
+        If another run is at work.
     """
     owner = f"{socket.gethostname()}, process {os.getpid()}"
     ended = threading.Event()

@@ -106,7 +106,7 @@ class NpzWriter:
     Raises
     ------
     OSError
-        When the disk refuses.
+        If the disk refuses.
 
     Examples
     --------

@@ -183,7 +183,7 @@ def file_state(path: str | Path) -> tuple[int, int | str]:
     Raises
     ------
     OSError
-        Where it can't be read.
+        If it can't be read.
     """
     if not is_remote(path):
         state = os.stat(path)

@@ -172,7 +172,7 @@ class TaskStore:
         Raises
         ------
         OSError
-            Where the disk refuses.
+            If the disk refuses.
         """
         content = pickle.dumps(value, protocol=pickle.HIGHEST_PROTOCOL)
         path = self.path(kind, key)
@@ -245,7 +245,7 @@ class TaskStore:
         Raises
         ------
         ValueError
-            Where another run is at work.
+            If another run is at work.
         """
         if is_remote(self.folder):
             with publishing.locked_in_store(self.folder / LOCK):

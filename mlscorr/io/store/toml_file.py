@@ -64,7 +64,7 @@ def read_toml(path: str | Path, model: type[Model], kind: str) -> Model:
         Names the line of invalid TOML, or every key that is unknown (with the most similar one),
         missing, or invalid.
     FileNotFoundError
-        Where there is no such file.
+        If there is no such file.
     """
     path = as_path(path)
     if not is_there(path):

@@ -44,7 +44,7 @@ def own_clouds(
     ValueError
         If a pattern matches none of them.
     FileNotFoundError
-        Where there is no such file.
+        If there is no such file.
     """
     if patterns is None:
         return [*clouds]

@@ -29,7 +29,7 @@ def simulated_survey(path: Path | str, survey: Survey) -> Survey:
     ValueError
         For clouds of another time, trajectory or CRS.
     FileNotFoundError
-        Where there are none.
+        If there are none.
     """
     path = Path(path)
     clouds = _clouds_of(path, survey)

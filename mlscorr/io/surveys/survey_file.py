@@ -295,7 +295,7 @@ def survey_toml(path: str | Path) -> Path:
     Raises
     ------
     FileNotFoundError
-        Where there is none.
+        If there is none.
     """
     path = as_path(path)
     if is_folder(path):

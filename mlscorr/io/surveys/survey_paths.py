@@ -127,7 +127,7 @@ def matching(path: Path, key: str, name: str) -> list[Path]:
     Raises
     ------
     FileNotFoundError
-        Where there is none.
+        If there is none.
 
     Warns
     -----
@@ -180,7 +180,7 @@ def existing(path: Path, key: str, name: str) -> Path:
     Raises
     ------
     FileNotFoundError
-        Where there is none.
+        If there is none.
     """
     there = beside(path, name)
     if not is_there(there):

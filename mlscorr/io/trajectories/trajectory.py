@@ -164,7 +164,7 @@ def write_trajectory_csv(path: str | Path, trajectory: Trajectory) -> None:
     Raises
     ------
     OSError
-        When the disk refuses.
+        If the disk refuses.
     """
     angles = np.degrees(np.column_stack(angles_from_attitude(trajectory.attitude)))
     blocks = [trajectory.file_time[:, None], trajectory.position, angles]

@@ -61,7 +61,7 @@ def scout(
 
 
 def _around(cloud, centre, radius):
-    """Points within a radius of a centre: coordinates relative to it, and intensity, (n, 4)."""
+    """Points within a radius of a center: coordinates relative to it, and intensity, (n, 4)."""
     rows = np.flatnonzero(np.abs(cloud.xyz[:, 0] - centre[0]) <= radius)
     local = cloud.xyz[rows] - centre
     near = (local**2).sum(axis=1) <= radius**2

@@ -42,7 +42,7 @@ def draw(
     phase: float,
     u_turn: bool = False,
 ) -> Path:
-    """Make the path of a PassScenario along a centre line.
+    """Make the path of a PassScenario along a center line.
 
     Parameters
     ----------

@@ -18,7 +18,7 @@ from mlscorr.survey import GAP_FACTOR, Trajectory
 
 
 def drive(scenario: Scenario, rng: Generator) -> tuple[CentreLine, float, tuple[Trajectory, ...]]:
-    """Make centre line, its length (m) along the drive, and the true trajectory of each pass.
+    """Make center line, its length (m) along the drive, and the true trajectory of each pass.
 
     Trajectories are in map coordinates, in the order of time, with epochs at the pose rate.
 
@@ -104,7 +104,7 @@ def _paces(drive, rng):
 
 
 def _ground(scenario, length, s, lateral):
-    """Height of the POS above the centre line (m) and cross fall (rad), each (n,)."""
+    """Height of the POS above the center line (m) and cross fall (rad), each (n,)."""
     pos_height = VEHICLES[scenario.scene.kind].pos_height
     if scenario.scene.kind != "street":
         return np.full(len(s), pos_height), np.zeros(len(s))

@@ -19,7 +19,7 @@ from mlscorr.simulate.settings import SETTINGS
 NO_TRIANGLE = np.uint32(0xFFFFFFFF)  # Open3D's triangle of a ray that hits nothing
 
 # Sub-rays of a beam and their shares of its power: the rule of Radon for a Gaussian, exact to
-# degree 5 with a centre of 1/2 and a hexagon of 1/12 each at two sigma, where the power is 1/e^2,
+# degree 5 with a center of 1/2 and a hexagon of 1/12 each at two sigma, where the power is 1/e^2,
 # as in the definition of divergence.
 ANGLES = np.arange(6) * np.pi / 3
 SUB_RAYS = np.vstack([[0.0, 0.0], np.column_stack([np.cos(ANGLES), np.sin(ANGLES)])])

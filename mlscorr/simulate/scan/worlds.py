@@ -181,7 +181,7 @@ class Boards(Columns):
         number : (n,) int array
             Of targets.
         place : (n, 2) array
-            Along their edges from the centre. Units: m.
+            Along their edges from the center. Units: m.
         """
         x, y = place.T
         form = self.form[number]

@@ -146,7 +146,7 @@ class HouseSize:
     storey, bay : float
         Height and width of what holds a window. Units: m.
     frame, window : float
-        Share of a bay and storey to each side of a window, and of the window itself.
+        Share of a bay and story to each side of a window, and of the window itself.
     recess : float
         Of a window behind the front. Units: m.
     reflectance : tuple of float
@@ -213,7 +213,7 @@ class TargetHeight:
     Parameters
     ----------
     least : float
-        Of the centre. Units: m.
+        Of the center. Units: m.
     below : float
         Smallest clearance below the target. Units: m.
     span : float
@@ -225,12 +225,12 @@ class TargetHeight:
     span: float
 
     def draw(self, half: float, rng: Generator, raised: float = 0.0) -> float:
-        """Draw the height of a target's centre above its foot. Units: m.
+        """Draw the height of a target's center above its foot. Units: m.
 
         Parameters
         ----------
         half : float
-            From the centre to the edge of the target. Units: m.
+            From the center to the edge of the target. Units: m.
         rng : Generator
         raised : float
             Additional height. Units: m.

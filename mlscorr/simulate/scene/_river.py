@@ -291,7 +291,7 @@ class River:
         support : str
             Support of the target: post, wall or road.
         half : float
-            From the centre to the edge of the target. Units: m.
+            From the center to the edge of the target. Units: m.
         rng : Generator
         """
         margin = half + TARGET_ENDS

@@ -42,7 +42,7 @@ class StreetSection:
     turn_reach, turn_taper : float
         From the middle of a U-turn to where the widening ends, and over which it narrows. Units: m.
     pavement, garden : float
-        Width from the kerb to the house fronts, and of the ground behind them. Units: m.
+        Width from the curb to the house fronts, and of the ground behind them. Units: m.
     kerb : float
         Height. Units: m.
     cross_fall : float
@@ -55,7 +55,7 @@ class StreetSection:
     dash : tuple of float
         Length of a dash of the middle line, and of the gap after it, usual in towns. Units: m.
     asphalt, kerbstone, paving, lawn, white_line : float
-        Reflectance of the carriageway, of the kerb, of the pavement, of the gardens, of paint.
+        Reflectance of the carriageway, of the curb, of the pavement, of the gardens, of paint.
     """
 
     road: float = 3.0
@@ -156,7 +156,7 @@ TREES = Furniture(across=0.7, extent=0.3)  # m
 CROWN = (1.7, 1.1, 1.6)  # m, half axes of a crown: trimmed toward the houses
 CAR_LIFT = 0.05  # m, of a car that is parked with two wheels on the pavement
 FREE_ENDS = 4.0  # m, without furniture at the ends of the scene
-POST_PLACES = (0.6, 1.1)  # m, from the kerb to a target's post
+POST_PLACES = (0.6, 1.1)  # m, from the curb to a target's post
 ROAD_PLACES = (0.5, 0.73)  # share of half the road: targets between the wheel tracks
 ROAD_EDGE = 0.05  # m, between a target and the middle or the edge of the road
 ON_FRONTS = TargetHeight(least=1.2, below=0.3, span=1.0)  # m
@@ -166,11 +166,11 @@ ON_POSTS = TargetHeight(least=1.0, below=0.2, span=1.2)  # m
 @dataclass(frozen=True)
 class _House:
     side: int  # -1 left, 1 right
-    start: float  # m along the centre line
+    start: float  # m along the center line
     end: float
     near: np.ndarray  # (3,) lower corners of the front, at the pavement's level
     far: np.ndarray
-    lateral: float  # m of the front's nearest part from the centre line
+    lateral: float  # m of the front's nearest part from the center line
 
 
 class Street:
@@ -240,7 +240,7 @@ class Street:
         return Mesh.concatenate(pieces)
 
     def _ground(self):
-        """Carriageway with crown, kerbs, pavements and gardens, as strips of 1 m."""
+        """Carriageway with crown, curbs, pavements and gardens, as strips of 1 m."""
         s = np.arange(-SETTINGS.margin, self.length + SETTINGS.margin)
         edge = self.section.half_width(s)
         fence = edge + self.section.pavement
@@ -309,7 +309,7 @@ class Street:
         support : str
             Support of the target: post, wall or road.
         half : float
-            From the centre to the edge of the target. Units: m.
+            From the center to the edge of the target. Units: m.
         rng : Generator
         """
         spot: Any = None

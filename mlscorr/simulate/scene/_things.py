@@ -9,7 +9,7 @@ from mlscorr.simulate.settings import SETTINGS
 
 
 def target(kind: str, centre: np.ndarray, u: np.ndarray, v: np.ndarray, size: float) -> Mesh:
-    """Make the mesh of a target about its centre (3,), in the plane of the unit vectors u, v (3,).
+    """Make the mesh of a target about its center (3,), in the plane of the unit vectors u, v (3,).
 
     A circle is a bright disc of diameter `size` within a darker square board of the same plane;
     a square is a bright plate of edge `size`. Units: m. With 64 segments the edge of a disc departs

@@ -44,7 +44,7 @@ class Scene:
 
 
 def build_scene(scenario: Scenario, line: CentreLine, length: float, rng: Generator) -> Scene:
-    """Build the Scene of a Scenario along a centre line, on which the drive is `length` (m) long.
+    """Build the Scene of a Scenario along a center line, on which the drive is `length` (m) long.
 
     Parameters
     ----------

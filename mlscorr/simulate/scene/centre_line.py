@@ -1,4 +1,4 @@
-"""Centre line of a way: a smooth curve by its own length."""
+"""Center line of a way: a smooth curve by its own length."""
 
 from dataclasses import dataclass
 from functools import cached_property

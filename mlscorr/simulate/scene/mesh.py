@@ -229,7 +229,7 @@ class MeshSite:
         support : str
             Support of the target: post, wall or road.
         half : float
-            From the centre to the edge of the target. Units: m.
+            From the center to the edge of the target. Units: m.
         rng : Generator
         """
         _, forward, _ = self.line.frame(s)

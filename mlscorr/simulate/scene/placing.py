@@ -19,7 +19,7 @@ from mlscorr.survey import Columns
 
 @dataclass(frozen=True)
 class TargetSpot:
-    """Position of one target: the plane (unit vectors u, v) and the ground below its centre.
+    """Position of one target: the plane (unit vectors u, v) and the ground below its center.
 
     s and lateral (m) place it along the way; ground (m) is the height of what a post stands on.
     """
@@ -97,7 +97,7 @@ def place_targets(
     scenario : TargetScenario
     site : object
         Its ``spot(s, side, support, half, rng)`` returns a TargetSpot, or None without room for a
-        target that extends `half` (m) from its centre.
+        target that extends `half` (m) from its center.
     yaw : float
         Turn of the scan plane against the cross-section, which posts' targets face. Units: rad.
 
