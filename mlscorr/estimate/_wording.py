@@ -44,15 +44,6 @@ def _wrong_or_drift(names, targets, odds, size):
     )
 
 
-def _rather_drift(names, targets, size):
-    return (
-        f"{_refused(names, targets)} deviate from their neighbours, by up to {size:.2f} m, each in "
-        "its own way. So many are seldom wrong: they were used, as the POS drifts there for a "
-        "short time and doesn't state it. What it drifts between control points is left: more "
-        "points would tell."
-    )
-
-
 def _neighbours_rejected(names, misclosures):
     return (
         f"{names[0]} and {names[1]} follow each other, were both rejected, and deviate in one "
@@ -199,7 +190,6 @@ SENTENCES: dict[str, Wording] = {
     ),
     "unstated drift": _unstated_drift,
     "wrong or drift": _wrong_or_drift,
-    "rather drift": _rather_drift,
     "neighbours rejected": _neighbours_rejected,
     "neighbours kept": _neighbours_kept,
     "contradicts ties": _contradicts_ties,

@@ -14,12 +14,6 @@ from threadpoolctl import threadpool_limits
 from mlscorr.collocation import Collocation
 from mlscorr.correction import Correction
 from mlscorr.estimate._prediction import GridPredictions, pose_rows, predict_pose_error
-from mlscorr.estimate._runs import (
-    doubtful_drift,
-    find_windows,
-    weighed_refusals,
-    with_windows,
-)
 from mlscorr.estimate._wording import sentences_of
 from mlscorr.estimate.adjustment import (
     NO_TREND,
@@ -30,11 +24,11 @@ from mlscorr.estimate.adjustment import (
 from mlscorr.estimate.factors import TIE, tie_factor
 from mlscorr.estimate.guards import Guards, find_guards, guard_warnings, sparse_warnings
 from mlscorr.estimate.inputs import checked_inputs, filled_sigmas
+from mlscorr.estimate.judgement import doubtful_drift, doubts, judge, with_drifts
 from mlscorr.estimate.mounting import prior_sigma
 from mlscorr.estimate.outages import with_drift_history
 from mlscorr.estimate.posterior import (
     Objective,
-    drifting_prior,
     most_probable,
     position_prior,
 )
@@ -206,41 +200,34 @@ def estimate_correction(
     """
     pos = pos or Pos()
     filled, notes = checked_inputs(trajectory, matched, pos, order)
-    adjustment, screening, windows = _screened(filled, matched, pos, order, kept_in)
+    adjustment, screening, probability, drifts = _judged(filled, matched, pos, order, kept_in)
     kept = adjustment.without({outlier.name for outlier in screening.outliers})
-    notes = (
-        *notes,
-        *(window.statement for window in windows),
-        *sparse_warnings(kept, order),
+    notes = (*notes, *(drift.statement for drift in drifts), *sparse_warnings(kept, order))
+    doubt = doubtful_drift(adjustment, screening, probability)
+    screening = replace(
+        screening,
+        warnings=(*screening.warnings, *doubts(adjustment, screening, probability)),
     )
-    doubt = doubtful_drift(adjustment, screening)
     return _estimate(trajectory, matched.name, GridPredictions(kept), screening, notes, doubt)
 
 
-def _screened(trajectory, matched, pos, order, kept_in):
-    """Equations, their Screening, and the windows of drift that runs of rejected targets show."""
-    windows = ()
-    more = ()
-    plain = None
-    for _ in range(SETTINGS.rounds):
-        windows += more
-        if windows:
-            raised = with_windows(trajectory, windows)
-        else:
-            raised = trajectory
-        adjustment = position_adjustment(raised, matched, pos, order, position_prior)
+def _judged(trajectory, matched, pos, order, kept_in):
+    """Adjustment of all targets, their Screening, how probably each refused one is right, and the
+    unstated drifts that others show.
+    """
+    drifts = ()
+    while True:
+        drifting = with_drifts(trajectory, drifts)
+        adjustment = position_adjustment(drifting, matched, pos, order, position_prior)
         adjustment = replace(adjustment, order=affordable_order(order, adjustment))
         adjustment = with_drift_history(adjustment)
-        plain = plain or adjustment
         screening = screen(adjustment, kept_in)
-        more = find_windows(adjustment, screening)
-        if not more:
-            break
-    plain = replace(plain, prior=drifting_prior)
-    weighed = weighed_refusals(adjustment, plain, screening, len(windows))
-    if screening.outliers and not weighed.outliers:
-        return plain, weighed, ()
-    return adjustment, weighed, windows
+        judgement = judge(adjustment, screening, len(drifts))
+        known = {name for drift in drifts for name in drift.names}
+        new = [drift for drift in judgement.drifts if not known.issuperset(drift.names)]
+        if not new:
+            return adjustment, screening, judgement.probability, drifts
+        drifts = (*drifts, *new)
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")

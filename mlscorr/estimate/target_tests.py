@@ -139,12 +139,28 @@ def _test(adjustment, name, left_out, targets):
     return TargetTest(name, statistic, critical, *(part.reshape(-1, 3) for part in parts))
 
 
-def gross_evidence(solved: Collocation, rows_of: dict) -> dict:
-    """Log Bayes factor, by name, of one error common to all epochs of some rows, against none.
+def error_evidence(weights: np.ndarray, precision: np.ndarray, course: np.ndarray) -> float:
+    """Log Bayes factor of errors in k observations against none.
 
-    With b = E^T V^-1 (l - A x) and M = E^T V^-1 E of the rows' design matrix E of three axes, an
-    error of sigma s has the log factor (s^2 b^T (I + s^2 M)^-1 b - log det(I + s^2 M)) / 2, along
-    the eigenvectors of M; averaged over the sizes that gross errors have.
+    With b = E^T V^-1 (l - A x) and M = E^T V^-1 E of what the rows see of the errors, E, errors of
+    sigma s have the log factor (s^2 b^T (I + s^2 M)^-1 b - log det(I + s^2 M)) / 2, along the
+    eigenvectors of M; averaged over the sizes that gross errors have.
+
+    Parameters
+    ----------
+    weights : (3 k,) array
+        V^-1 (l - A x) of the observations, as of a Collocation.
+    precision : (3 k, 3 k) array
+        Their block of V^-1 without the trend. Units: 1/m^2.
+    course : (k,) or (k, q) array
+        Share of one error vector, or of each of q, in each observation.
+    """
+    seen = np.kron(np.reshape(course, (len(weights) // 3, -1)), np.eye(3))
+    return float(_evidence(seen.T @ weights, seen.T @ precision @ seen))
+
+
+def gross_evidence(solved: Collocation, rows_of: dict) -> dict:
+    """Log Bayes factor of one error vector in all observations of a target, by name.
 
     Parameters
     ----------
@@ -156,13 +172,18 @@ def gross_evidence(solved: Collocation, rows_of: dict) -> dict:
     blocks = [
         solved.precision_of(rows).reshape(-1, 3, len(rows) // 3, 3) for rows in rows_of.values()
     ]
-    values, vectors = np.linalg.eigh([block.sum(axis=(0, 2)) for block in blocks])
-    along = np.einsum("nij,ni->nj", vectors, score) ** 2
-    variance = np.square(SETTINGS.gross_sizes)[:, None, None]
-    more = 1.0 + variance * np.maximum(values, 0.0)
-    density = 0.5 * np.sum(variance * along / more - np.log(more), axis=2)
-    gains = np.logaddexp.reduce(density, axis=0) - np.log(len(SETTINGS.gross_sizes))
+    gains = _evidence(np.array(score), np.array([block.sum(axis=(0, 2)) for block in blocks]))
     return dict(zip(rows_of, gains.tolist(), strict=True))
+
+
+def _evidence(score, precision):
+    """Log Bayes factors (...,) by b (..., q) and M (..., q, q) of error_evidence."""
+    values, vectors = np.linalg.eigh(precision)
+    along = np.einsum("...ij,...i->...j", vectors, score) ** 2
+    variance = np.square(SETTINGS.gross_sizes).reshape(-1, *(1,) * values.ndim)
+    more = 1.0 + variance * np.maximum(values, 0.0)
+    density = 0.5 * np.sum(variance * along / more - np.log(more), axis=-1)
+    return np.logaddexp.reduce(density, axis=0) - np.log(len(SETTINGS.gross_sizes))
 
 
 @dataclass(frozen=True)
@@ -178,15 +199,12 @@ class Screening:
     tests : tuple of TargetTest
         Of the accepted targets.
     warnings : tuple of Statement
-    drift_probability : float
-        Probability that the outliers are correct, and the POS has an unstated drift there.
     """
 
     posterior: Posterior
     outliers: tuple[TargetTest, ...]
     tests: tuple[TargetTest, ...]
     warnings: tuple[Statement, ...]
-    drift_probability: float = 0.0
 
     @classmethod
     def believed(cls, adjustment: Adjustment) -> Screening:

@@ -38,14 +38,6 @@ CATALOGUE = [
         "of them around.",
     ),
     (
-        "rather drift",
-        {"names": ("T02", "T07"), "targets": 12, "size": 0.2},
-        "2 of 12 control points (T02, T07) deviate from their neighbours, by up to 0.20 m, each in "
-        "its own way. So many are seldom wrong: they were used, as the POS drifts there for a "
-        "short time and doesn't state it. What it drifts between control points is left: more "
-        "points would tell.",
-    ),
-    (
         "neighbours rejected",
         PAIR,
         "T02 and T03 follow each other, were both rejected, and deviate in one direction "

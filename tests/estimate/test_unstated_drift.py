@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from mlscorr.estimate import estimate_correction
-from mlscorr.estimate._runs import DriftWindow, with_windows
+from mlscorr.estimate.judgement import UnstatedDrift, with_drifts
 from mlscorr.survey import Matched, Trajectory
 from tests.beds.discs import observed_discs
 from tests.beds.pos_errors import EPOCHS, NOISE, START, Case, even, outage, rms
 
-WINDOW = DriftWindow(START + 50.0, START + 90.0, 0.4, False, ("T05", "T06"))
+DRIFT = UnstatedDrift(START + 50.0, START + 90.0, 0.4, False, ("T05", "T06"))
 
 
 def smoothed_case(seed, stated=0.02):
@@ -99,18 +99,18 @@ def test_a_lone_blunder_stays_an_outlier():
     assert rms(case.remaining(estimate)) < 0.05 * rms(error)
 
 
-def test_a_window_is_held_at_its_ends():
-    "Its sigma is the whole in the middle, nothing outside; open at the end it grows up to it"
-    sigma = WINDOW.sigma(START + np.array([40.0, 50.0, 70.0, 90.0, 95.0]))
-    assert sigma == pytest.approx([0.0, 0.0, 0.4, 0.0, 0.0])
-    unheld = DriftWindow(START + 50.0, START + 90.0, 0.4, True, ("T05",))
-    assert unheld.sigma(START + np.array([50.0, 90.0])) == pytest.approx([0.0, 0.4])
+def test_an_unstated_drift_is_constrained_at_its_ends():
+    "Its whole size in the middle, nothing outside; open at the end it grows up to it"
+    course = DRIFT.course(START + np.array([40.0, 50.0, 70.0, 90.0, 95.0]))
+    assert course == pytest.approx([0.0, 0.0, 1.0, 0.0, 0.0])
+    free = UnstatedDrift(START + 50.0, START + 90.0, 0.4, True, ("T05",))
+    assert free.course(START + np.array([50.0, 90.0])) == pytest.approx([0.0, 1.0])
 
 
-def test_windows_raise_what_is_stated():
+def test_unstated_drift_adds_to_what_is_stated():
     "Variances add, also where the trajectory states nothing at all"
     case, _ = smoothed_case(1, 0.03)
-    raised = with_windows(case.recorded, (WINDOW,)).position_sigma
+    raised = with_drifts(case.recorded, (DRIFT,)).position_sigma
     middle = np.searchsorted(EPOCHS, 70.0)
     assert raised[middle] == pytest.approx(np.hypot(0.03, 0.4))  # m
     assert raised[0] == pytest.approx(0.03)

@@ -1,0 +1,337 @@
+"""Refused control points: wrong, or right beside a POS that drifts and does not state it.
+
+A wrong point is wrong by one vector in all its passes, a wrong setup of the instrument moves its
+neighbors likewise, and control points are seldom wrong in great numbers. Drift comes and goes
+between two points, differs from pass to pass, and moves all that was observed within a second. The
+evidence of both readings and their prior odds decide, for refused points that belong together at
+a time; where drift is the likelier by far, its sigma is increased there and all is estimated anew.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from mlscorr.estimate.adjustment import Adjustment
+from mlscorr.estimate.settings import SETTINGS
+from mlscorr.estimate.target_tests import Screening, error_evidence
+from mlscorr.matching import log_share
+from mlscorr.pos import SETTINGS as POS_SETTINGS
+from mlscorr.pos import runs
+from mlscorr.survey import Statement, Trajectory
+
+
+@dataclass(frozen=True)
+class UnstatedDrift:
+    """An interval in which the POS drifts by more than it states.
+
+    Parameters
+    ----------
+    first, last : float
+        Times of the observed control points that constrain it, or the end of the pass where there
+        are none. Units: s.
+    size : float
+        One sigma per axis at its largest. Units: m.
+    is_open : bool
+        True where no control point constrains its end.
+    names : tuple of str
+        Control points observed in it.
+    """
+
+    first: float
+    last: float
+    size: float
+    is_open: bool
+    names: tuple[str, ...]
+
+    def course(self, gps_time: np.ndarray) -> np.ndarray:
+        """Share (n,) of its size at each time, as of an integrated random walk between its ends.
+
+        Parameters
+        ----------
+        gps_time : (n,) array
+            Units: s.
+        """
+        share = np.clip((gps_time - self.first) / (self.last - self.first), 0.0, 1.0)
+        inside = (gps_time >= self.first) & (gps_time <= self.last)
+        if self.is_open:
+            return np.where(inside, share**1.5, 0.0)
+        return np.where(inside, (4.0 * share * (1.0 - share)) ** 1.5, 0.0)
+
+    @property
+    def statement(self) -> Statement:
+        """A warning that the POS drifts there by more than it states."""
+        values = {"names": self.names, "size": self.size, "first": self.first, "last": self.last}
+        return Statement("unstated drift", "warning", values)
+
+
+def with_drifts(trajectory: Trajectory, drifts: tuple[UnstatedDrift, ...]) -> Trajectory:
+    """Return the trajectory with the sigma of its position increased where it drifts unstated.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        One without sigmas is given those of a POS that has GNSS.
+    drifts : tuple of UnstatedDrift
+    """
+    if not drifts:
+        return trajectory
+    sigma = trajectory.position_sigma
+    if sigma is None:
+        sigma = np.tile(POS_SETTINGS.gnss, (len(trajectory), 1))
+    variance = sigma**2
+    for drift in drifts:
+        variance = variance + (drift.size * drift.course(trajectory.gps_time)[:, None]) ** 2
+    return replace(trajectory, position_sigma=np.sqrt(variance))
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """Probability that each refused point is right beside drift, and the drifts to take account of.
+
+    Parameters
+    ----------
+    probability : dict of str to float
+        By the name of each refused target.
+    drifts : tuple of UnstatedDrift
+        Where that is the likelier by far.
+    """
+
+    probability: Mapping[str, float]
+    drifts: tuple[UnstatedDrift, ...]
+
+
+def judge(adjustment: Adjustment, screening: Screening, known: int = 0) -> Judgement:
+    """Weigh for all refused targets whether they are wrong or the POS drifts beside them.
+
+    With n groups of refused targets that belong together, n + 1 readings are weighed: that the POS
+    drifts beside none of them, beside the one where that is the likeliest, beside two, and so on.
+
+    Parameters
+    ----------
+    adjustment : Adjustment
+        Of all targets.
+    screening : Screening
+        Of these targets.
+    known : int
+        Number of unstated drifts that the sigmas account for by now.
+    """
+    refused = {test.name: test for test in screening.outliers}
+    if not refused:
+        return Judgement({}, ())
+    parameters = screening.posterior.modes[0][0]
+    groups = []
+    for names, bursts in _groups(adjustment, refused):
+        others = adjustment.without(refused.keys() - set(names))
+        solved = others.solve(parameters)
+        sized = [_sized(burst, adjustment, refused) for burst in bursts]
+        groups.append(_Group.of(others, names, sized, solved))
+    drifting: list[_Group] = []
+    readings = [_log_posterior(adjustment, drifting, groups, known)]
+    while groups:
+        nexts = [
+            _log_posterior(adjustment, [*drifting, group], _others(groups, group), known)
+            for group in groups
+        ]
+        drifting.append(groups.pop(int(np.argmax(nexts))))
+        readings.append(max(nexts))
+    share = np.exp(np.array(readings) - max(readings))
+    right = np.cumsum(share[::-1])[::-1][1:] / share.sum()
+    probability = {}
+    drifts: list[UnstatedDrift] = []
+    for group, p in zip(drifting, right.tolist(), strict=True):
+        probability |= dict.fromkeys(group.names, p)
+        if p > SETTINGS.strong_evidence * (1.0 - p):
+            drifts += group.drifts
+    return Judgement(probability, tuple(sorted(drifts, key=lambda drift: drift.first)))
+
+
+class _Group(NamedTuple):
+    """Refused targets that follow each other in time, in one pass or several.
+
+    Parameters
+    ----------
+    names : tuple of str
+    wrong, drift : float
+        Log evidence that they are wrong, and that the POS drifts beside them.
+    drifts : tuple of UnstatedDrift
+        That explain them.
+    """
+
+    names: tuple[str, ...]
+    wrong: float
+    drift: float
+    drifts: tuple[UnstatedDrift, ...]
+
+    @classmethod
+    def of(cls, adjustment, names, bursts, solved):
+        time = adjustment.observed
+        inside = np.isin(adjustment.names, names)
+        for burst in bursts:
+            inside |= (time > burst.first) & (time < burst.last)
+        inside = np.flatnonzero(inside)
+        rows = (3 * inside[:, None] + np.arange(3)).ravel()
+        seen = solved.weights[rows], solved.precision_of(rows)
+        wrong = _wrong_evidence(seen, adjustment.names[inside], names)
+        drift = 0.0
+        drifts = []
+        courses = np.empty((len(inside), 0))
+        for burst in bursts:
+            tried = [np.column_stack([courses, own]) for own in _courses_of(burst, time[inside])]
+            evidence = [error_evidence(*seen, each) for each in tried]
+            if max(evidence) > drift:
+                drift = max(evidence)
+                courses = tried[int(np.argmax(evidence))]
+                drifts.append(burst)
+        return cls(names, wrong, drift, tuple(drifts))
+
+
+def _others(groups, group):
+    return [other for other in groups if other is not group]
+
+
+def _log_posterior(adjustment, drifting, others, known):
+    """Log posterior of the reading that the POS drifts beside some groups, and others are wrong."""
+    wrong = sum(len(group.names) for group in others)
+    bursts = known + sum(len(group.drifts) for group in drifting)
+    evidence = sum(group.drift for group in drifting) + sum(group.wrong for group in others)
+    prior = log_share(wrong, len(adjustment.target_rows), SETTINGS.gross_share)
+    often = np.log(0.5) + log_share(bursts, len(adjustment.names), 0.5)
+    if bursts == 0:  # as may well be that the POS never drifts unstated
+        often = np.logaddexp(often, np.log(0.5))
+    return evidence + prior + often
+
+
+def _groups(adjustment, refused):
+    """Names of refused targets that belong together, with an UnstatedDrift of each run of them."""
+    order = np.argsort(adjustment.observed, kind="stable")
+    time = adjustment.observed[order]
+    names = adjustment.names[order]
+    is_out = np.isin(names, list(refused))
+    passes = np.flatnonzero(np.diff(adjustment.trajectory.segment(time))) + 1
+    found = runs(is_out, passes)
+    number = {name: k for k, name in enumerate(refused)}
+    edges = [(number[name], k) for k, (i, j) in enumerate(found) for name in set(names[i:j])]
+    target, run = np.array(edges).T
+    size = len(number) + len(found)
+    graph = coo_array((np.ones(len(edges)), (target, len(number) + run)), (size, size))
+    label = connected_components(graph, directed=False)[1]
+    for group in np.unique(label):
+        own = tuple(name for name in refused if label[number[name]] == group)
+        bursts = [
+            _burst(adjustment.trajectory, time, names, *rows)
+            for k, rows in enumerate(found)
+            if label[len(number) + k] == group
+        ]
+        yield own, [burst for burst in bursts if burst.first < burst.last]
+
+
+def _burst(trajectory, time, names, start, end):
+    """The UnstatedDrift of a run of observations, of unit size."""
+    begin, finish = trajectory.passes[trajectory.segment(time[start])]
+    beside = POS_SETTINGS.sigma_interval  # what was observed within it drifts together
+    first = time[time < time[start] - beside].max(initial=begin)
+    last = time[time > time[end - 1] + beside].min(initial=finish)
+    is_open = bool(last == finish)
+    return UnstatedDrift(
+        float(first), float(last), 1.0, is_open, tuple(dict.fromkeys(names[start:end]))
+    )
+
+
+def _wrong_evidence(seen, observed, names):
+    """Log evidence that targets are wrong: each, in all passes or in one; or all by one setup."""
+    courses = [(observed == name).astype(float) for name in names]
+    setup = error_evidence(*seen, np.sum(courses, axis=0))
+    evidence = error_evidence(*seen, np.column_stack(courses))
+    for number, course in enumerate(courses):
+        passes = np.flatnonzero(course)
+        if len(passes) == 1:
+            continue
+        for single in np.eye(len(observed))[passes]:
+            tried = [*courses[:number], single, *courses[number + 1 :]]
+            alone = error_evidence(*seen, np.column_stack(tried))
+            if alone > evidence:
+                evidence = alone
+                courses = tried
+    return max(evidence, setup)
+
+
+def _courses_of(burst, time):
+    """Courses of a drift: a walk that its ends constrain, a constant one, and any other one.
+
+    What was observed within a second drifts together.
+    """
+    inside = (time > burst.first) & (time < burst.last)
+    walk = burst.course(time)
+    order = np.argsort(time, kind="stable")
+    apart = np.diff(time[order], prepend=-np.inf) > POS_SETTINGS.sigma_interval
+    moment = np.empty(len(time), int)
+    moment[order] = np.cumsum(apart)
+    free = (moment[:, None] == np.unique(moment[inside])) & inside[:, None]
+    return walk / walk.max(), inside, free
+
+
+def _sized(burst, adjustment, refused):
+    """The drift with the size that its refused targets deviate by."""
+    time = adjustment.observed
+    inside = (time > burst.first) & (time < burst.last)
+    deviations = [
+        refused[name].left_out[inside[adjustment.names == name]].mean(axis=0)
+        for name in burst.names
+    ]
+    return replace(burst, size=float(np.sqrt(np.mean(np.square(deviations)))))
+
+
+def doubtful_drift(
+    adjustment: Adjustment, screening: Screening, probability: Mapping[str, float]
+) -> np.ndarray:
+    """One sigma (n, 3) at every epoch of the drift that refused targets may show. Units: m.
+
+    With the probability p that a target is right, the POS is off there by what it deviates by, d:
+    p d d^T beside the covariance of the estimate without it. Between targets it is linear in
+    time, and zero at those in use.
+
+    Parameters
+    ----------
+    adjustment : Adjustment
+        Of all targets.
+    screening : Screening
+        Of these targets.
+    probability : dict of str to float
+        By the name of each refused target.
+    """
+    deviation = np.zeros((len(adjustment.names), 3))
+    for test in screening.outliers:
+        share = np.sqrt(probability[test.name])
+        deviation[adjustment.names == test.name] = share * test.left_out
+    order = np.argsort(adjustment.observed, kind="stable")
+    time = adjustment.trajectory.gps_time
+    known = adjustment.observed[order]
+    return np.column_stack([np.interp(time, known, axis) for axis in deviation[order].T])
+
+
+def doubts(
+    adjustment: Adjustment, screening: Screening, probability: Mapping[str, float]
+) -> tuple[Statement, ...]:
+    """A warning where refused targets are rather right than wrong.
+
+    Parameters
+    ----------
+    adjustment, screening, probability
+        As of doubtful_drift.
+    """
+    doubtful = [test for test in screening.outliers if probability[test.name] > 0.5]
+    if not doubtful:
+        return ()
+    size = max(np.linalg.norm(test.left_out, axis=1).max() for test in doubtful)
+    p = max(probability[test.name] for test in doubtful)
+    values = {
+        "names": tuple(test.name for test in doubtful),
+        "targets": len(adjustment.target_rows),
+        "size": float(size),
+        "odds": p / (1.0 - p),
+    }
+    return (Statement("wrong or drift", "warning", values),)
