@@ -29,9 +29,9 @@ def diagnosed(rows, survey, rng, replicas=REPLICAS):
 
 
 def terms(rows, survey, rng=None, replicas=REPLICAS):
-    """What a survey's beliefs don't predict of its n residuals: time, sigma^2 (u^2 - 1) of the
+    """Unpredicted parts of a survey's n residuals: time, sigma^2 (u^2 - 1) of the
     innovations, square of the residual less its variance, log likelihood, and with rng the means
-    of the second of replicas in which the beliefs are right. Units: m^2."""
+    of the second of replicas in which the assumptions are correct. Units: m^2."""
     observed = Observations.of(rows, background(rows, survey))
     whitener = observed.whitener()
     residual = observed.columns(rows.residual[:, None])

@@ -181,7 +181,7 @@ def fit_literal(
     Parameters
     ----------
     trajectory, matched, order
-        As for fit_polynomial.
+        See ``fit_polynomial``.
     pos : Pos
         Assumed accuracy, used if the trajectory has no sigmas.
 

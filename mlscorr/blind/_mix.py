@@ -12,7 +12,7 @@ from mlscorr.effects import known_effects
 @dataclass(frozen=True)
 class Case:
     """Specification of one survey: kind, names of effects or of a mechanism, size, and
-    alternative names if the geometry does not show one. The library lacks ``without``.
+    alternative names if the geometry does not show one. The library is without ``without``.
     """
 
     kind: str

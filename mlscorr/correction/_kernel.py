@@ -96,7 +96,7 @@ def fill_increments(
     Parameters
     ----------
     gps_time, epochs, step, is_gap
-        As for ``locate``.
+        See ``locate``.
     xyz : (n, 3) array
         Relative to the correction's origin. Units: m.
     table : (k, 15) array
@@ -139,7 +139,7 @@ def move_integers(
     scale, offset : (3,) array
         The offset is relative to the correction's origin. Units: m.
     gps_time, constant, epochs, step, is_gap, table
-        As for ``locate`` and ``fill_increments``.
+        See ``locate`` and ``fill_increments``.
     rest : (3,) array
         Added to points without a pose. Units: m.
 

@@ -245,7 +245,7 @@ def _least_squares(adjustment, matched, recorded):
     observed = 3 * len(matched)
     sigma0 = 1.0
     redundancy = observed - len(correction) + np.trace(held)
-    if round(redundancy) > 0:  # a redundancy below one says nothing about the noise
+    if round(redundancy) > 0:  # a redundancy below one contains no information on the noise
         sigma0 = solved.sigma0 * np.sqrt(observed / redundancy)
     # Larger noise makes the targets worse, but not the constraint: s^2 (C^-1 + (s^2 - 1) W)^-1
     shared = np.eye(len(correction)) + (sigma0**2 - 1.0) * held

@@ -19,7 +19,7 @@ from mlscorr.pos import SignalParameters
 
 
 def with_drift_history(adjustment: Adjustment) -> Adjustment:
-    """The equations with fall-backs, and with the most likely start of growth in each segment.
+    """Return the equations with re-acquisitions, and the most likely start of each drift.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def with_likely_starts(adjustment: Adjustment) -> tuple[Adjustment, SignalParame
     Parameters
     ----------
     adjustment : Adjustment
-        Of control points, and of some ties, whose epochs tell starts apart between the points.
+        Of control points, and of some ties, whose epochs separate starts between the points.
     """
     history = adjustment.errors.history
     edges = history.edges

@@ -212,8 +212,8 @@ def estimate_correction(
 
 
 def _judged(trajectory, matched, pos, order, kept_in):
-    """Adjustment of all targets, their Screening, how probably each refused one is right, and the
-    unstated drifts that others show.
+    """Adjustment of all targets, their Screening, probabilities of rejected ones, and the
+    drifts.
     """
     drifts = ()
     while True:

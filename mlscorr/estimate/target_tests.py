@@ -142,18 +142,18 @@ def _test(adjustment, name, left_out, targets):
 def error_evidence(weights: np.ndarray, precision: np.ndarray, course: np.ndarray) -> float:
     """Log Bayes factor of errors in k observations against none.
 
-    With b = E^T V^-1 (l - A x) and M = E^T V^-1 E of what the rows see of the errors, E, errors of
+    With b = E^T V^-1 (l - A x) and M = E^T V^-1 E of the design matrix E of the errors, errors of
     sigma s have the log factor (s^2 b^T (I + s^2 M)^-1 b - log det(I + s^2 M)) / 2, along the
     eigenvectors of M; averaged over the sizes that gross errors have.
 
     Parameters
     ----------
     weights : (3 k,) array
-        V^-1 (l - A x) of the observations, as of a Collocation.
+        V^-1 (l - A x) of the observations, from a Collocation.
     precision : (3 k, 3 k) array
         Their block of V^-1 without the trend. Units: 1/m^2.
     course : (k,) or (k, q) array
-        Share of one error vector, or of each of q, in each observation.
+        Fraction of one error vector, or of each of q, in each observation.
     """
     seen = np.kron(np.reshape(course, (len(weights) // 3, -1)), np.eye(3))
     return float(_evidence(seen.T @ weights, seen.T @ precision @ seen))

@@ -1,7 +1,7 @@
 """Scale of a default POS sigma that nobody stated, estimated from the survey.
 
 The inference averages over scales around a stated sigma, with a prior that is too narrow for a
-default: a POS of another grade would look like noise, or like something unknown. For a default, the
+default: a POS of another grade would resemble noise, or like something unknown. For a default, the
 scale with the most probable residuals is therefore used. Any cause is allowed, so that an effect is
 not mistaken for drift, except those that a larger sigma describes better: errors of the POS itself,
 and unknown ones. The scale is at least one: too large a default hides small errors, but makes no

@@ -182,7 +182,7 @@ class _GapPlace(NamedTuple):
 
 
 def headline(where: Where, label: str, lead: str, start: float) -> str:
-    """Return the sentence on the size of the gap and on where most of it lies.
+    """Return the sentence on the size of the gap and on its largest part.
 
     Parameters
     ----------

@@ -306,7 +306,7 @@ def _validate(given):
 
 
 def _roles(folder, given, key, roles):
-    """Candidate files for a role: the given one, otherwise those that look like it."""
+    """Candidate files for a role: the given one, otherwise those that resemble it."""
     name = given.get(key, {}).get("file")
     if name is not None:
         if not (folder / name).is_file():

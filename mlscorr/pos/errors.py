@@ -73,7 +73,7 @@ class PosErrors(Summary):
         Raises
         ------
         ValueError
-            If a time lies outside the trajectory or in one of its gaps.
+            If a time is outside the trajectory or in one of its gaps.
         """
         return stated_sigma(self.trajectory, self.pos, gps_time, self.starts)
 

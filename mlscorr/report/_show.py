@@ -98,7 +98,7 @@ class Layer:
         Parameters
         ----------
         color : str
-            As of ``painted``.
+            See ``painted``.
         """
         if self.colors is not None:
             meaning = "own colors"

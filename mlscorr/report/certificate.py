@@ -90,7 +90,7 @@ class _Sheet:
             self.down()
 
     def pairs(self, items, start=0.27):
-        """Write names with their values beside them, wrapped into lines."""
+        """Write names with their values next to them, wrapped into lines."""
         for name, value in items:
             self.text(name, color=SOFT)
             for line in textwrap.wrap(str(value), 80) or [""]:

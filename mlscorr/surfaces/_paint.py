@@ -151,9 +151,9 @@ class Stripes(Columns):
     along : (n, 3) array
         Unit vector, level.
     ends : (n, 2) array
-        How far it reaches along that from the center. Units: m.
+        Extent along that direction from the center. Units: m.
     begin, end : (n,) array
-        When it was first and last seen. Units: s.
+        Times of the first and last observation. Units: s.
     length, width : (n,) array
         Variances of the crossings along and across. Units: m^2.
     pace : (n,) array
@@ -189,7 +189,7 @@ def find_markings(crossings: Crossings, start: float) -> TieFeatures:
     Returns
     -------
     TieFeatures
-        The group stands for pass_number and scanner.
+        The group is that of pass_number and scanner.
     """
     since = crossings.gps_time - start
     whole = _connected(crossings, window_of(since))
@@ -245,7 +245,7 @@ def window_of(since: np.ndarray) -> np.ndarray:
 
 
 def _with_both_ends(dashes, start):
-    """Those seen at once, and wholly in one window: two lost crossings are no end."""
+    """Tracks observed at once, and entirely in one window: two lost crossings are no end."""
     took = dashes.end - dashes.begin
     margin = 3 * took / (dashes.count - 1)
     begin, end = (window_of(t - start) for t in (dashes.begin - margin, dashes.end + margin))

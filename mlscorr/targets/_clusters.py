@@ -232,7 +232,7 @@ def connected(points: np.ndarray, link: float) -> np.ndarray:
 
 @cache
 def _offsets(dimensions):
-    """Offsets (m, d) of voxels less than three apart; exactly three would depend on rounding."""
+    """Offsets (m, d) of voxels at distances below three; exactly three would depend on rounding."""
     around = np.stack(np.meshgrid(*[np.arange(-2, 3)] * dimensions), axis=-1)
     offsets = around.reshape(-1, dimensions)
     return offsets[np.sum(offsets**2, axis=1) < 9]

@@ -276,7 +276,7 @@ def _trained(case, observations, model, used, rng):
 
 
 def _with_factor(observations, model, residual):
-    """Intervals of a model with all factors scaled alike, as residuals (n, 1) indicate."""
+    """Intervals of a model with all factors scaled equally, as residuals (n, 1) indicate."""
 
     def windows(log_ratio):
         return tuple(w._replace(factor=w.factor * float(np.exp(log_ratio))) for w in model.windows)

@@ -83,7 +83,7 @@ DRIFT_FUNCTIONS = ("time", "slow time", "location", "slow place", "pass", "elaps
 class UnknownBlock:
     """One direction times one function: columns (m, p) of the rows, and the hint in words.
 
-    is_drift is True if the POS's own drift may look the same.
+    is_drift is True if the POS's own drift may appear the same.
     """
 
     lead: str

@@ -429,7 +429,7 @@ def assemble(
     ----------
     survey : Survey
     channel, ..., believed : (m, ...) arrays
-        As in Rows. Missing arguments mean one time, no survey error, no assumed value.
+        See ``Rows``. Missing arguments mean one time, no survey error, no assumed value.
     pulses : SamplePulses
     pass_number : (m,) int array
         From 1.
@@ -485,7 +485,7 @@ def sample_pulses(
     ----------
     survey : Survey
     item, weight, xyz, gps_time, intensity, normal : (k, ...) arrays
-        As in SamplePulses.
+        See ``SamplePulses``.
     """
     beam = xyz - scanner_origin(survey, gps_time)
     beam /= np.linalg.norm(beam, axis=1, keepdims=True)

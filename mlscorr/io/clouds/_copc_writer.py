@@ -326,7 +326,7 @@ class CopcWriter:
     output : binary file
         Empty and open for writing.
     folder : path
-        As of _Octree.
+        See ``_Octree``.
     """
 
     def __init__(self, layout: LasLayout, output: BinaryIO, folder: Path):
@@ -351,7 +351,7 @@ class CopcWriter:
         Parameters
         ----------
         blocks : function
-            As of _Octree.
+            See ``_Octree``.
         file : binary file
             File of the layout, open for reading.
         """

@@ -37,7 +37,7 @@ def in_time_order(layout: LasLayout, new_week: float = -np.inf) -> LasLayout:
     ----------
     layout : LasLayout
     new_week : float
-        As of CloudFile. Units: s.
+        See ``CloudFile``. Units: s.
 
     Raises
     ------

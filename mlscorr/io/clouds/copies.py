@@ -105,7 +105,7 @@ class _Points:
     _moments: np.ndarray | None = None
 
     def are_those_of(self, other: "_Points") -> bool:
-        """Return True if both clouds hold the same times in any order; False if undecodable."""
+        """Return True if both clouds have the same times in any order; False if undecodable."""
         if self.layout.points != other.layout.points:  # some of an E57 are invalid
             return False
         with suppress(OSError, ValueError):

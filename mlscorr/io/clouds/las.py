@@ -121,7 +121,7 @@ def read_cloud(
     Raises
     ------
     ValueError
-        If the file is truncated, damaged or without times, or lacks a dimension.
+        If the file is truncated, damaged or without times or a dimension.
     OSError
         If reading fails.
 

@@ -384,7 +384,7 @@ def read_records(
     chunk_size : int
         Points in a chunk.
     first, end : int
-        As of read_chunks.
+        See ``read_chunks``.
     is_brief : bool
         True if gps_time and point_source_id suffice.
 

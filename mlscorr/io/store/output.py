@@ -146,7 +146,7 @@ def output_folder(
     overwrite : bool
         True to replace files of the same name; others are kept.
     folders : iterable of str
-        As of check_output.
+        See ``check_output``.
 
     Yields
     ------
@@ -156,7 +156,7 @@ def output_folder(
     Raises
     ------
     ValueError
-        As check_output.
+        See ``check_output``.
     OSError
         If an input has changed, another run has written into the folder, or the disk refuses.
     """
@@ -175,7 +175,7 @@ def output_folder(
 
 @contextmanager
 def _locked(part):
-    """Create a folder with a lock that ends with the process, and remove what is left of it."""
+    """Create a folder with a lock that ends with the process, and remove its remains."""
     with ExitStack() as ends:
         ends.callback(remove, part)
         while not part.exists():  # first time, or another run removed it as abandoned

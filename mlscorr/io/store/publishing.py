@@ -107,7 +107,7 @@ def check_store_output(
     Parameters
     ----------
     out, inputs, overwrite, folders
-        As of check_output.
+        See ``check_output``.
 
     Raises
     ------

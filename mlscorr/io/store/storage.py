@@ -165,7 +165,7 @@ def is_folder(path: Path) -> bool:
     Raises
     ------
     OSError
-        As is_there.
+        See ``is_there``.
     """
     if not is_remote(path):
         return path.is_dir()
@@ -390,7 +390,7 @@ def files_like(folder: Path, pattern: str) -> list[Path]:
     ValueError
         If it is a pattern on a web server.
     OSError
-        As is_there.
+        See ``is_there``.
     """
     if not is_url(pattern) and not is_remote(folder):
         stem, end = posixpath.splitext(pattern)  # upper-case suffixes are equivalent

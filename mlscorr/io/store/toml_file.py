@@ -105,7 +105,7 @@ def validate(source: str, document: dict[str, Any], model: type[Model]) -> Model
     Raises
     ------
     ValueError
-        As read_toml.
+        See ``read_toml``.
     """
     try:
         return model.model_validate(document)

@@ -89,7 +89,7 @@ def map_factors(crs: str, place: np.ndarray) -> MapFactors:
 
     R is the mean radius of the ellipsoid there, sqrt(M N) = a sqrt(1 - e^2) / (1 - e^2 sin^2 phi)
     (Gauss). The height is used as given; a height above the geoid instead of the ellipsoid changes
-    the factor by at most 1.6e-5. The scale is the root of the areal scale, which holds for any
+    the factor by at most 1.6e-5. The scale is the root of the areal scale, which is valid for any
     direction if the projection is conformal.
 
     Parameters

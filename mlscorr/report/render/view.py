@@ -9,7 +9,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Camera:
-    """Camera that looks at a focus, in parallel projection or from a finite distance.
+    """Camera aimed at a focus, in parallel projection or from a finite distance.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class Camera:
         size: tuple[int, int],
         view_angle: float = 0.0,
     ) -> Camera:
-        """Make a camera that looks toward an azimuth from an elevation above the horizon.
+        """Make a camera facing an azimuth from an elevation above the horizon.
 
         Parameters
         ----------

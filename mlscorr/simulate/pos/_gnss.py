@@ -110,7 +110,7 @@ def gnss_fixes(
 
 
 def wall_elevation(azimuth: np.ndarray, heading: np.ndarray, walls: np.ndarray) -> np.ndarray:
-    """Elevation (n, m) of endless walls along the way toward azimuths (n, m). Units: rad.
+    """Elevation (n, m) of endless walls along the path toward azimuths (n, m). Units: rad.
 
     tan(elevation) = tan(elevation perpendicular to the way) |sin(azimuth - heading)|.
 

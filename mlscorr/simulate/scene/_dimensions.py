@@ -117,7 +117,7 @@ class BushSize:
     leaves : float
         Number of leaves of a bush of size 1.
     scatter : float
-        By which bushes lie off their row, to each side. Units: m.
+        Distance of bushes from their row, to each side. Units: m.
     """
 
     size: tuple[float, float] = (0.5, 1.0)
@@ -140,11 +140,11 @@ class HouseSize:
     ridge : float
         Of the roof above the eaves. Units: m.
     base : float
-        By which it reaches below the lower corner of its front. Units: m.
+        Depth below the lower corner of its front. Units: m.
     ground_floor : float
         Height without windows, above the higher corner. Units: m.
     storey, bay : float
-        Height and width of what holds a window. Units: m.
+        Height and width of the wall around a window. Units: m.
     frame, window : float
         Share of a bay and story to each side of a window, and of the window itself.
     recess : float

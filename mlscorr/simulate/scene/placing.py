@@ -21,7 +21,7 @@ from mlscorr.survey import Columns
 class TargetSpot:
     """Position of one target: the plane (unit vectors u, v) and the ground below its center.
 
-    s and lateral (m) place it along the way; ground (m) is the height of what a post stands on.
+    s and lateral (m) place it along the way; ground (m) is the height at the foot of a post.
     """
 
     support: str
