@@ -1,14 +1,14 @@
-"""Which numbers of a room its benchmark feels: each setting is halved and doubled in turn.
+"""Halve and double each setting of a room in turn, and print the figures that react.
 
     python benchmarks/ablation.py [room or room.field ...] [--seeds 1 2] [--tolerance 0.01]
 
-A number that no figure feels should go, or follow from another one. A number is felt where a
-figure moves by more than the tolerance (a hundredth by default) of its value, or where the
-benchmark refuses the number; those that guard against bad input or bound resources are felt by
-tests instead. Each room of ``ROOMS`` names its frozen ``SETTINGS`` and a function of seeds that
-returns figures by name (room_figures.py), the same ones each time: it runs twice for every field.
-A field's unit is the first word of the comment on its line. Values that a module copies when it is
-imported (defaults of arguments, settings of a higher room) aren't reached.
+A number that affects no figure should be removed, or be derived from another one. A number counts
+as effective if a figure changes by more than the tolerance (a hundredth by default) of its value,
+or if the benchmark rejects the number; those that guard against bad input or limit resources are
+covered by tests instead. Each room of ``ROOMS`` names its frozen ``SETTINGS`` and a function of
+seeds that returns figures by name (room_figures.py), the same ones each time: it runs twice for
+every field. A field's unit is the first word of the comment on its line. Values that a module
+copies when it is imported (defaults of arguments, settings of a higher room) aren't reached.
 """
 
 import argparse
@@ -24,7 +24,7 @@ from time import perf_counter
 
 import room_figures
 
-TOLERANCE = 0.01  # of a figure: what moves less is the luck of a small benchmark
+TOLERANCE = 0.01  # of a figure: smaller changes are chance in a small benchmark
 SEEDS = (1,)
 SHOWN = 3  # figures of a number, those that move most
 ROOMS = {  # name: module of the settings, function of seeds that returns a dict of figures
@@ -61,7 +61,7 @@ class Ablation:
     field, unit : str
     value : number or tuple of numbers
     half, double : dict of str to float, or str
-        Figures; the sentence of the error where the benchmark refuses the value.
+        Figures, or the error message if the benchmark rejects the value.
     """
 
     field: str
@@ -71,20 +71,20 @@ class Ablation:
     double: dict[str, float] | str
 
     def changes(self, figures, tolerance=TOLERANCE):
-        """Relative changes of what moved at half and at double of the value: two lists of words.
+        """Relative changes of the affected figures at half and double the value: two lists of text.
 
         Parameters
         ----------
         figures : dict of str to float
-            With the value as it is.
+            With the original value.
         tolerance : float
-            Of a figure, below which it did not move.
+            Of a figure; smaller changes are ignored.
         """
         return [_changes(figures, other, tolerance) for other in (self.half, self.double)]
 
 
 def scaled(value, factor):
-    """A number, or each one of a tuple, times a factor; whole numbers stay whole, one at least."""
+    """Multiply a number, or each one of a tuple; whole numbers stay whole and at least one."""
     if isinstance(value, tuple):
         return tuple(scaled(part, factor) for part in value)
     if isinstance(value, int):
@@ -96,7 +96,7 @@ def scaled(value, factor):
 
 @contextmanager
 def setting(settings, field, value):
-    """Give a field of a frozen instance another value for a while."""
+    """Temporarily give a field of a frozen instance another value."""
     before = getattr(settings, field)
     object.__setattr__(settings, field, value)
     try:
@@ -111,11 +111,11 @@ def ablate(settings, benchmark, names=()):
     Parameters
     ----------
     settings : dataclass instance
-        As its modules import it; every field is left as it was.
+        As its modules import it; every field is restored.
     benchmark : function
         Without arguments; returns a dict of figures, the same ones each time.
     names : collection of str
-        Fields to look at; all by default.
+        Fields to examine; all by default.
 
     Yields an Ablation for each field that holds a number or a tuple of numbers.
     """
@@ -134,7 +134,7 @@ def units_of(cls):
 
 
 def report(name, settings, benchmark, names=(), tolerance=TOLERANCE):
-    """Print a room's figures and a line or more for each field: what moved at half and double.
+    """Print a room's figures, and one or more lines on each field: the changes at half and double.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def report(name, settings, benchmark, names=(), tolerance=TOLERANCE):
     settings, benchmark, names
         As of ``ablate``.
     tolerance : float
-        Of a figure, below which it did not move.
+        Of a figure; smaller changes are ignored.
     """
     benchmark()  # compiled loops are loaded, simulated surveys written
     start = perf_counter()
@@ -175,7 +175,7 @@ def _figures(settings, field, value, benchmark):
 
 
 def _changes(figures, other, tolerance):
-    """Words on the figures that moved, those that moved most first."""
+    """Describe the figures that changed, largest changes first."""
     if isinstance(other, str):
         return [other]
     moved = []

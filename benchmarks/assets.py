@@ -1,13 +1,14 @@
-"""Draw the pictures of README.md and docs anew, and say which ones no longer look like that.
+"""Redraw the pictures of README.md and docs, and report which ones have changed.
 
     python benchmarks/assets.py [NAME ...] [--write]
 
-Without names those are drawn that need nothing from elsewhere, some minutes; the others can be
-named: the paper's and what costs of mistakes do take hours, the real ones the data that their
-scripts name. The same code draws the same file, byte for byte, on one machine; letters and the last
-figure of a sum may differ on another. So a picture has changed where its size has, or where more
-than 1 % of its pixels differ by more than 16 of 255 in a channel: a moved letter is less, a moved
-curve more. --write keeps the new ones; without it the exit code is 1 where one has changed.
+By default only pictures that need no external data are drawn, which takes some minutes; others can
+be named: those of the paper and of decision costs take hours, those of real data need the files
+that their scripts name. The same code draws the same file, byte for byte, on one machine; letters
+and the last figure of a sum may differ on another. So a picture has changed where its size has, or
+where more than 1 % of its pixels differ by more than 16 of 255 in a channel: a moved letter is
+less, a moved curve more. --write keeps the new ones; without it the exit code is 1 where one has
+changed.
 """
 
 import argparse
@@ -41,7 +42,7 @@ SHARE = 0.01
 
 
 def share_changed(old: Path, new: Path) -> float:
-    """Share of the pixels that differ between two pictures; all where the size does."""
+    """Share of the pixels that differ between two pictures; one if their sizes differ."""
     pixels = [np.asarray(Image.open(path).convert("RGB"), dtype=int) for path in (old, new)]
     if pixels[0].shape != pixels[1].shape:
         return 1.0
@@ -62,7 +63,7 @@ def main():
 
 
 def draw(name, folder, write):
-    """Draw a picture and compare it: whether it has changed."""
+    """Draw a picture and compare it with the old one; return True if it has changed."""
     new = folder / f"{name}.png"
     old = ASSETS / f"{name}.png"
     command = [sys.executable, ROOT / SCRIPTS[name][0], "--picture", new]

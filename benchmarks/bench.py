@@ -1,8 +1,8 @@
-"""Ratios of speed and memory against the plain tools, all measured in this run.
+"""Speed and memory relative to the plain tools, all measured in this run.
 
     python benchmarks/bench.py
 
-Times alone mean nothing on a busy machine: what is compared runs in turn, and medians count.
+Absolute times mean nothing on a busy machine, so competitors run in turn and medians are compared.
 """
 
 import argparse
@@ -33,7 +33,9 @@ CHUNK = 1_000_000  # points
 
 
 def drift(seconds):
-    """A drive at 10 m/s whose recorded poses are wrong by decimetres and millirads, slowly."""
+    """A drive at 10 m/s whose recorded poses have slowly varying errors of decimeters and
+    millirads.
+    """
     time = START - 1.0 + np.arange(0.0, seconds + 2.0, 1.0 / RATE)
     wave = np.sin(time[:, None] / [7.0, 11.0, 13.0])
     position = CORNER + np.outer(time - START, [0.0, 10.0, 0.0]) + 0.1 * wave
@@ -60,7 +62,7 @@ def street_chunks(points, rng):
 
 
 def write_street(path, points):
-    """A LAZ file in format 6 of some 3 bytes a point."""
+    """Write a LAZ file in format 6 of some 3 bytes per point."""
     header = laspy.LasHeader(point_format=6)
     header.scales = SCALE
     header.offsets = CORNER
@@ -75,7 +77,7 @@ def write_street(path, points):
 
 
 def bare_copy(path, target):
-    """What laspy and lazrs take for the copy alone."""
+    """Time that laspy and lazrs take for the copy alone."""
     with laspy.open(path) as reader, laspy.open(target, "w", header=reader.header) as writer:
         for points in reader.chunk_iterator(CHUNK):
             writer.write_points(points)
@@ -87,7 +89,7 @@ def corrected_copy(path, points, target, correction):
 
 
 def slerp_increments(correction, xyz, time):
-    """The same correction in plain float64: both poses by Slerp, Eq. 1 backward and forward."""
+    """Correct in plain float64: both poses by Slerp, Eq. 1 backward and forward."""
     old, new = (
         (
             np.stack([np.interp(time, t.gps_time, p) for p in t.position.T], axis=1),
@@ -161,7 +163,7 @@ def memory_rows(folder):
 
 
 def peak_memory():
-    """Of this process alone (ru_maxrss starts at that of the parent). Units: MB."""
+    """Peak memory of this process alone (ru_maxrss starts at the parent's value). Units: MB."""
     status = Path("/proc/self/status").read_text()
     return int(status.split("VmHWM:")[1].split()[0]) // 1024
 

@@ -1,9 +1,9 @@
-"""Speed of collocation by recursion, and beside other libraries, all measured in this run.
+"""Speed of collocation by recursion compared with other libraries, all measured in this run.
 
     python benchmarks/bench_collocation.py
 
-One thread, and its processor time: what is compared runs in turn on a busy machine, and the best
-of three counts. celerite2 (pip install celerite2) is no dependency; without it its column says so.
+Processor time of one thread: competitors run in turn on a busy machine, and the best of three
+counts. celerite2 (pip install celerite2) is no dependency; without it its column is marked so.
 """
 
 import argparse
@@ -39,7 +39,7 @@ CONSOLE = Console()
 
 
 def best(work, repeats=3):
-    """Shortest processor time of a function in s, and what it returned."""
+    """Shortest processor time of a function in s, and its result."""
     times = []
     for _ in range(repeats):
         begin = thread_time()
@@ -49,7 +49,7 @@ def best(work, repeats=3):
 
 
 class Component:
-    """One component: a signal seen at n random times, asked at q epochs."""
+    """One component: a signal observed at n random times and predicted at q epochs."""
 
     def __init__(self, n, q, family="matern32"):
         rng = np.random.default_rng(1)
@@ -78,7 +78,7 @@ class Component:
 
 
 class Pose:
-    """Six components as a correction has them: drift, jitter and attitude of three axes each."""
+    """Six components as in a correction: drift, jitter and attitude of three axes each."""
 
     def __init__(self, n, q, order=1):
         rng = np.random.default_rng(1)
@@ -114,7 +114,7 @@ class Pose:
 
 
 def growth():
-    """Time against observations, and against epochs."""
+    """Print time against the number of observations, and of epochs."""
     table = Table("observations", "epochs", "s", "times the row before", title="Growth, Matern 3/2")
     for sizes in (
         [(n, 10_000) for n in (1_000, 10_000, 100_000)],
@@ -131,7 +131,7 @@ def growth():
 
 
 def rates():
-    """Epochs a second with variance."""
+    """Print epochs per second with variance."""
     table = Table("family", "million epochs/s", title="One component, 1000 observations")
     for family in FAMILIES:
         component = Component(1_000, 3_000_000, family)
@@ -142,7 +142,7 @@ def rates():
 
 
 def beside_others():
-    """The same surveys by other ways; exponential, which all of them have."""
+    """Compare with other libraries on the same surveys, by an exponential covariance."""
     table = Table(
         "observations",
         "epochs",
@@ -198,7 +198,7 @@ def _celerite(component):
 
 
 def likelihoods():
-    """One evaluation of the likelihood, as the search for parameters needs hundreds of."""
+    """Time one evaluation of the likelihood, of which the parameter search needs hundreds."""
     table = Table(
         "observations",
         "recursion, s",
@@ -224,7 +224,7 @@ def _celerite_likelihood(component):
 
 
 def six_components():
-    """Position and attitude with full covariances, at the epochs of a trajectory."""
+    """Time position and attitude with full covariances at the epochs of a trajectory."""
     table = Table(
         "way",
         "solve, s",

@@ -3,8 +3,8 @@
     python benchmarks/bench_compile.py [survey.toml ...]
 
 By default the survey of `mlscorr demo`, which is simulated first, untimed. Each survey is corrected
-twice in processes of their own: with an empty folder for compiled loops, and again with the folder
-that the first left. The difference is what a new user waits for; seconds are of the processor.
+twice in separate processes: with an empty folder for compiled loops, and again with the folder
+that the first left. The difference is the delay for a new user; seconds are processor time.
 """
 
 import argparse
@@ -30,7 +30,7 @@ CONSOLE = Console(width=110)
 
 
 class Seconds(event.Listener):
-    """Processor time of compiling each function, without what it calls.
+    """Processor time of compiling each function, excluding its callees.
 
     numba compiles a callee while it infers the types of its caller, so that events nest.
     """
@@ -65,7 +65,7 @@ def correct(survey, result):
 
 
 def run(survey, cache, folder):
-    """The same in a process of its own: processor time, and (name, s, count) of each function."""
+    """Run the same in a separate process: processor time, and (name, s, count) of each function."""
     result = folder / "result.json"
     subprocess.run(
         [sys.executable, __file__, "--only", result, survey],

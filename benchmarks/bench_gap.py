@@ -1,9 +1,9 @@
-"""Time and memory of the diagnosis of a large survey, beside bare decoding of its clouds.
+"""Time and memory of the diagnosis of a large survey, compared with bare decoding of its clouds.
 
     python benchmarks/bench_gap.py [millions of points]
 
-By default 5 million points on two passes, with a reference surface. Times alone mean little on a
-busy machine: laspy decodes the same clouds before and after, each in a process of its own.
+By default 5 million points on two passes, with a reference surface. Absolute times mean little on a
+busy machine, so laspy decodes the same clouds before and after, each in a separate process.
 """
 
 import argparse
@@ -47,7 +47,7 @@ def decode(folder):
 
 
 def diagnose(folder):
-    """The whole diagnosis, reading included; what it says."""
+    """Run the whole diagnosis, reading included, and return its headline."""
     told = mlscorr.diagnose(mlscorr.read_survey(folder)).document
     rows = sum(told["channels"].values())
     return f"{told['verdict']['label']} of {rows} rows"
@@ -57,14 +57,14 @@ TASKS = {"decode": decode, "diagnose": diagnose}
 
 
 def measured(task, folder):
-    """A task in a process of its own: what it says, wall and processor time (s), memory (MB)."""
+    """Run a task in a separate process: its output, wall and processor time (s), memory (MB)."""
     command = [sys.executable, __file__, "--task", task, str(folder)]
     *told, wall, used, memory = subprocess.check_output(command, text=True).strip().rsplit(" ", 3)
     return " ".join(told), float(wall), float(used), float(memory)
 
 
 def child(task, folder):
-    """Run one task and print what `measured` reads."""
+    """Run one task and print the figures that `measured` reads."""
     start = perf_counter()
     told = TASKS[task](folder)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3

@@ -1,12 +1,12 @@
-"""Clusters and planes of the search for targets, beside scikit-learn, SciPy and Open3D.
+"""Clustering and plane fits of the target search compared with scikit-learn, SciPy and Open3D.
 
     python benchmarks/bench_libraries.py [--points MILLIONS] [--repeat N]
 
-An extraction of a simulated street is run once, and what it asks for is kept: the points of every
-call that grows clusters or fits a plane. Each tool then answers the same calls; the fastest of
-several rounds counts. Clusters are compared with exact single linkage (points nearer than a link
-belong together) by the adjusted Rand index, planes by the points that they hold, of those that the
-best of 5 000 samples holds. How exact a plane is shows on boards whose normal is known.
+An extraction from a simulated street is run once, and the points of every call that grows clusters
+or fits a plane are recorded. Each tool then answers the same calls; the fastest of several rounds
+counts. Clusters are compared with exact single linkage (points nearer than a link belong together)
+by the adjusted Rand index, planes by their inliers, relative to those of the best of 5 000 samples.
+The accuracy of planes is measured on boards of known normal.
 """
 
 import argparse
@@ -33,12 +33,12 @@ from mlscorr.targets._plane import fit_plane
 from mlscorr.targets.settings import SETTINGS
 
 CALLS = 400  # of each kind, spread evenly over all that an extraction makes
-REFERENCE = 5000  # samples of a plane that the others are compared with
+REFERENCE = 5000  # samples of the plane that serves as the reference
 
 
 @contextmanager
 def listened(names):
-    """Keep the arguments of functions that the seeds of targets are made by, by their names."""
+    """Record the arguments of the functions that find target seeds, by function name."""
     calls = {name: [] for name in names}
     plain = {name: getattr(_seeds, name) for name in names}
 
@@ -59,12 +59,12 @@ def listened(names):
 
 
 def real_calls(points):
-    """Arguments of clusters, of component trees and of planes, as an extraction gives them."""
+    """Arguments of clusters, of component trees and of planes in a real extraction."""
     with tempfile.TemporaryDirectory() as folder:
         make_street(Path(folder), points)
         survey = mlscorr.read_survey(folder)
         surveyed = survey.surveyed
-        # plates that stand free are told by edges: with them every kind of seed is looked for
+        # free-standing plates are found by their edges: with them, every kind of seed is sought
         kinds = tuple("plate" if k % 2 else kind for k, kind in enumerate(surveyed.kind))
         control = replace(surveyed, kind=kinds)
         survey = replace(survey, control=control, check=NO_POINTS)
@@ -74,14 +74,14 @@ def real_calls(points):
 
 
 def _spread(calls):
-    """So many of them, evenly chosen, those with too few points to tell anything left out."""
+    """Up to CALLS evenly chosen calls, without those that have too few points to be meaningful."""
     enough = [call for call in calls if len(call[0]) >= SETTINGS.smallest_count]
     chosen = np.unique(np.linspace(0, len(enough) - 1, min(CALLS, len(enough))).round().astype(int))
     return [enough[k] for k in chosen]
 
 
 def by_dbscan(points, link):
-    """Labels by scikit-learn: with one point to a core it is single linkage, and exact."""
+    """Labels by scikit-learn: with core size one this is exact single linkage."""
     return DBSCAN(eps=link, min_samples=1).fit_predict(points)
 
 
@@ -92,7 +92,7 @@ def by_tree(points, link):
 
 
 def by_open3d(points, link):
-    """Labels by Open3D, which knows three dimensions alone."""
+    """Labels by Open3D, which supports only three dimensions."""
     import open3d
 
     space = np.zeros((len(points), 3))
@@ -102,7 +102,7 @@ def by_open3d(points, link):
 
 
 def open3d_plane(samples):
-    """A fit by Open3D's segment_plane of so many samples: normal and offset."""
+    """Function that fits a plane by Open3D's segment_plane with this number of samples."""
     import open3d
 
     def fit(xyz, tolerance):
@@ -116,7 +116,7 @@ def open3d_plane(samples):
 
 
 def own_plane(xyz, tolerance):
-    """Ours: normal and offset."""
+    """Fit by mlscorr: normal and offset."""
     plane = fit_plane(xyz, tolerance)
     normal = plane.axes[2]
     return normal, -normal @ plane.origin
@@ -142,7 +142,7 @@ CLUSTERS = {
 
 
 def cluster_table(title, calls, tools, repeat):
-    """Clusters of points by several of the tools."""
+    """Print a comparison of clusterings by several of the tools."""
     points = sum(len(call[0]) for call in calls)
     table = Table(
         *("tool", "ms", "times ours", "clusters", "Rand index: mean", "least", "calls alike"),
@@ -163,7 +163,7 @@ def cluster_table(title, calls, tools, repeat):
 
 
 def plane_tools():
-    """Fits of a plane by their names."""
+    """Functions that fit a plane, by tool."""
     trials = SETTINGS.plane_trials
     return {
         f"mlscorr ({trials} samples)": own_plane,
@@ -173,7 +173,7 @@ def plane_tools():
 
 
 def plane_table(calls, repeat):
-    """Planes through the points of real calls."""
+    """Print a comparison of planes through the points of real calls."""
     points = sum(len(call[0]) for call in calls)
     table = Table(
         *("tool", "ms", "times ours", "points held: mean", "5 %"),
@@ -192,7 +192,7 @@ def plane_table(calls, repeat):
 
 
 def board_table(boards=300):
-    """Planes of boards of 0.6 m with noise of 5 mm, a third of the points on a post behind."""
+    """Print errors on boards of 0.6 m with 5 mm of noise and a third of the points behind."""
     rng = np.random.default_rng(1)
     calls = []
     for _ in range(boards):
@@ -214,7 +214,7 @@ def board_table(boards=300):
 
 
 def _held(call, plane):
-    """Number of points that a plane holds within the tolerance of a call."""
+    """Number of points within the tolerance of a call from a plane."""
     xyz, tolerance = call
     normal, offset = plane
     return np.count_nonzero(np.abs(xyz @ normal + offset) <= tolerance)

@@ -1,8 +1,8 @@
-"""Speed of matching many observations with as many surveyed points, beside plain assignments.
+"""Speed of matching many observations with as many surveyed points, compared with plain assignment.
 
     python benchmarks/bench_matching.py [observations]
 
-The peers know neither drift nor time, and refuse nothing: the nearest surveyed point, and the
+The peers use neither drift nor time, and reject nothing: the nearest surveyed point, and the
 assignment with the smallest sum of squared distances among all pairs within the radius
 (scipy.sparse.csgraph). All run in turn; processor time counts, and each runs once on a small drive
 before.

@@ -1,4 +1,4 @@
-"""What drawing costs: 2 M points at 1920 x 1080 by both engines, and the memory of 50 M points.
+"""Cost of drawing 2 M points at 1920 x 1080 by both engines, and memory for 50 M points.
 
     python benchmarks/bench_render.py
     python benchmarks/bench_render.py --report [SURVEY]
@@ -6,7 +6,7 @@
 With --report, what the report and pictures of a correction take: of a survey.toml, or of the
 simulated drive of examples/scenarios/car.toml, 11 M points.
 
-Times alone mean little on a busy machine; the goals are those of two idle cores.
+Absolute times mean little on a busy machine; the goals apply to two idle cores.
 """
 
 import argparse
@@ -38,14 +38,14 @@ PANEL = (936, 847)  # of a page of that size
 
 
 class Moved:
-    """A correction by a constant."""
+    """Correction by a constant shift."""
 
     def apply(self, cloud):
         return PointCloud(cloud.xyz + MOVE, cloud.gps_time, cloud.intensity)
 
 
 def street(points, seed=1):
-    """Chunks of a street with two walls, in no order."""
+    """Chunks of a street with two walls, in random order."""
     rng = np.random.default_rng(seed)
     for first in range(0, points, SETTINGS.chunk_points):
         n = min(SETTINGS.chunk_points, points - first)
@@ -67,7 +67,7 @@ def survey():
 
 
 def one_picture(points, by_open3d):
-    """Seconds for one picture of 1920 x 1080: half of those for a pair, before and after."""
+    """Seconds for one picture of 1920 x 1080: half the time of a pair, before and after."""
     clouds = list(street(points))
     focus = CORNER + np.array([0.0, LENGTH / 2, 0.0])
     camera = Camera.towards(focus, -60.0, 35.0, 9.5, SIZE)
@@ -88,7 +88,7 @@ class Both:
 
 
 def peak_memory():
-    """Of this process alone. Units: MB."""
+    """Peak memory of this process alone. Units: MB."""
     return int(Path("/proc/self/status").read_text().split("VmHWM:")[1].split()[0]) // 1024
 
 
@@ -144,7 +144,7 @@ def simulated(folder):
 
 
 def memory(millions):
-    """Seconds, and peak memory in MB over that after the imports, of a child that draws."""
+    """Seconds, and peak memory in MB above that of the imports, of a child that draws."""
     command = [sys.executable, __file__, "--task", str(millions)]
     start = perf_counter()
     peak = int(subprocess.run(command, check=True, capture_output=True).stdout)

@@ -1,13 +1,13 @@
-"""What workers gain and what tasks cost: a project of tiles against a survey of the same files.
+"""Gain from workers and cost of tasks: a project of tiles against a survey of the same files.
 
     python benchmarks/bench_scale.py [DRIVES] [KILLS] [--points MILLIONS] [--workers-alone]
 
 A simulated street is driven DRIVES times (2 by default). In the same run are timed: the single
 survey of one drive, a project of that drive, the project of all drives with one worker and with
-two, and a resumed run with nothing to do; beside each stands the memory of its largest process.
-Then the client is killed at KILLS random moments (2 by default), and each time resumed: the bytes
-must be the same. Times alone mean nothing on a busy machine; ratios of one run do, where nothing
-else is at work.
+two, and a resumed run with nothing to do, each with the memory of its largest process. Then the
+client is killed at KILLS random moments (2 by default), and resumed each time: the bytes must be
+the same. Absolute times mean nothing on a busy machine; ratios within one run do if nothing else is
+running.
 """
 
 import argparse
@@ -34,14 +34,14 @@ SINGLE = {"RAYON_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}  # as in each of mor
 
 
 def apart(function, *arguments):
-    """What a function returns, in another process: a child's memory begins with its parent's."""
+    """Call a function in another process, because a child's memory starts at its parent's."""
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(1, mp_context=context) as executor:
         return executor.submit(function, *arguments).result()
 
 
 def write_drive(folder, number, points):
-    """A survey in tiles of a number of points: the same street each time, another POS."""
+    """Write a survey in tiles of a number of points: the same street each time, another POS."""
     import laspy
 
     from mlscorr.simulate import Scenario, simulate
@@ -66,7 +66,7 @@ def write_drive(folder, number, points):
 
 
 def write_project(folder, numbers, name):
-    """A project.toml of some drives."""
+    """Write a project.toml of some drives."""
     drives = "".join(f'\n[[drive]]\nsurvey = "drive-{number}"\n' for number in numbers)
     path = folder / f"{name}.project.toml"
     path.write_text(f'[control]\nfile = "drive-0/control.csv"\n{drives}')
@@ -74,7 +74,7 @@ def write_project(folder, numbers, name):
 
 
 def timed(*arguments):
-    """Cost of a run of correct without pages: seconds by the clock, of all processors, MB (3,).
+    """Cost of a correction without pages: wall and total processor seconds, MB (3,).
 
     The memory is that of the largest of its processes.
     """
@@ -137,7 +137,7 @@ def stage_costs(project, out, points):
 
 
 def main(drives, kills, million_points, workers_alone):
-    """Print the table and the stages; whether all bytes are the same."""
+    """Print the table and the stages; return True if all bytes are the same."""
     rng = np.random.default_rng(0)
     table = Table("run", "s", "processor s", "MB", "against")
     costs = {}

@@ -2,9 +2,9 @@
 
     python benchmarks/bench_simulate.py
 
-Times alone mean nothing on a busy machine: what is compared runs in turn, and medians count. Both
-cast the same rays, by blocks of the same size; the simulator also makes them, measures what they
-hit, georeferences it with what was recorded, and applies the effects.
+Absolute times mean nothing on a busy machine, so competitors run in turn and medians are compared.
+Both cast the same rays in blocks of the same size; the simulator also generates them, measures the
+hits, georeferences these with the recorded poses, and applies the effects.
 """
 
 import argparse
@@ -66,7 +66,7 @@ def survey(seconds, scanner, effects=()):
 
 
 class Recorder(Surfaces):
-    """Surfaces that remember the rays that were cast."""
+    """Surfaces that record the rays that were cast."""
 
     def __init__(self, mesh):
         super().__init__(mesh)

@@ -1,4 +1,4 @@
-"""How long a user waits for the first word, beside what Python and numpy take in the same run.
+"""Time until a user sees the first output, compared with the start of Python and numpy.
 
     python benchmarks/bench_start.py
 

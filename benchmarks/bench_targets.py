@@ -1,10 +1,10 @@
-"""Speed and memory of the search for targets, beside the decoding of its clouds.
+"""Speed and memory of the target search, compared with the decoding of its clouds.
 
     python benchmarks/bench_targets.py [millions of points ...]
 
 By default 2 and 20 million points: a simulated street, repeated file after file for more than 20.
-Times alone mean nothing on a busy machine: each extraction runs between two bare decodings by
-laspy in processes of their own, and the ratio counts; that of processor time is steadier.
+Absolute times mean nothing on a busy machine, so each extraction runs between two bare decodings by
+laspy in separate processes, and the ratios are reported; that of processor time is steadier.
 """
 
 import argparse
@@ -29,7 +29,7 @@ RUNS = "decode", "extract", "decode", "extract without control", "decode"
 
 
 def make_street(folder, points):
-    """A drive of a third of a million points a second with a target every 25 m."""
+    """Write a drive of a third of a million points per second with a target every 25 m."""
     seconds = points / 333_000
     scenario = Scenario(
         drive={"duration": seconds},
@@ -40,7 +40,7 @@ def make_street(folder, points):
 
 
 def decode(folder):
-    """What laspy takes to decode the clouds alone: number of points."""
+    """Decode the clouds by laspy alone, and return the number of points."""
     points = 0
     for path in sorted(Path(folder).glob("*.laz")):
         with laspy.open(path) as reader:
@@ -49,7 +49,7 @@ def decode(folder):
 
 
 def extract(folder, with_control):
-    """Extraction without writing: number of surveyed points found, and of other objects."""
+    """Extract without writing: number of surveyed points found, and of other objects."""
     survey = mlscorr.read_survey(folder)
     surveyed = survey.surveyed
     if not with_control:
@@ -62,8 +62,7 @@ def extract(folder, with_control):
 
 
 def measure(task, folder):
-    """Run one task in this process: wall and processor seconds, megabytes over the imports, and
-    what it gave."""
+    """Run one task in this process: wall and processor seconds, MB above the imports, result."""
     imported = memory("VmRSS")
     if task != "decode":
         extract(WARM_UP, task == "extract")  # compiled kernels are loaded once
@@ -78,7 +77,7 @@ def measure(task, folder):
 
 
 def memory(name):
-    """Memory of this process: VmRSS now, VmHWM at most. Units: MB."""
+    """Memory of this process: VmRSS is the current, VmHWM the largest value. Units: MB."""
     lines = Path("/proc/self/status").read_text().splitlines()
     return next(int(line.split()[1]) / 1024 for line in lines if line.startswith(name))
 
@@ -90,7 +89,7 @@ def in_own_process(task, folder, warm_up):
 
 
 def speed_table(millions, folder):
-    """Rates and peak memory for several sizes."""
+    """Print rates and peak memory for several sizes."""
     table = Table(
         "points",
         "task",
@@ -133,7 +132,7 @@ def speed_table(millions, folder):
 
 
 def repeat(folder, times):
-    """Name the clouds several times, as other files."""
+    """List the clouds several times, as if they were other files."""
     settings = (folder / "survey.toml").read_text()
     names = [f"again-{i}.laz" for i in range(times)]
     for name in names:

@@ -1,10 +1,10 @@
-"""Solving for control and ties between passes, beside SuperLU and the dense formula.
+"""Cost of solving for control and ties between passes, compared with SuperLU and the dense formula.
 
     python benchmarks/bench_tie_solver.py [knots ...]
 
 Two opposite passes of one street, a signal of six components with twelve states at each knot, ten
-ties a knot, and a control point every 100 s that both passes see. Each size runs in a process of
-its own, which tells its memory; seconds are of the processor.
+ties a knot, and a control point every 100 s that both passes see. Each size runs in a separate
+process, which reports its memory; seconds are processor time.
 """
 
 import argparse
@@ -43,7 +43,7 @@ CONSOLE = Console(width=110)
 
 
 class Street:
-    "Rows of two passes, the second back along the first, at about so many knots"
+    "Rows of two passes, the second back along the first, with approximately this number of knots"
 
     def __init__(self, knots, ties_per_knot=10):
         self.rng = rng = np.random.default_rng(1)
@@ -76,7 +76,7 @@ class Street:
         self.asked = START + np.linspace(0.0, 2 * self.length, knots)
 
     def seen(self, rows):
-        "What rows (n, r, 3) see of position and rotation at a point some metres away"
+        "Design matrix of rows (n, r, 3) for position and rotation, at a point some meters away"
         lever = self.rng.uniform(-15.0, 15.0, (len(rows), 1, 3))
         return np.concatenate([rows, np.cross(lever, rows)], axis=2) * SIGMA
 
@@ -90,14 +90,14 @@ class Street:
 
 
 def timed(work):
-    "Seconds of the processor, and what a function returns"
+    "Processor time of a function in s, and its result"
     begin = thread_time()
     result = work()
     return thread_time() - begin, result
 
 
 def memory():
-    "Largest memory of this process so far in MB"
+    "Peak memory of this process so far in MB"
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6
 
 
@@ -116,7 +116,7 @@ def run(knots):
 
 
 def growth(sizes):
-    "Sizes each in a process of its own"
+    "Run each size in a separate process"
     table = Table(
         "knots",
         "ties",
@@ -170,7 +170,7 @@ def sparse_matrix(solver):
 
 
 def beside_superlu(sizes):
-    "The factor of the same matrix, and four columns solved; SuperLU has no inverse"
+    "Compare factorization and solution of four columns by SuperLU, which has no inverse"
     table = Table(
         "knots",
         "states",
@@ -212,7 +212,7 @@ def beside_superlu(sizes):
 
 
 def beside_the_dense_formula(sizes):
-    "V of all rows written out, factored and inverted for its diagonal, at what it can do"
+    "Compare with the dense V of all rows, factored and inverted, at the largest feasible size"
     table = Table(
         "ties",
         "sparse, s",

@@ -1,10 +1,10 @@
-"""Speed and memory of the search for ties, beside bare decoding and Open3D's ICP of two passes.
+"""Speed and memory of the tie search, compared with bare decoding and Open3D's ICP of two passes.
 
     python benchmarks/bench_ties.py [millions of points ...]
 
-By default 2, 10 and 20 million points on two passes of a simulated street, repeated file after
-file for more than 2. Times alone mean nothing on a busy machine: processor time counts, and each
-search runs between two decodings by laspy of the same files in processes of their own. ICP starts
+By default 2, 10 and 20 million points on two passes of a simulated street, repeated file after file
+for more than 2. Absolute times mean nothing on a busy machine, so processor time is measured, and
+each search runs between two decodings of the same files by laspy in separate processes. ICP starts
 from the two passes as recorded, on points of voxels of 0.2 m.
 """
 
@@ -35,7 +35,7 @@ RATE = 333_000  # points a second
 
 
 def make_street(folder, points):
-    """Two passes there and back, half of the points on each."""
+    """Write two passes there and back, with half of the points on each."""
     seconds = points / RATE / 2
     scenario = Scenario(
         drive={"duration": seconds, "passes": [{}, {"direction": "back", "pause": 20.0}]},
@@ -46,7 +46,7 @@ def make_street(folder, points):
 
 
 def decode(folder):
-    """Decode the clouds by laspy alone: processor seconds."""
+    """Decode the clouds by laspy alone, and return the processor seconds."""
     start = process_time()
     for path in sorted(Path(folder).glob("*.laz")):
         with laspy.open(path) as reader:
@@ -104,7 +104,7 @@ def icp(folder):
 
 
 def measure(task, folder):
-    """One task in a process of its own: processor seconds, two counts, largest memory in MB."""
+    """Run one task in a separate process: processor seconds, two counts, peak memory in MB."""
     command = [sys.executable, __file__, "--task", task, str(folder)]
     out = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout.split()
     return [float(word) for word in out[-4:]]

@@ -1,13 +1,13 @@
-"""How good a calibration is over many simulated surveys, against their truth.
+"""Accuracy of calibrations over many simulated surveys, against their truth.
 
     python benchmarks/calibration_study.py [--seeds 24] [--scenario FILE.toml] [--whole | --site]
 
-Each survey is the scenario's with another seed: another street, drive, POS error and survey of
-the targets. Targets are observed where the scan plane passes their centres, with the noise of
-extraction, and nothing hides them; with --whole the cloud is simulated and the targets found in it
-(a minute each). With --site it is a site of 24 control points whose boresight is wrong by half a
-degree, from its files, with what both passes saw; targets alone stand beside it. The POS error is
-made by its causes, not by the estimator's covariance.
+Each survey is the scenario's with another seed: another street, drive, POS error and survey of the
+targets. Targets are observed when the scan plane passes their centers, with the noise of extraction
+and no occlusion; with --whole the cloud is simulated and the targets found in it (a minute each).
+With --site it is a site of 24 control points with a boresight error of half a degree, read from its
+files and calibrated with the ties between both passes; targets alone are listed too. The POS error
+is made by its causes, not by the estimator's covariance.
 
 Prints for both methods the RMS error of each component, its stated sigma, and the RMS of error
 over sigma (one if the sigma is honest), then the RMSE at the check points.
@@ -29,9 +29,9 @@ from mlscorr.simulate import Scenario, read_scenario, simulate
 from mlscorr.survey import Matched, TargetObservations
 
 SCENARIO = Path(__file__).parents[1] / "examples" / "scenarios" / "calibration.toml"
-EXTRACTION = 0.003  # m, one sigma: what target extraction states for targets of 0.6 m at 10 m
-REACH = 25.0  # m, beyond which the street's houses hide targets
-GRAZING = 0.2  # least cosine of the incidence at which a target is found
+EXTRACTION = 0.003  # m, one sigma: stated by target extraction for 0.6 m at 10 m
+REACH = 25.0  # m, beyond which the houses occlude targets
+GRAZING = 0.2  # smallest cosine of incidence at which a target is found
 METHODS = ("lsc", "ls", "targets")  # the last: collocation by targets alone
 SITE = Scenario(
     name="site",
@@ -72,7 +72,7 @@ def main():
 
 
 def tell(results):
-    """The table over all seeds."""
+    """Print the table over all seeds."""
     print("\nRMS over the surveys; mm and deg")
     for method in METHODS:
         error, sigma = np.moveaxis([result[method] for result in results], 1, 0)
@@ -98,7 +98,7 @@ def tell(results):
 
 
 def features(scenario, seed):
-    """A survey whose targets are observed without a cloud."""
+    """Simulate a survey whose targets are observed without a cloud."""
     simulated = simulate(scenario, np.random.default_rng(seed))
     observations, is_check = observe(simulated, np.random.default_rng([seed, 1]))
     control, check = (simulated.targets[of] for of in (~simulated.is_check, simulated.is_check))
@@ -152,7 +152,7 @@ def score(calibration, simulated, check, alone=None):
 
 
 def observe(simulated, rng):
-    """TargetObservations of all targets that face the scanner, and which are check points."""
+    """TargetObservations of all targets that face the scanner, and a mask of check points."""
     mounting = simulated.true_mountings[0]
     centres = simulated.true_centre
     found = []

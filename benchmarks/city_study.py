@@ -1,11 +1,12 @@
-"""A city at the level of small values: what planning, joining and solving of many drives costs.
+"""Cost of planning, joining and solving many drives of a city, at feature level.
 
     python benchmarks/city_study.py [DRIVES ...] [--tiles TILES] [--places PLACES] [--limit LIMIT]
                                     [--seed SEED] [--workers WORKERS]
 
-Vehicles wander a grid of streets, 200 s each, at 10 Hz. What each saw of walls, road and poles, and
-the control points of one drive in ten, is made up; no point of a cloud is. Each size runs in a
-process of its own, which tells its memory; seconds are of the processor but for those by clock.
+Vehicles wander a grid of streets, 200 s each, at 10 Hz. Their observations of walls, road and
+poles, and the control points of one drive in ten, are generated without a point cloud. Each size
+runs in a separate process, which reports its memory; seconds are processor time except for wall
+times.
 """
 
 import argparse
@@ -66,7 +67,7 @@ CONTROL_SHARE = 0.1  # of the drives
 
 
 class City:
-    "Streets, drives that wander over them, and what these saw"
+    "Streets, drives along random routes through them, and the observations of these"
 
     def __init__(self, drives, tiles, places, seed):
         self.rng = np.random.default_rng(seed)
@@ -78,7 +79,7 @@ class City:
         self.drives = [self.drive(number) for number in range(drives)]
 
     def crossings(self):
-        "A way (k, 2) over the grid that never turns round at once"
+        "Random route (k, 2) over the grid that never turns round at once"
         place = self.rng.integers(0, self.edge, 2)
         ahead = None
         way = [place]
@@ -117,7 +118,7 @@ class City:
         return self.blocks[key]
 
     def drive(self, number):
-        "FoundDrive of a way"
+        "FoundDrive along a route"
         rng = self.rng
         way = self.crossings()
         start = START + 86_400.0 * (number // 50) + 400.0 * (number % 50)
@@ -156,7 +157,7 @@ class City:
         return FoundDrive(survey, finding, features, control, control[[]])
 
     def left(self, name, correction):
-        "What a correction leaves (n, 3) of a drive's error. Units: m"
+        "Residual error (n, 3) of a drive after a correction. Units: m"
         recorded = correction.recorded
         corrected = correction.corrected
         added = corrected.position - recorded.position
@@ -217,7 +218,7 @@ class City:
 
 
 def run(given):
-    "Print what a city of so many drives costs"
+    "Print the cost of a city with this number of drives"
     number = given.drives[0]
     begin = processor_time()
     city = City(number, given.tiles, given.places, given.seed)
@@ -259,7 +260,7 @@ def run(given):
 
 @contextmanager
 def areas_at_work(workers):
-    "What estimates areas: this process, or so many others as a project has them"
+    "Estimators of areas: this process, or the given number of worker processes, as in a project"
     if workers == 1:
         yield in_turn
         return
@@ -272,7 +273,7 @@ def areas_at_work(workers):
 
 
 def _apart(places, left):
-    "RMS of the difference of what is left in two drives at a place. Units: m"
+    "RMS of the difference of the residual errors of two drives at one place. Units: m"
     drive = np.repeat(np.arange(len(places)), list(map(len, places)))
     place = np.concatenate(places)[:, :2]
     left = np.concatenate(left)
@@ -282,22 +283,22 @@ def _apart(places, left):
 
 
 def used():
-    "What this process and its workers, once they ended, have used"
+    "Resources used by this process and its workers that have ended"
     return [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
 
 
 def processor_time():
-    "Of all of them in s"
+    "Processor time of all processes in s"
     return sum(part.ru_utime + part.ru_stime for part in used())
 
 
 def memory():
-    "Of the largest of them so far in MB"
+    "Peak memory of the largest process so far in MB"
     return max(part.ru_maxrss for part in used()) * 1024 / 1e6
 
 
 def main():
-    """Each size in a process of its own."""
+    """Run each size in a separate process."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("drives", type=int, nargs="*", default=[1, 2])
     parser.add_argument("--tiles", type=int, default=4, help="Of each drive.")

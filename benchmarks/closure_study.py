@@ -1,11 +1,11 @@
-"""How far a found cause truly closes the gap, and whether the closure that is stated says so.
+"""True closure of the gap by a found cause, compared with the stated closure.
 
     OMP_NUM_THREADS=1 python benchmarks/closure_study.py [--cases 36] [--seed 8000]
 
-Made-up surveys of features: two opposite passes, 40 targets, of which 6 are check
-points, and 200 patches, with one effect of 3 to 8 minimal detectable biases. The truth is without
-noise: of the effect's own shift of all rows, in the metric of the drift that was made, the share
-of the square that a prediction takes away. It is compared with the share that is stated.
+Synthetic surveys of features: two opposite passes, 40 targets, of which 6 are check points, and 200
+patches, with one effect of 3 to 8 minimal detectable biases. The truth is free of noise: the share
+of the squared shift of all rows by the effect that a prediction removes, in the metric of the
+simulated drift. It is compared with the stated share.
 """
 
 import argparse
@@ -27,7 +27,7 @@ CHECKED = 6  # targets that are check points
 
 
 def case(bed, rng, kind, name, m):
-    """One survey: label, and shares of the effect's square that are gone, stated and true."""
+    """One survey: label, and stated and true shares of the effect's square that are removed."""
     g = bed.g
     shift, _, _ = sized(g, bed.signs, name, m, rng, bed.size)
     rows = replace(g.rows, residual=errors(g, rng, kind) + shift)
@@ -64,7 +64,7 @@ def case(bed, rng, kind, name, m):
 
 
 def _gone(bed, shift, predicted):
-    """Share of the square of a shift (m,) that a prediction takes away."""
+    """Share of the square of a shift (m,) that a prediction removes."""
     return 1.0 - (bed.size(shift - predicted) / bed.size(shift)) ** 2
 
 
@@ -85,7 +85,7 @@ def run(cases, seed, beds=4):
 
 
 def report(results):
-    """Lines: true and stated closure, over all cases and over those named rightly."""
+    """Lines of true and stated closure, over all cases and over correctly named ones."""
     for words, part in (
         ("all", results),
         ("named rightly", [r for r in results if r["name"] in r["label"].split("+")]),

@@ -1,11 +1,12 @@
-"""How often is control in another scale, turn or tilt found, and how often where there is none?
+"""Rates at which a scale, turn or tilt of the control is found, with and without one.
 
 python benchmarks/datum_study.py [KIND ...] [--seeds 20] [--points 8] [--good]
 
 Surveys at feature level under each kind of POS that the simulator makes: MEMS and tactical units,
 filtered and smoothed, with their stated sigma(t), without any, and with sigmas ten times too small
 and too large; under open sky, in outages, and among houses that leave few satellites; the paper's
-car and boat; a POS whose GNSS is fixed in turns; and one that drifts for seconds unstated.
+car and boat; a POS whose GNSS fix comes and goes; and one with short drifts that its sigmas do not
+state.
 
 The table has the share of good surveys in which a term is found (false alarms), and of the same
 surveys, with their control changed by one term, in which this term is found. With --points, of so
@@ -76,7 +77,7 @@ def recorded(scenario, factor):
 
 
 def changed(matched, matrix):
-    """The observed control points, surveyed with a linear change about their middle."""
+    """The observed control points, surveyed with a linear change about their mean."""
     place = matched.surveyed.position
     moved = place + (place - place.mean(axis=0)) @ matrix.T
     return replace(matched, surveyed=replace(matched.surveyed, position=moved))
@@ -102,7 +103,7 @@ def terms_found(survey, seed, changes, points):
 
 
 def main():
-    """Print the table, a kind as soon as it is done."""
+    """Print the table, each kind of POS as soon as it is done."""
     known = kinds()
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("kinds", nargs="*", metavar="KIND", help=f"of {', '.join(known)}")

@@ -1,9 +1,9 @@
-"""What the cost of a false alarm buys and loses: clean surveys given a cause against effects named.
+"""Effect of the cost of a false alarm: clean surveys given a cause against effects named.
 
     python benchmarks/decision_costs.py [--records FOLDER] [--worlds N] [--picture FILE]
 
 Synthetic surveys of features, whose evidence is kept in FOLDER (as by ``train_decision.py``; a
-missing world takes minutes), are labelled at costs from a tenth to a hundred times the default, by
+missing world takes minutes), are labeled at costs from a tenth to a hundred times the default, by
 probabilities learned on other worlds.
 """
 
@@ -33,7 +33,7 @@ MARKS = {"sensitive": "^", "default": "o", "careful": "s"}
 
 
 def rates(records, probabilities, costs):
-    """Share of clean surveys that are given a cause, and of effects that are named rightly."""
+    """Share of clean surveys that are given a cause, and of effects that are named correctly."""
     known = figures(records, probabilities, costs)
     claims = sum(known[name][0] * known[name][1] for name in CLEAN if known[name][1])
     clean = sum(known[name][1] for name in CLEAN)
@@ -41,7 +41,7 @@ def rates(records, probabilities, costs):
 
 
 def draw(records, probabilities, path):
-    """Both shares over the cost of a false alarm, and the three operating points on them."""
+    """Draw both shares over the cost of a false alarm, and the three operating points."""
     default = OPERATING_POINTS["default"]
     curve = np.array(
         [rates(records, probabilities, replace(default, false_alarm=cost)) for cost in FALSE_ALARMS]
@@ -71,7 +71,7 @@ def draw(records, probabilities, path):
 
 
 def main():
-    """Collect what lacks, and draw."""
+    """Collect missing records, and draw."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--records", type=Path, default=Path("build/records"))
     parser.add_argument("--worlds", type=int, default=69)

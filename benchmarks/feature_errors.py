@@ -1,4 +1,4 @@
-"""Errors of made-up surveys of features in which no effect acts, for studies and tests."""
+"""Errors of synthetic surveys of features without an effect, for studies and tests."""
 
 import numpy as np
 from gap_training.errors import process, scatter
@@ -7,7 +7,7 @@ from numpy.random import Generator
 
 
 def errors(g: Geometry, rng: Generator, kind: str = "sines") -> np.ndarray:
-    """Residuals (m,) of a survey in which no effect acts.
+    """Residuals (m,) of a survey without an effect.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""Simulated surveys at feature level: target centres with noise instead of rays and extraction.
+"""Simulated surveys at feature level: target centers with noise instead of rays and extraction.
 
 The drive, the scene, the POS with its errors and sigmas, the mounting and the surveyor are the
-simulator's; a target is observed where its plane of scan passes over its centre. So hundreds of
-surveys take minutes, and what is measured is the estimate alone.
+simulator's; a target is observed when the scan plane passes over its center. Thus hundreds of
+surveys take minutes, and only the estimate is measured.
 """
 
 from dataclasses import dataclass, replace
@@ -16,7 +16,7 @@ from mlscorr.simulate import DEMO, read_scenario, simulate
 from mlscorr.simulate.scenario import DriveScenario, PosScenario
 from mlscorr.survey import ControlPoints, Matched, TargetObservations, Trajectory
 
-EXTRACTION = 0.004  # m, one sigma of a target's centre, as extraction reaches it
+EXTRACTION = 0.004  # m, one sigma of a target's center, as extraction reaches it
 REACH = 40.0  # m, beyond which no target is extracted
 RATE = 10.0  # Hz of the trajectory; the POS's errors change more slowly
 FOLDER = Path(__file__).parents[1] / "examples" / "scenarios"
@@ -24,7 +24,7 @@ FOLDER = Path(__file__).parents[1] / "examples" / "scenarios"
 
 @dataclass(frozen=True)
 class FeatureSurvey:
-    """What is estimated from, and the truth: true trajectory, true centres of check points."""
+    """Input of an estimate, and the truth: true trajectory, true centers of check points."""
 
     true: Trajectory
     recorded: Trajectory
@@ -48,11 +48,11 @@ class FeatureSurvey:
         return Matched.by_name(self.checked, self.check)
 
     def position_left(self, correction):
-        """True - corrected position (n, 3) at every epoch. Units: m."""
+        """Residual position error (n, 3) after a correction, true - corrected. Units: m."""
         return self.true.position - correction.corrected.position
 
     def keep(self, names):
-        """The survey with some of its control points only."""
+        """The survey with only some of its control points."""
         rows = [name in names for name in self.observations.name]
         return replace(self, observations=self.observations[np.array(rows)])
 
@@ -94,7 +94,7 @@ def scenarios():
 
 
 def feature_survey(scenario, seed, rate=RATE):
-    """FeatureSurvey of a scenario, at a rate of the trajectory in Hz; None: as recorded."""
+    """FeatureSurvey of a scenario, at a trajectory rate in Hz; None keeps the recorded rate."""
     simulated = simulate(scenario, np.random.default_rng(seed))
     rng = np.random.default_rng([seed, 1])
     pairs = list(zip(simulated.true_passes, simulated.passes, strict=True))
@@ -125,7 +125,7 @@ def feature_survey(scenario, seed, rate=RATE):
 
 
 def _observe(simulated, true, recorded, number, rng):
-    """Targets, pass number, times and observed centres of what one pass sees."""
+    """Targets, pass number, times and observed centers in one pass."""
     coarse = true.gps_time[::10]
     found = []
     mounting = simulated.true_mountings[0]

@@ -1,4 +1,4 @@
-"""Longest time without a change on the terminal, by command: what looks frozen to a user.
+"""Longest time without a change on the terminal by command, during which it appears frozen.
 
 Runs each command on the demo survey in a terminal of its own, and prints the intervals over 2 s in
 which nothing was printed or redrawn, with the last line before them.
@@ -32,7 +32,7 @@ ESCAPES = re.compile(r"\x1b\[[0-9;?]*[a-zA-Z]")
 
 
 def record(arguments: list[str]) -> tuple[list[tuple[float, str]], float, int]:
-    """What a command prints on a terminal: (time, text) of each change, its end, its exit code."""
+    """Output of a command on a terminal: (time, text) of each change, its end, its exit code."""
     process, terminal = pty.fork()
     if process == 0:
         os.environ["COLUMNS"] = "120"
@@ -54,7 +54,7 @@ def record(arguments: list[str]) -> tuple[list[tuple[float, str]], float, int]:
 
 
 def last_line(text: str) -> str:
-    """The last line that a person sees."""
+    """The last visible line."""
     lines = [line.strip() for line in re.split(r"[\r\n]+", ESCAPES.sub("", text)) if line.strip()]
     if lines:
         return lines[-1]
@@ -62,7 +62,7 @@ def last_line(text: str) -> str:
 
 
 def frozen(changes: list[tuple[float, str]], end: float) -> list[tuple[float, float, str]]:
-    """Beginning, length and last line of each interval over the limit without a change."""
+    """Start, length and last line of each interval over the limit without a change."""
     intervals = []
     before = 0.0
     line = "(nothing yet)"
@@ -79,7 +79,7 @@ def frozen(changes: list[tuple[float, str]], end: float) -> list[tuple[float, fl
 
 
 def main() -> None:
-    """Print a table of the commands that are asked for, or of all."""
+    """Print a table of the given commands, or of all."""
     asked = sys.argv[1:] or list(COMMANDS)
     with tempfile.TemporaryDirectory() as out:
         places = {"out": out, "survey": f"{out}/demo/survey"}

@@ -1,4 +1,4 @@
-"""What acts on made-up surveys: effects at finite size, noise, and mechanisms of no library."""
+"""Effects at finite size, noise, and mechanisms outside the library, for synthetic surveys."""
 
 from dataclasses import replace
 from typing import ClassVar
@@ -11,7 +11,7 @@ from mlscorr.gap.signatures import Bench
 
 
 class Outside:
-    """Mechanisms that no library knows: shifts (m,) of the rows by one unit of each."""
+    """Mechanisms outside the library: shifts (m,) of the rows by one unit of each."""
 
     names = (
         "lift with speed",
@@ -129,7 +129,7 @@ ACTUAL = ErrorModel(
 
 
 def metric(g):
-    """Function that gives the size of a shift (m,) in units of the minimal detectable bias."""
+    """Function that returns the size of a shift (m,) in units of the minimal detectable bias."""
     observed = Observations.of(g.rows, g.background)
     whitener = observed.whitener(ACTUAL)
 
@@ -160,7 +160,7 @@ def sized(g, signs, name, m, rng, size):
 
 
 def noisy(g, name, rng):
-    """What a random effect does to residuals and to the noise that the points show."""
+    """Changes by a random effect to the residuals and to the observed noise of points."""
     effect = make_effect(name, magnitude=NOISES[name])
     rows = g.rows
     zero = np.zeros(len(g.rows))

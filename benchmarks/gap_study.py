@@ -1,4 +1,4 @@
-"""How well the diagnosis names effects, over many made-up surveys of features alone.
+"""Accuracy of the diagnosis over many synthetic surveys at feature level.
 
     OMP_NUM_THREADS=1 python benchmarks/gap_study.py [--cases 24] [--seed 1000]
 
@@ -41,7 +41,7 @@ class Bed:
 
 
 def _rho(bed, told, label):
-    """Squared correlation of the truth with the effect that was named; zero where unknown."""
+    """Squared correlation of the truth with the named effect; zero for unknown."""
     compared = bed.separable
     if len(told) != 1 or label not in compared.effects:
         return 0.0
@@ -68,7 +68,7 @@ def _off(bed, rows, signs, evidence, told, name, m):
 
 
 def case(bed, rng, kind, effects=(), m=3.0, withheld=None, outside=None, noise=None, replicas=0):
-    """One survey, diagnosed: a dict of truth and answers."""
+    """Diagnose one survey, and return a dict of truth and answers."""
     g = bed.g
     rows = bed.g.rows
     residual = errors(g, rng, kind)
@@ -116,7 +116,7 @@ def case(bed, rng, kind, effects=(), m=3.0, withheld=None, outside=None, noise=N
 
 
 def jobs(cases, rng):
-    """What is studied: keyword arguments of `case`, in cells."""
+    """Studied cases: keyword arguments of `case`, in cells."""
     cells = {"clean": [{"replicas": 50}] * (3 * cases)}
     cells["noise"] = [{"noise": n} for n in NOISES for _ in range(max(1, cases // 8))]
     for m in (2.0, 3.0, 5.0):
@@ -139,7 +139,7 @@ def _cycle(rng, number):
 
 
 def run(cases, seed, beds=4, save=None):
-    """All cells: lists of what `case` returns."""
+    """Run all cells, and return lists of `case` results."""
     ground = [Bed.of(seed + i) for i in range(beds)]
     rng = np.random.default_rng(seed)
     results = {}
@@ -159,7 +159,7 @@ def run(cases, seed, beds=4, save=None):
 
 
 def right(one):
-    """Whether a label is the truth, or by class: what the geometry can't tell from it."""
+    """True if a label is the truth, or one that the geometry cannot distinguish from it."""
     parts = one["label"].split("+")
     truth = one["truth"].split("+")
     strict = sorted(parts) == sorted(truth)
@@ -236,7 +236,7 @@ def _share(k, n):
 
 
 def calibration(results):
-    """Stated probability of the label against how often it was right, over all cells."""
+    """Stated probability of the label against the rate of correct labels, over all cells."""
     stated = []
     hit = []
     for cell, several in results.items():

@@ -1,9 +1,9 @@
-"""Grade the decision of a diagnosis on evidence of made-up surveys of features.
+"""Grade the decision of a diagnosis on the evidence of synthetic surveys of features.
 
     OMP_NUM_THREADS=1 python benchmarks/grade_decision.py FOLDER --first 5000 --worlds 10 --cases 24
 
-Worlds are others than those it was learned on, and mechanisms those of the half that grades. What
-is weighed in each world is kept in FOLDER.
+Its worlds differ from those of the training, and its mechanisms are those of the grading half. The
+evidence of each world is kept in FOLDER.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ from mlscorr.gap.evidence.decision import learned
 
 
 def main() -> None:
-    """Collect, and print figures."""
+    """Collect records, and print figures."""
     given = study_arguments(__doc__, 5000, 10).parse_args()
     seeds = range(given.first, given.first + given.worlds)
     records = collect(given.folder, seeds, given.cases, outside_mechanisms(), given.replicas)

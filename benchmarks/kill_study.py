@@ -1,12 +1,12 @@
-"""What is left of a project that is killed at a random moment, and what a resumed run makes of it.
+"""State of a project killed at a random moment, and the result of a resumed run.
 
     python benchmarks/kill_study.py [KILLS]
 
 A project of two drives in four files each is corrected without a disturbance. Then, KILLS times (60
 by default) in turn: a worker, the command itself, the scheduler of a cluster is ended by SIGKILL,
 the disk is full (a file system in memory, which only root may mount), or the command is interrupted
-as by Ctrl-C. What stands in the folder then must be whole, and ``--resume`` must end with the same
-bytes, without doing again what had ended. Times don't count: it may run beside other work.
+as by Ctrl-C. Files in the folder must then be complete, and ``--resume`` must give the same bytes
+without repeating finished tasks. Times don't matter, so other work may run at the same time.
 """
 
 import argparse
@@ -57,7 +57,7 @@ class Case:
         )
 
     def wait(self, seconds):
-        "Until a moment after the start, unless the run ends before"
+        "Wait until a moment after the start, unless the run ends before"
         due = monotonic() + seconds
         while monotonic() < due and self.process.poll() is None:
             sleep(0.02)
@@ -68,7 +68,7 @@ class Case:
         return self.process.returncode
 
     def done(self, line=0):
-        "Counts of the tasks that ended, from a line of the log on"
+        "Number of finished tasks, from a line of the log on"
         log = self.out / "log.txt"
         if log.is_file():
             lines = log.read_text().splitlines()[line:]
@@ -77,7 +77,7 @@ class Case:
         return Counter(match.groups() for match in map(ENDED.search, lines) if match)
 
     def resumed(self):
-        "What is wrong after --resume: sentences"
+        "Sentences on errors after --resume"
         left = contents(self.out)
         left.pop("project.json", None)  # which counts the workers that were lost
         wrong = [f"{n} is half" for n, content in left.items() if content != self.expected.get(n)]
@@ -95,7 +95,7 @@ class Case:
 
 
 def contents(out):
-    "Bytes of all results but those that say when they were made, and of tasks"
+    "Bytes of all results except those with their time of creation, and of tasks"
     if out.is_dir():
         names = [path for path in out.rglob("*") if path.is_file()]
     else:
@@ -108,14 +108,14 @@ def contents(out):
 
 
 def children(number):
-    "Numbers of the processes that a process started, of these and so on"
+    "Process IDs of all descendants of a process"
     tasks = Path(f"/proc/{number}/task")
     own = [int(n) for path in tasks.glob("*/children") for n in path.read_text().split()]
     return own + [n for child in own for n in children(child)]
 
 
 def lose_worker(case, moment, rng):
-    "One of the workers is ended; the run goes on"
+    "Kill one of the workers; the run goes on"
     case.start("--workers", str(WORKERS))
     case.wait(moment)
     if workers := [n for n in children(case.process.pid) if is_worker(n)]:
@@ -124,7 +124,7 @@ def lose_worker(case, moment, rng):
 
 
 def is_worker(number):
-    "Whether a process works on tasks"
+    "True if a process works on tasks"
     try:
         return b"spawn_main" in Path(f"/proc/{number}/cmdline").read_bytes()
     except OSError:
@@ -132,7 +132,7 @@ def is_worker(number):
 
 
 def lose_command(case, moment, rng):
-    "The command itself is ended"
+    "Kill the command itself"
     case.start("--workers", str(WORKERS))
     case.wait(moment)
     case.process.kill()
@@ -140,7 +140,7 @@ def lose_command(case, moment, rng):
 
 
 def lose_scheduler(case, moment, rng):
-    "The scheduler of a cluster of two workers is ended"
+    "Kill the scheduler of a cluster of two workers"
     silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "scheduler.json"
@@ -165,7 +165,7 @@ def lose_scheduler(case, moment, rng):
 
 
 def fill_disk(case, moment, rng):
-    "No byte can be written from a moment on"
+    "Fill the disk at a given moment"
     case.out.mkdir(parents=True)
     mount = ["mount", "-t", "tmpfs", "-o", f"size={DISK}", "tmpfs", str(case.out)]
     subprocess.run(mount, check=True)
@@ -184,7 +184,7 @@ def fill_disk(case, moment, rng):
 
 
 def interrupt_command(case, moment, rng):
-    "Ctrl-C"
+    "Interrupt the command by Ctrl-C"
     case.start("--workers", str(WORKERS))
     case.wait(moment)
     case.process.send_signal(signal.SIGINT)
@@ -195,7 +195,7 @@ DISTURBANCES = (lose_worker, lose_command, lose_scheduler, fill_disk, interrupt_
 
 
 def tell(rows, wrong, seconds):
-    "A row of each disturbance, and what is wrong"
+    "Print a row for each disturbance, and the errors found"
     table = Table("disturbed", "runs", "moments, s", "exit codes", "tasks when resumed", "wrong")
     for name, cases in rows.items():
         moments, codes, tasks, faults = zip(*cases, strict=True)

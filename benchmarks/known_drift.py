@@ -1,12 +1,12 @@
-"""How often an effect is named rightly where the covariance of all errors is known: the limit.
+"""Limit of correct names of effects: the rate with the true covariance of all errors.
 
     OMP_NUM_THREADS=1 python benchmarks/known_drift.py [--seed 20000] [--worlds 40] [--cases 24]
 
-Made-up surveys of features whose errors are drawn from what the POS, the survey and the extraction
-state, which no real POS grants. The posterior of nothing, 18 effects and unknown, as it is, without
-anything learned, is worked out twice: by that covariance, and by the family of those that a
-diagnosis averages over, since it doesn't know it. MDB is the minimal detectable bias by the known
-one. Noise and pairs are neither drawn nor tried.
+Synthetic surveys of features whose errors are drawn from the stated sigmas of POS, survey and
+extraction, which no real POS guarantees. The raw posterior of nothing, 18 effects and unknown,
+without a trained decision, is computed twice: with the true covariance, and with the family of
+covariances that a diagnosis averages over, as it doesn't know the true one. MDB is the minimal
+detectable bias by the known one. Noise and pairs are neither drawn nor tried.
 """
 
 import argparse
@@ -40,7 +40,7 @@ SIZES = (1.0, 8.0)  # MDB, between which sizes are drawn evenly by their logs, a
 
 
 class Bed:
-    """A geometry with all that is weighed in it."""
+    """A geometry with all hypotheses about it."""
 
     def __init__(self, seed):
         rng = np.random.default_rng([seed, 0])
@@ -73,7 +73,7 @@ class Bed:
         return replace(self.rows, residual=residual + sized.shift), sized.effect.name, sized.mdb
 
     def label(self, rows, is_known):
-        """The cheapest label by the posterior, of rows in which something may act."""
+        """Cheapest label by the posterior, for rows with a possible effect."""
         observations = self.observations
         prior = dict(SETTINGS.prior)
         residual = observations.columns(rows.residual[:, None])
@@ -96,7 +96,7 @@ class Bed:
 
 
 def figures(results):
-    """Shares by what they are of, each of results (truth, mdb, labels by both)."""
+    """Shares of correct labels in results (truth, mdb, labels by both)."""
 
     def rate(good, some):
         hits = [

@@ -1,10 +1,10 @@
-"""Are errors of metres and degrees named as well as those of centimetres?
+"""Names of errors of meters and degrees, compared with those of centimeters.
 
 python benchmarks/large_errors.py [--seeds 3] [--errors position_step lever_arm ...]
 
 A street is driven there and back, 40 s each way, and simulated with one large error, with its
-surfaces as a reference and without. Patches then lie before other surfaces than their own. For
-each: what diagnose names, with which probability, and its sizes.
+surfaces as a reference and without. Patches are then compared with wrong surfaces. For each: the
+label by diagnose, its probability, and its sizes.
 """
 
 import argparse
@@ -30,7 +30,7 @@ ERRORS = {
 
 
 def survey_with(folder, error, seed, reference):
-    """The folder of a simulated survey with an error, or nothing wrong."""
+    """Folder of a simulated survey with one error, or none."""
     if ERRORS[error] is None:
         effects = []
     else:

@@ -1,19 +1,18 @@
-"""What the collocation reaches over many simulated surveys, and on real drift.
+"""Accuracy of the collocation over many simulated surveys, and on real drift.
 
     python benchmarks/lsc_study.py windows SERIES.err
     python benchmarks/lsc_study.py STUDY [--seeds 25] [--first 0]
 
 windows    16 ideal targets in each window of a real series of POS errors, against order-5 least
            squares and a stationary exponential collocation
-coverage   how often the truth lies within one and 1.96 stated sigmas, and good points rejected
-gross      15 % of the control points wrong by 0.1 to 1 m
-adjacent   two neighbours wrong by one vector: found, or told as doubtful
-order      orders 0 to 3 of the trend, and the most probable one
-tuned      parameters from control points alone against those tuned on the truth
-count      3 to 60 control points, against least squares
+coverage how often the truth lies within one and 1.96 stated sigmas, and good points rejected gross
+15 % of the control points wrong by 0.1 to 1 m adjacent two neighbors wrong by one vector: found, or
+reported as doubtful order orders 0 to 3 of the trend, and the most probable one tuned parameters
+from control points alone against those tuned on the truth count 3 to 60 control points, against
+least squares
 
-Surveys are simulated at feature level (feature_surveys.py); seeds count from --first. Intervals
-are 95 % by bootstrap over surveys. Errors in m, RMS over E, N, H together unless said.
+Surveys are simulated at feature level (feature_surveys.py); seeds count from --first. Intervals are
+95 % by bootstrap over surveys. Errors in m, RMS over E, N, H together unless noted.
 """
 
 import argparse
@@ -59,7 +58,7 @@ def by_scenario(rows, statistic):
 
 
 def inside(survey, found):
-    """Which epochs (n,) lie within the control span."""
+    """Mask (n,) of the epochs within the control span."""
     time = survey.recorded.gps_time
     return (time >= found.span[0]) & (time <= found.span[1])
 

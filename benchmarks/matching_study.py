@@ -1,21 +1,21 @@
-"""How many targets are matched right, refused and matched wrong, over many random surveys.
+"""Rates of correct, rejected and wrong matches of targets, over many random surveys.
 
     python benchmarks/matching_study.py [surveys]
     python benchmarks/matching_study.py canyons [surveys]
     python benchmarks/matching_study.py many [observations]
 
 Each survey has 20 to 60 targets of two kinds and two sizes along one to three passes, 30 % of them
-in look-alike pairs 1.5 m apart. The POS drifts up to 3 m, by one of four causes in turn: velocity
-errors that wander in outages, sums of sinusoids, an integrated MEMS, and the real error series
-of a MEMS GNSS/INS where it is at hand (MLSCORR_SHARED). Its stated sigmas are 0.5 to 2 times the
-drift's size. Of the control 10 % are mis-numbered (exchanged in pairs), 10 % moved by 0.3 to 3 m,
-10 % stand hidden; of the observations 20 % are look-alikes without control, half of them near
+in look-alike pairs 1.5 m apart. The POS drifts by up to 3 m, from one of four causes in turn:
+velocity errors that wander in outages, sums of sinusoids, an integrated MEMS, and the real error
+series of a MEMS GNSS/INS where it is at hand (MLSCORR_SHARED). Its stated sigmas are 0.5 to 2 times
+the drift's size. Of the control 10 % are mis-numbered (exchanged in pairs), 10 % moved by 0.3 to 3
+m, and 10 % are hidden; of the observations 20 % are look-alikes without control, half of them near
 a target. Nothing is drawn from the covariance functions of the estimate.
 
-In canyons the POS has a bias and a trend, 1 to 3 m at most, that its constant sigma of 0.5 m does
-not state (also 10 times smaller and larger, and no sigma); look-alikes stand 1.5 to 4 m from
-targets, surveyed or not, and all control is right. The last study is of speed: as many surveyed
-points as observations.
+In canyons the POS has a bias and a trend of at most 1 to 3 m that its constant sigma of 0.5 m does
+not state (also 10 times smaller and larger, and no sigma); look-alikes are 1.5 to 4 m from targets,
+surveyed or not, and all control is correct. The last study concerns speed: as many surveyed points
+as observations.
 """
 
 import argparse
@@ -48,9 +48,9 @@ CAUSES = ("outages", "sinusoids", "mems", "real")
 
 @dataclass(frozen=True)
 class Made:
-    """A made survey: what match gets, and the truth of each observation and control point.
+    """A simulated survey: the input of match, and the truth of each observation and control point.
 
-    truth (n,) is the row of the target seen, -1 for a look-alike; whole (k,) tells the control
+    truth (n,) is the row of the target seen, -1 for a look-alike; whole (k,) marks the control
     points whose position and appearance are those of their target, moved (k,) how far others were
     moved (m), 0 for mis-numbered ones.
     """
@@ -111,7 +111,7 @@ def print_canyons(surveys=100):
 
 
 def many(count=100_000):
-    """Seconds, observations, right and wrong of a drive past so many surveyed points."""
+    """Seconds, observations, and right and wrong matches of a drive past this number of points."""
     observations, control, drive = long_drive(count)
     started = time.perf_counter()
     found = match(observations, control, drive).matched
@@ -122,7 +122,7 @@ def many(count=100_000):
 
 
 def long_drive(count):
-    """TargetObservations, ControlPoints and Trajectory of a drive past so many surveyed points.
+    """TargetObservations, ControlPoints and Trajectory of a drive past this number of points.
 
     The i-th observation is the i-th point, 4 m on from the one before.
     """
@@ -160,7 +160,7 @@ TITLES = ("right", "refused", "wrong", "moved used", "moved", "else used", "else
 
 @cache
 def small_set(seeds):
-    """Made surveys of each simulated cause, for each seed."""
+    """Simulated surveys of each cause, for each seed."""
     causes = [cause for cause in CAUSES if cause != "real"]
     return [make(len(causes) * seed + i, cause) for seed in seeds for i, cause in enumerate(causes)]
 
@@ -201,12 +201,12 @@ def score(made):
 
 
 def make_canyon(seed, sigma):
-    """A Made survey in a canyon whose POS states this sigma (m), or None."""
+    """Simulate a survey in a canyon with this stated sigma (m), or None."""
     return make(seed, "canyon", sigma)
 
 
 def make(seed, cause, stated=None):
-    """A Made survey."""
+    """Simulate a survey."""
     rng = np.random.default_rng(seed)
     is_canyon = cause == "canyon"
     if cause == "real" and not SERIES.exists():
@@ -239,7 +239,7 @@ def make(seed, cause, stated=None):
 
 
 def _places(rng, pair):
-    """Targets (n, 3) along a way: metres ahead, to the right, up; 30 % of them in pairs."""
+    """Targets (n, 3) along the street: meters ahead, to the right, up; 30 % of them in pairs."""
     n = int(rng.integers(20, 61))
     ahead = 40.0 + np.cumsum(rng.uniform(5.0, 60.0, n))
     places = np.column_stack([ahead, rng.choice([-1, 1], n) * rng.uniform(4, 15, n)])
@@ -267,7 +267,7 @@ def _appearances(rng, local):
 
 
 def _way(ahead):
-    """The winding street: position (n, 3) in the map and heading (n,) at metres along it."""
+    """The winding street: position (n, 3) in the map and heading (n,) at a length in meters."""
     heading = 0.8 * np.sin(ahead / 150.0)
     steps = np.linspace(0.0, max(float(np.max(ahead)), 1.0) + 1.0, 20_000)
     turn = 0.8 * np.sin(steps / 150.0)
@@ -299,7 +299,7 @@ def _drive(length, number, rng):
 
 
 def _see(local, drive, rng):
-    """When each target is seen: gps_time (n,) of the nearest epoch, a little later or earlier."""
+    """Sighting time gps_time (n,) of each target: that of the nearest epoch, slightly shifted."""
     place, _ = _way(local[:, 0])
     distance = np.linalg.norm(drive.position[None, ::5] - place[:, None], axis=2)
     time = drive.gps_time[::5][np.argmin(distance, axis=1)]
@@ -308,7 +308,7 @@ def _see(local, drive, rng):
 
 
 def _record(drive, cause, rng, stated=None):
-    """What the POS records: the trajectory with sigmas, and its position error (n, 3)."""
+    """Recording of the POS: the trajectory with sigmas, and its position error (n, 3)."""
     n = len(drive)
     if cause == "canyon":
         error = _canyon(drive.gps_time, rng)
@@ -338,7 +338,7 @@ def _record(drive, cause, rng, stated=None):
 
 
 def _canyon(gps_time, rng):
-    """A bias and a trend, 1 to 3 m at most, in a canyon that begins and ends within 10 s."""
+    """A bias and a trend, at most 1 to 3 m, in a canyon that begins and ends within 10 s."""
     first, last = np.quantile(gps_time, [rng.uniform(0.0, 0.3), rng.uniform(0.7, 1.0)])
     inside = np.clip((gps_time - first) / 10.0, 0, 1) * np.clip((last - gps_time) / 10.0, 0, 1)
     direction = rng.normal(size=(2, 3)) * [1.0, 1.0, 0.5]
@@ -377,7 +377,7 @@ def _sinusoids(gps_time, rng):
 
 
 def _survey(local, kinds, sizes, rng, blunders=1.0):
-    """ControlPoints, which of them are whole, and how far the others were moved."""
+    """ControlPoints, a mask of the correct ones, and the displacements of the others."""
     n = len(local)
     position = _to_map(local)
     order = rng.permutation(n)
@@ -386,8 +386,8 @@ def _survey(local, kinds, sizes, rng, blunders=1.0):
     whole = np.ones(n, bool)
     moved = np.zeros(n)
     surveyed = position + rng.normal(0, 0.003, (n, 3))
-    # The two points' names are exchanged, with the appearance that belongs to the name: where
-    # that is the same, nothing of it is left to see, nor does it matter.
+    # The names of the two points are exchanged, with the appearance that belongs to the name: if
+    # both look the same, the exchange is neither visible nor relevant.
     kinds = kinds.copy()
     sizes = sizes.copy()
     for a, b in pairs:
@@ -406,7 +406,7 @@ def _survey(local, kinds, sizes, rng, blunders=1.0):
 
 
 def _observe(number, local, kinds, sizes, hidden, drive, seen, error, rng):
-    """TargetObservations of a pass with look-alikes among them, their truth and POS errors."""
+    """TargetObservations of a pass, look-alikes included, their truth and POS errors."""
     rows = np.flatnonzero(~hidden & (rng.random(len(local)) > 0.03))
     extra = round(0.2 * len(rows))
     near = rng.random(extra) < 0.5

@@ -1,8 +1,8 @@
-"""How fast a correction changes where the recorded path doesn't jump.
+"""Rate of change of a correction at epochs without a jump of the recorded path.
 
     python benchmarks/path_rates.py [FILE of real POS errors (.err)] [--seeds 5] [--worst 10]
 
-Corrected - recorded position may change at once only where the recorded path does. Each drive is
+Corrected - recorded position may change abruptly only where the recorded path does. Each drive is
 estimated at the rate of its recording. Prints for each kind of POS the largest rate of corrected -
 recorded, beyond that of the true error over two seconds between jumps, outside the steps of the
 recorded path and the gaps between passes; the epochs at which it is beyond 0.2 m/s; and the largest
@@ -30,8 +30,7 @@ LIMIT = 0.2  # m/s: 2 mm from one epoch to the next at 100 Hz, less than a scann
 
 
 class Rates(NamedTuple):
-    """Largest rate (m/s), when (s), epochs beyond LIMIT, excess at steps (m, and in sigmas), RMS 3D
-    left (m), share within 1.96 sigma."""
+    """Rate (m/s), its time, epochs beyond LIMIT, excess at steps, error, share in 1.96 sigma."""
 
     largest: float
     at: float
@@ -105,7 +104,7 @@ def rates(trajectory, matched, error, pos):
 def speed(time, error, is_jump):
     """Speed (n - 1,) of the true error over two seconds on one side of jumps, m/s.
 
-    MEMS units drift by half a meter a second at the end of an outage.
+    MEMS units drift by half a meter per second at the end of an outage.
     """
     edges = np.concatenate([[0], np.flatnonzero(is_jump) + 1, [len(time)]])
     side = np.searchsorted(edges, np.arange(len(time) - 1), side="right")

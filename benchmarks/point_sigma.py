@@ -1,9 +1,9 @@
-"""Whether the sigmas of points are honest, and what it costs to write them.
+"""Honesty of the sigmas of points, and the cost of writing them.
 
     python benchmarks/point_sigma.py [--seeds 10]
 
-Corrects the demo's drive with another seed each time, and compares where points were put with
-where the pulses truly hit. Prints for each drive the RMSE of the points and the RMS of error over
+Corrects the demo's drive with another seed each time, and compares the positions of points with the
+true hits of the pulses. Prints for each drive the RMSE of the points and the RMS of error over
 sigma, then the share of points within 1 and 2 sigmas, and the time of a copy with sigmas over that
 of the plain corrected copy.
 """
@@ -20,7 +20,7 @@ import mlscorr
 from mlscorr.io.clouds import CorrectedPart, write_parts
 from mlscorr.simulate import DEMO, simulate
 
-EVERY = 20  # points; neighbours have the same pose and hardly tell more
+EVERY = 20  # points; neighbors have the same pose and hardly tell more
 REPEATS = 3
 
 

@@ -1,4 +1,4 @@
-"""Is the collocation ever worse than interpolation between control points?
+"""Rate of drives on which collocation is worse than interpolation between control points.
 
 python benchmarks/pos_study.py [FILE of real POS errors (.err)] [--seeds 2] [--every 1]
     [--first-seed 0] [--control 3] [--only TEXT]
@@ -6,12 +6,12 @@ python benchmarks/pos_study.py [FILE of real POS errors (.err)] [--seeds 2] [--e
 RMS in 3D of the whole trajectory over many drives: windows of a real error series with and without
 its sigma(t); clones of the paper's car and boat; MEMS and tactical units, filtered and smoothed,
 with their stated sigmas, without any, and with sigmas ten times too small and too large; a POS
-whose GNSS loses its fixed solution now and again; one that drifts for seconds, three to eight
-times in a window, and states 2 cm all along; and a tactical unit without outages that states a
-seventh of its error. Beside it what practitioners use on the same control points: linear and
-monotone interpolation, the former cut at the steps of the path, and a Gaussian process of
-scikit-learn. With --every 4 each fourth control point along the drive takes part, with its passes;
-with --control 6 six of them, spread evenly. A table at the end has a line for each kind of POS.
+whose GNSS loses its fixed solution at times; one that drifts for seconds, three to eight times in a
+window, and states 2 cm throughout; and a tactical unit without outages that states a seventh of its
+error. The peers use the same control points: linear and monotone interpolation, the former cut at
+the steps of the path, and a Gaussian process of scikit-learn. With
+--every 4 each fourth control point along the drive takes part, with its passes; with --control 6
+six of them, spread evenly. A table at the end has a line for each kind of POS.
 """
 
 import argparse
@@ -34,12 +34,12 @@ PEERS = {
     "gp": fit_gaussian_process,
 }
 UNSTATED = Pos(position_sigma=0.5)  # m, a constant that says nothing of the drift
-# m, m, s: fixed, not fixed, and how long its errors last
+# m, m, s: fixed, not fixed, and duration of its errors
 HELD = 0.02
 FLOAT = 0.4
 MEMORY = 60.0
 WORSE = 1.1  # times the best peer: beyond it a survey counts as worse
-# A tactical unit without outages, as a series of precise point positioning has it
+# A tactical unit without outages, like a series of precise point positioning
 UNDERSTATED = 7.0  # true error over stated sigma
 SIZES = (0.1, 1.0)  # m, one sigma of an axis
 DECORRELATED = (40.0, 200.0)  # s, after which correlation is 1 / e
@@ -75,7 +75,7 @@ def surveys(series, seeds):
 
 
 def unfixed(seed):
-    """Recorded trajectory, matched control and error of a drive that GNSS fixes in turns."""
+    """Recorded trajectory, matched control and error of a drive whose GNSS fix comes and goes."""
     rng = np.random.default_rng(seed)
     time = np.arange(0.0, WINDOW, 0.1)
     turns = np.cumsum(rng.uniform(10.0, 60.0, 30))  # s
@@ -88,7 +88,7 @@ def unfixed(seed):
 
 
 def bumped(seed):
-    """Recorded trajectory, matched control and error of a drive whose POS drifts unstated."""
+    """Recorded trajectory, matched control and error of a drive with unstated drift of the POS."""
     rng = np.random.default_rng([seed, 1])
     time = np.arange(0.0, WINDOW, 0.1)
     error = HELD / 2 * rng.normal(size=3) + np.zeros((len(time), 3))
@@ -133,13 +133,13 @@ def drives():
 
 
 def left(correction, error):
-    """RMS in 3D (m) of what a correction leaves of the position error (n, 3)."""
+    """RMS in 3D (m) of the residual position error (n, 3) after a correction."""
     moved = correction.corrected.position - correction.recorded.position
     return float(np.sqrt(np.mean(np.sum((error - moved) ** 2, axis=1))))
 
 
 def row(trajectory, matched, error, pos):
-    """Raw RMS, that of each peer, that of mlscorr, and the share within 1.96 sigma."""
+    """Raw RMS, those of each peer and of mlscorr, and the share within 1.96 sigma."""
     peers = [left(fit(trajectory, matched), error) for fit in PEERS.values()]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -151,7 +151,7 @@ def row(trajectory, matched, error, pos):
 
 
 def some(matched, every, number):
-    """Matched control without some points: each n-th, or a number of them, spread evenly."""
+    """Subset of matched control: every n-th point, or a number of evenly spread ones."""
     names = list(dict.fromkeys(matched.name))
     if number is None:
         kept = names[::every]
@@ -162,14 +162,14 @@ def some(matched, every, number):
 
 
 def kind_of(name):
-    """The kind of POS: windows of one series are one."""
+    """The kind of POS; windows of one series are one kind."""
     if name.startswith("real"):
         return " ".join(word for word in name.split() if not word.isdigit() and word != "s")
     return name
 
 
 def by_kind(found):
-    """Print a line for each kind of POS: geometric means, and how often sigmas are right."""
+    """Print a line for each kind of POS: geometric means, and shares within the sigmas."""
     print(f"{'kind':34s} surveys       linear      mlscorr   ratio   worst   within   least")
     for kind in dict.fromkeys(kind for kind, _ in found):
         table = np.array([row for other, row in found if other == kind])

@@ -1,9 +1,9 @@
-"""Write the tables of README.md and docs anew by the commands that measure them.
+"""Update the tables of README.md and docs by the commands that measure them.
 
     python benchmarks/readme_tables.py [NAME ...] [--check FOLDER]
 
-A table stands between <!-- table: NAME --> and <!-- end of table -->. Without names all are
-measured (an hour or two); one whose data are not at hand stays as it is, with a word on stderr.
+A table is between <!-- table: NAME --> and <!-- end of table -->. By default all are measured (an
+hour or two); one without available data is left unchanged, with a note on stderr.
 """
 
 import argparse
@@ -42,7 +42,7 @@ def markdown(header, rows):
 
 
 def place(text, name, table):
-    """The text with a table put between its marks. Raises ValueError where it has no such mark."""
+    """Put a table between its marks in a text. Raises ValueError if there are no such marks."""
     text, count = re.subn(
         TABLE.format(re.escape(name)), lambda match: match[1] + table + match[2], text, flags=re.S
     )
@@ -52,19 +52,19 @@ def place(text, name, table):
 
 
 def names_in(text):
-    """Names of the tables of a text, in their order."""
+    """Names of the tables of a text, in order."""
     return re.findall(r"<!-- table: (\S+) -->", text)
 
 
 def axes(values, digits=2):
-    """East, north and height in m, or nothing."""
+    """Format east, north and height in m, or nothing."""
     if values is None:
         return ""
     return " / ".join(f"{value:.{digits}f}" for value in values)
 
 
 def scenarios(_):
-    """Each scenario simulated with seed 1 and corrected."""
+    """Simulate each scenario with seed 1 and correct it."""
     from mlscorr import correct, read_survey
     from mlscorr.pipeline import simulate_survey
 
@@ -81,7 +81,7 @@ def scenarios(_):
 
 
 def results(_):
-    """Surveys that lie beside the project, corrected, compared and calibrated; simulated drives."""
+    """Correct, compare and calibrate the surveys next to the project, and simulated drives."""
     from seeds import drive
 
     from mlscorr import calibrate, compare, correct, read_survey

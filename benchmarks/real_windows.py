@@ -13,7 +13,7 @@ from mlscorr.io.trajectories import read_pos_error_series
 from mlscorr.pos import SignalParameters
 from mlscorr.survey import ControlPoints, Matched, Pos, TargetObservations, Trajectory
 
-# s: the windows' length; where a shared survey took its own
+# s: length of the windows; start of that of a shared survey
 WINDOW = 248.0
 USED = 357_881.0
 # s: GNSS was withheld 60 s in every 150 s
@@ -31,7 +31,7 @@ def interval(values, statistic=np.median):
 
 
 def stated_sigma(gps_time):
-    """What such a POS states (n, 3; m): it grows with the square of the time without GNSS."""
+    """Stated sigmas (n, 3; m) of such a POS: quadratic growth with the time without GNSS."""
     lost = (gps_time - FROM) % EVERY
     lost = np.where((gps_time >= FROM) & (lost < LOST), lost, 0.0)
     return np.outer(lost**2, [3.33e-4, 3.33e-4, 1.92e-4]) + np.array([0.015, 0.015, 0.03])
@@ -40,7 +40,7 @@ def stated_sigma(gps_time):
 def cases(path):
     """Name, recorded trajectory, matched control and error (n, 3) of each window of a real series.
 
-    The windows that share more than half with the shared survey's are left out.
+    Windows that overlap the shared survey's by more than half are skipped.
     """
     series = read_pos_error_series(path)
     sigma = stated_sigma(series.gps_time)
@@ -53,7 +53,7 @@ def cases(path):
 
 
 def windows(path):
-    """Print what is left of real drift, with its sigma(t) stated and with none."""
+    """Print residual errors on real drift, with its sigma(t) stated and without."""
     for title, hidden in (("sigma(t) stated", False), ("no sigma stated", True)):
         rows = []
         within = []
@@ -102,7 +102,7 @@ def _print_windows(title, rows, shares):
 
 
 def window(gps_time, error, sigma, seed):
-    """A drive of 10 m/s with a POS error (true - recorded) and 16 even targets beside it."""
+    """A drive of 10 m/s with a POS error (true - recorded) and 16 evenly spaced targets."""
     rng = np.random.default_rng(seed)
     n = 16
     zero = np.zeros(len(gps_time))

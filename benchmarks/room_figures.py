@@ -1,8 +1,8 @@
 """Figures of merit of each room on small simulated surveys, for ablation.py.
 
-Each function takes seeds and returns figures by name, the same ones for the same seeds. Where the
-truth is known they are errors against it; of documents they are the count and the RMS of the
-numbers below each key. No real data take part.
+Each function takes seeds and returns figures by name, the same ones for the same seeds. They are
+errors if the truth is known; for documents they are the count and the RMS of the numbers below each
+key. No real data are used.
 """
 
 import math
@@ -61,7 +61,7 @@ def written(scenario, seed):
 
 
 def numbers_in(document):
-    """All finite numbers in a document, flags left out."""
+    """All finite numbers in a document, except flags."""
     if isinstance(document, np.ndarray):
         document = document.tolist()
     if isinstance(document, dict):
@@ -96,7 +96,7 @@ def matching(seeds):
 
 
 def targets(seeds):
-    """Recall, centre errors and false targets."""
+    """Recall, center errors and false targets."""
     return target_study.figures(seeds)
 
 
@@ -146,7 +146,7 @@ def corrections(seeds):
 
 
 def estimate(seeds):
-    """The same with ties as well, and of a mounting."""
+    """Errors and honesty of corrections with ties as well, and of a mounting."""
     figures = corrections(seeds)
     for survey, ties in tied_drives(seeds):
         found = with_ties(estimate_correction(survey.recorded, survey.matched), ties)
@@ -163,7 +163,7 @@ def pos(seeds):
 
 
 def ties(seeds):
-    """Features and ties of a street there and back, and how well they agree with the truth."""
+    """Features and ties of a street there and back, and their agreement with the truth."""
     figures = {}
     for seed in seeds:
         survey = mlscorr.read_survey(written(THERE_AND_BACK, seed))
@@ -185,7 +185,7 @@ def ties(seeds):
 
 
 def io(seeds):
-    """The check of a survey, and how it is read."""
+    """Figures of the check of a survey, and of its reading."""
     figures = {}
     for seed in seeds:
         folder = written(SHORT, seed)
@@ -199,7 +199,7 @@ def io(seeds):
 
 
 def effects(seeds):
-    """What an error by incidence does to the ranges of a survey."""
+    """Effect of an error by incidence on the ranges of a survey."""
     effect = {"name": "incidence_bias", "magnitude": 0.005}
     biased = Scenario(**{**SHORT.model_dump(), "effects": [effect]})
     figures = {}
@@ -248,7 +248,7 @@ def baselines(seeds):
 
 
 def evaluate(seeds):
-    """The accuracy that a report states, and the terms of a datum difference."""
+    """The accuracy stated by a report, and the terms of a datum difference."""
     figures = {}
     for seed in seeds:
         figures |= summary(corrected(seed).accuracy, f"{seed} ")
@@ -298,7 +298,7 @@ def report(seeds):
 
 
 def diagnosed(seeds):
-    """The document of a diagnosis of a street with a clock that is off."""
+    """The document of a diagnosis of a street with a clock error."""
     figures = {}
     for seed in seeds:
         document = mlscorr.diagnose(mlscorr.read_survey(written(LONG, seed))).document
@@ -332,7 +332,7 @@ def diagnosis_page(seeds):
 
 
 def plan(seeds):
-    """The document of what a survey will see."""
+    """The document of a plan of a survey."""
     figures = {}
     for seed in seeds:
         document = mlscorr.plan(mlscorr.read_survey(written(LONG, seed))).document

@@ -1,11 +1,12 @@
-"""Two scanners of a vehicle calibrated together against each alone: clouds in, mountings out.
+"""Calibration of two scanners of a vehicle together compared with each alone, from clouds.
 
 python benchmarks/scanners_study.py [--seeds 12] [--first 1] [--control 8]
 
-RMS errors (mm, mdeg) of both mountings and of the second beside the first, the median of their
-sigmas, and the share within two; how far apart both put a wall that both saw on one pass, by these
-errors and as ``fit_sigma`` states it; processor time of both. The scanners look to the left and to
-the right alike, and what their recorded mountings lack is drawn evenly up to 3 cm and 0.5 deg.
+RMS errors (mm, mdeg) of both mountings and of the second relative to the first, the median of their
+sigmas, and the share within two; distance between both images of a wall seen on one pass, by these
+errors and as stated by ``fit_sigma``; processor time of both. The scanners face left and right
+symmetrically, and the errors of their recorded mountings are drawn uniformly up to 3 cm and 0.5
+deg.
 """
 
 import argparse
@@ -31,7 +32,7 @@ RADIUS = 1.5  # m of the search for targets, for speed
 
 
 def write(folder, seed, control):
-    """A survey folder of two scanners, and what both mountings lack (2, 6)."""
+    """Write a survey folder of two scanners, and return the errors of both mountings (2, 6)."""
     scenario = Scenario(
         drive={"duration": DURATION, "speed": SPEED, "passes": [{}, {"direction": "back"}]},
         targets={"control": control, "check": 2, "hidden": 0.0},
@@ -51,7 +52,7 @@ def write(folder, seed, control):
 
 
 def walls(calibration):
-    """Mean square (12, 12) of what errors of both do to walls that both saw on one pass."""
+    """Mean square (12, 12) of the effect of both errors on walls that both saw on one pass."""
     ties = calibration.ties.ties[calibration.ties.used]
     segment = calibration.trajectory.segment(ties.gps_time.ravel()).reshape(-1, 2)
     is_both = (np.diff(ties.scanner, axis=1) != 0).ravel() & (segment[:, 0] == segment[:, 1])

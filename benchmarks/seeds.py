@@ -1,10 +1,10 @@
-"""How good a correction is over many simulated drives, against their truth.
+"""Accuracy of corrections over many simulated drives, against their truth.
 
     python benchmarks/seeds.py [--seeds 20]
 
-Each drive is the demo's with another seed: another street, drive, drift, scan and survey. The
-drift is made by its causes, not by the estimator's covariance. Prints one line a drive, then the
-median and the worst, and how often the truth lies within the stated sigmas.
+Each drive is the demo's with another seed: another street, drive, drift, scan and survey. The drift
+comes from its physical causes, not from the estimator's covariance. Prints one line per drive, then
+the median and the worst, and the share of the truth within the stated sigmas.
 """
 
 import argparse

@@ -1,7 +1,7 @@
-"""A small line scanner that looks at one target among clutter, for tests and studies.
+"""A small line scanner that scans one target among clutter, for tests and studies.
 
-It shares nothing with the package: each pulse is seven rays across its footprint, what they hit
-makes its echo, and range, angle and intensity are noisy.
+It shares nothing with the package: each pulse is seven rays across its footprint, their hits form
+its echo, and range, angle and intensity are noisy.
 """
 
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ WHITE = 0.9
 
 @dataclass(frozen=True)
 class Surface:
-    "A flat piece: centre (3,), axes u, v (2, 3), and reflectance of (u, v), NaN where nothing is"
+    "A flat piece: center (3,), axes u, v (2, 3), and reflectance of (u, v), NaN outside of it"
 
     centre: np.ndarray
     axes: np.ndarray
@@ -37,7 +37,7 @@ class Surface:
 
 @dataclass(frozen=True)
 class View:
-    "One piece of cloud, the way of the scanner, and the truth"
+    "One piece of cloud, the path of the scanner, and the truth"
 
     cloud: PointCloud
     path: ScannerPath
@@ -88,7 +88,7 @@ TARGETS = {  # look -> kind and surfaces' paints from the front
 
 
 def view(look, size, rng, incidence=70.0, hidden=0.4, clutter=True, away=(3.0, 20.0), step=None):
-    "A View of a target 3-20 m off, up to an incidence (deg) and a share hidden"
+    "A View of a target 3-20 m off, up to an incidence (deg) and an occluded share"
     distance = rng.uniform(*away)
     if look == "painted disc":
         low = -0.05
@@ -187,7 +187,7 @@ def _beam(angle, yaw):
 
 
 def _cast(surfaces, start, beam):
-    "Range, reflectance times cosine, and number of the surface hit first, by rays"
+    "Range, reflectance times cosine, and index of the surface that each ray hits first"
     nearest = np.full(len(beam), np.inf)
     value = np.zeros(len(beam))
     number = np.full(len(beam), 99)

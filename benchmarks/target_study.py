@@ -1,4 +1,4 @@
-"""Centre errors, recall and honesty of covariances of simulated targets, by kind and points.
+"""Center errors, recall and honesty of covariances of simulated targets, by kind and points.
 
 python benchmarks/target_study.py [views per row [looks, with commas [first seed]]]
 """
@@ -28,7 +28,7 @@ WITHIN_95 = 7.815  # chi-squared of 3 axes
 
 
 def look_at(look, size, condition, seed, known=True):
-    """(points on the target, error (3,), normalised square, false targets, score)."""
+    """Points on the target, error (3,), normalized square, false targets and score of a view."""
     rng = np.random.default_rng([seed, len(look), int(1000 * size)])
     seen = view(look, size, rng, *CONDITIONS[condition])
     shape = TARGETS[look][0], size if known else None
@@ -86,7 +86,7 @@ def street():
 
 
 def street_figures(label, survey, searched):
-    """How many of a street's targets are found, and how many other objects."""
+    """Number of a street's targets that are found, and of other objects."""
     rows = mlscorr.extract(searched).targets
     place = np.array([row["observed"] for row in rows]).reshape(-1, 3)
     near = np.linalg.norm(place[None] - survey.surveyed.position[:, None], axis=2) < 0.3  # m
@@ -99,7 +99,7 @@ def street_figures(label, survey, searched):
 
 
 def row(label, results):
-    """One line of the table, of results that have enough points to be asked for."""
+    """One line of the table, of results with enough points on the target."""
     results = [result for result in results if result[0] >= COUNTS[0]]
     found = [result for result in results if result[1] is not None]
     if not found:

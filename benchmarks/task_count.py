@@ -1,9 +1,9 @@
-"""What a task of a cluster takes by itself.
+"""Overhead of a task of a cluster.
 
     python benchmarks/task_count.py tcp://HOST:8786 1500
 
-Calls that do nothing are handed out as a run hands out its tasks, twice as many as there are
-workers at a time.
+Empty calls are submitted like the tasks of a run, at most twice as many at a time as there are
+workers.
 """
 
 import argparse
@@ -15,7 +15,7 @@ from mlscorr.pipeline.project.settings import SETTINGS
 
 
 def seconds_each(scheduler: str, number: int) -> float:
-    """Time of one call, of as many as are handed out."""
+    """Time of one call, on average over this number of calls."""
     with engine(scheduler=scheduler, tell=print) as cluster:
         start = time.perf_counter()
         running = set()

@@ -1,11 +1,11 @@
-"""What ties add on the real drift of a POS, on a road there and back.
+"""Gain from ties on the real drift of a POS, on a road there and back.
 
     python benchmarks/tied_windows.py [--control 0 3 6 12]
 
 Two windows of the real error series, one after the other, are the errors of a drive there and of
 the drive back; GNSS was withheld in each, at other places of the road. Control points are seen in
 both passes. RMS in 3D of the whole trajectory by control alone (0: as recorded) and with ties, and
-the shares within 2 sigma. The window of the shared survey of the same series is left out. Reads the
+the shares within 2 sigma. The window of the shared survey of the same series is skipped. Reads the
 series below MLSCORR_SHARED, else ../shared.
 """
 

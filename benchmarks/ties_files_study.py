@@ -1,18 +1,18 @@
-"""What ties between passes add through files: clouds there and back, targets and ties found.
+"""Gain from ties between passes through files: clouds there and back, targets and ties found.
 
 python benchmarks/ties_files_study.py [--seeds 4] [--control 0 3 6 12] [--scanners 2] [--elsewhere]
     [--spinning] [--passes 1] [--road [--without-paint]]
 
-RMS in 3D of the whole trajectory by control alone and with ties, the shares within 2 sigma, and how
-far apart the trajectories of both passes are left in a place, with the share of that within 2 sigma
-of their difference. Without control the latter two are claimed, and of what both passes share that
-it is as large as the POS's sigmas and the ties make it: a survey shows few independent values of
-it, so that its share within 2 sigma tells something over many surveys alone. Drives are the
-simulator's canyon by a MEMS unit that has GNSS for 5 s at both ends of each pass of 150 s alone:
-its smoothed drift is 0.6 to 1 m. With --elsewhere each pass loses it once, for 70 to 120 s from a
-random moment. A second scanner is turned to the other side. With --spinning it has 16 rings and an
-axis that leans back by 30 deg, so that a pass sees a thing for seconds. With --road it sees the
-road alone, which has a dashed middle line and lines along the kerbs.
+RMS in 3D of the whole trajectory by control alone and with ties, the shares within 2 sigma, and the
+difference that remains between both passes at one place, with its share within 2 sigma. Without
+control the latter two are claimed, and of the error common to both passes only that it is as large
+as the POS's sigmas and the ties imply: a survey has few independent values of it, so that its share
+within 2 sigma is meaningful only over many surveys. Drives are the simulator's canyon by a MEMS
+unit that has GNSS for 5 s at both ends of each pass of 150 s alone: its smoothed drift is 0.6 to 1
+m. With --elsewhere each pass loses it once, for 70 to 120 s from a random moment. A second scanner
+is turned to the other side. With --spinning it has 16 rings and an axis that leans back by 30 deg,
+so that a pass sees a thing for seconds. With --road it sees the road alone, which has a dashed
+middle line and lines along the curbs.
 """
 
 import argparse
@@ -51,7 +51,7 @@ PROBE = 1.0  # m, one sigma of the rows that ask for that sigma: they hold nothi
 
 
 def scenario(scanners=1, duration=DURATION, rng=None, road=False, spinning=False, passes=2):
-    """The canyon as a MEMS unit records it, with GNSS at the ends of the passes alone.
+    """The canyon as recorded by a MEMS unit, with GNSS only at the ends of the passes.
 
     With a generator of random numbers, without it once in each pass; or its painted road alone.
     """
@@ -90,7 +90,7 @@ def scenario(scanners=1, duration=DURATION, rng=None, road=False, spinning=False
 
 
 def read(survey):
-    """The control points that are found in the clouds, and planes and poles; read once."""
+    """Control points found in the clouds, and planes and poles, each read once."""
     collector = FeatureCollector(survey)
 
     def chunks(file):
@@ -103,7 +103,7 @@ def read(survey):
 
 
 def some_control(matched, number):
-    """Observations of control points evenly taken along the street."""
+    """Observations of evenly chosen control points along the street."""
     names, rows = np.unique(matched.name, return_index=True)
     place = matched.surveyed.position[rows]
     along = np.linalg.svd(place - place.mean(axis=0))[2][0]  # their longest direction
@@ -113,7 +113,7 @@ def some_control(matched, number):
 
 
 def measure(true, estimate):
-    """RMS (m) of what is left and its share within 2 sigma, and both of a pass from the other."""
+    """RMS (m) of the residual error and its share within 2 sigma, and both between the passes."""
     corrected = estimate.correction.corrected
     left = true.at(corrected.gps_time).position - corrected.position
     within = np.mean(np.abs(left) < 2 * corrected.position_sigma)
@@ -129,7 +129,7 @@ def measure(true, estimate):
 
 
 def _meetings(true, gps_time):
-    """Epochs of the first pass, and those of the second in the same places."""
+    """Epochs of the first pass, and those of the second at the same places."""
     (first, last), (begin, end) = true.passes[:2]
     place = true.at(gps_time).position
     there, back = (
@@ -144,7 +144,7 @@ def _meetings(true, gps_time):
 def _sigma_apart(estimate, there, back):
     """Sigma (k, 3) of the difference of the errors at two epochs of the trajectory. Units: m.
 
-    By the most probable parameters, as that of ties which nobody saw.
+    By the most probable parameters, like that of unobserved ties.
     """
     adjustment = estimate.adjustment
     trajectory = adjustment.trajectory

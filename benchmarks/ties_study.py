@@ -1,11 +1,11 @@
-"""What ties between passes add to control points, on simulated drives there and back.
+"""Gain from ties between passes over control points alone, on simulated drives there and back.
 
 python benchmarks/ties_study.py [--seeds 6] [--control 3 6 12] [--streets canyon] [--preview]
 
 RMS in 3D of the whole trajectory by control alone and with ties, and the shares within 2 sigma.
 Drives, drift and sigmas are the simulator's canyon; ties are facades, road and cross walls at
-random places beside the way, as both passes saw them, with 10 mm of noise, a share of them wrong.
-Other streets have kerbs and eaves too, or road, poles, kerbs and markings alone; all by --streets
+random places along the street, observed in both passes with 10 mm of noise, a share of them wrong.
+Other streets have curbs and eaves too, or road, poles, curbs and markings alone; all by --streets
 without a name. With --preview parameters are those of control alone, in a tenth of the time.
 """
 
@@ -24,8 +24,9 @@ NOISE = 0.010  # m, one sigma of a tie: what is left of a street that changes a 
 FARTHEST = 30.0  # m from the vehicle
 WRONG_SIZE = (0.1, 1.0)  # m, of cars that moved, and facades shifted by one window
 OUTAGES = ((20.0, 40.0), (225.0, 40.0))  # s
-# Number of ties of a drive of 90 s there, by what they are of: what stays of a second, poles and
-# trees every 12 m, ends of dashes every 12 m. A pole or an end of a dash is known to 2 NOISE.
+# Number of ties of a drive of 90 s there, by kind: the share that a second surface retains, poles
+# and trees every 12 m, ends of dashes every 12 m. A pole or an end of a dash has a sigma of 2
+# NOISE.
 CANYON = {"facade": 600, "road": 300, "cross wall": 100}
 ROAD = {"road": 300}
 STREETS = {
@@ -42,7 +43,7 @@ STREETS = {
     "tunnel": {"facade": 600, "road": 300},
     "tunnel with markings": {"facade": 600, "road": 300, "line": 500, "dash": 45},
 }
-# Along which a tie of it holds: right, forward or up.
+# Axis along which such a tie constrains: right, forward or up.
 AXES = {
     "facade": "r",
     "road": "u",
@@ -113,7 +114,7 @@ def feature_ties(survey, seed, street=CANYON, wrong=0.05):
 
 
 def some_control(survey, number):
-    """The survey with control points evenly taken along the way."""
+    """The survey with evenly chosen control points along the street."""
     names = list(survey.control.name)
     kept = np.unique(np.linspace(0, len(names) - 1, number).round().astype(int))
     return survey.keep([names[i] for i in kept])
@@ -126,7 +127,7 @@ def by_control(survey):
 
 
 def measure(survey, correction):
-    """RMS in 3D (m) of what is left of the whole trajectory, and the share within 2 sigma."""
+    """RMS in 3D (m) of the residual error of the whole trajectory, and the share within 2 sigma."""
     left = survey.position_left(correction)
     within = np.mean(np.abs(left) < 2 * correction.corrected.position_sigma)
     return float(np.sqrt(np.mean(np.sum(left**2, axis=1)))), float(within)

@@ -1,8 +1,8 @@
-"""Learn how evidence becomes probability: decision.json of the inference.
+"""Train the mapping from evidence to probability: decision.json of the inference.
 
     OMP_NUM_THREADS=1 python benchmarks/train_decision.py FOLDER --first 1000 --worlds 40 --cases 24
 
-What is weighed in each world is kept in FOLDER, so that a second run fits within seconds.
+The evidence of each world is kept in FOLDER, so that a second run fits within seconds.
 """
 
 import json
@@ -17,7 +17,7 @@ import mlscorr.gap.evidence
 
 
 def main() -> None:
-    """Collect, fit, write, and print figures of worlds that the fit had not seen."""
+    """Collect records, fit, write, and print figures of worlds outside the training set."""
     parser = study_arguments(__doc__, 1000, 40)
     parser.add_argument("--mechanisms", type=Path, help="Further mechanisms, beside the grammar's.")
     parser.add_argument("--write", action="store_true", help="Into the package: decision.json.")

@@ -1,12 +1,12 @@
-"""Whether the stretch that a diagnosis points at is the one in which an effect acts.
+"""Agreement of the interval that a diagnosis names with the one in which an effect acts.
 
     OMP_NUM_THREADS=1 python benchmarks/where_study.py [--seeds 6] [--seed 9000] [--size 4]
 
-Made-up surveys of features in which something acts in one stretch of time, way,
-range, incidence or scan angle alone: events of the library, a POS that is worse for a while, and
-mechanisms that no library knows. Of each the stretch that is told of that covariate is compared
-with the true one, in which it is half as large as at its largest or larger: intersection over
-union, zero where nothing is told.
+Synthetic surveys of features in which something acts in one interval of time, distance, range,
+incidence or scan angle alone: events of the library, a POS that is worse for a while, and
+mechanisms that no library knows. For each the interval reported for that covariate is compared with
+the true one, in which the effect is at least half of its maximum: intersection over union, zero if
+none is reported.
 """
 
 import argparse
@@ -35,7 +35,7 @@ EVENTS = ("position_bump", "position_step", "worse POS for a while")
 
 
 def confined(bed, name, rng, m):
-    """Shift (m,) of rows, covariate and its true stretch."""
+    """Shift (m,) of rows, covariate and its true interval."""
     g = bed.g
     if name in ("position_bump", "position_step"):
         shift, _, fixed = sized(g, bed.signs, name, m, rng, bed.size)
@@ -68,7 +68,7 @@ def confined(bed, name, rng, m):
 
 
 def overlap(extent, truth):
-    """Intersection over union of two stretches."""
+    """Intersection over union of two intervals."""
     if extent is None:
         return 0.0
     shares = []
@@ -106,7 +106,7 @@ def case(bed, rng, kind, name, m):
 
 
 def run(seeds, seed, m, beds=2):
-    """Yields names and their results."""
+    """Yield names and their results."""
     ground = [Bed.of(seed + 2 * i) for i in range(beds)]
     for number, name in enumerate((*EVENTS, *BANDS)):
         results = []

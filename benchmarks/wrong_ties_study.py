@@ -1,8 +1,8 @@
-"""Whether ties that are wrong spoil a correction, through files: a street that changed meanwhile.
+"""Effect of wrong ties on a correction, through files: a street that changed between passes.
 
     python benchmarks/wrong_ties_study.py [--seeds 3] [--first 0] [--control 4] [--cases NAME ...]
 
-A street is scanned there and back as it is (``clean``), and again so that passes met other things:
+A street is scanned there and back as it is (``clean``), and again with changes between the passes:
 ``fifth`` (half of the stretches of facades 0.1 to 1 m aside or shifted by a window, cars gone
 elsewhere), ``window`` (three whole stretches of facades shifted by a window), ``lorry`` (three hid
 the facades in the first pass), ``rebuilt`` (other houses, cars, trees and lamps along the same
@@ -40,7 +40,7 @@ PARALLEL = np.array([25.0, 0.0, 0.4])  # m to the right, forward, up
 
 @dataclass(frozen=True)
 class ChangedSurvey(SimulatedSurvey):
-    """A SimulatedSurvey whose passes have met other things.
+    """A SimulatedSurvey with a street that changed between the passes.
 
     ``move`` is a function of pass (0, 1), points (n, 3) about the origin, where they truly were,
     and the scanner's places, which returns by how much they are moved (n, 3); ``later`` the mesh
@@ -71,7 +71,7 @@ class ChangedSurvey(SimulatedSurvey):
 
 
 class Street:
-    """Where points are along a simulated street, and what hides or shifts there."""
+    """Coordinates of points along a simulated street, and its occlusions and shifts."""
 
     def __init__(self, survey, rng):
         self.line = survey.scene.centre_line
@@ -98,12 +98,12 @@ class Street:
         return s + along, np.einsum("ni,ni->n", way, right), way[:, 2], forward, right
 
     def free(self, points):
-        """Which points (n,) lie far from all targets."""
+        """Mask of points (n,) far from all targets."""
         away = np.linalg.norm(points[:, None] - self.targets, axis=2)
         return away.min(axis=1) > NEAR_TARGET
 
     def fifth(self, number, points, scanner):
-        """Stretches of facades aside or shifted by a window, cars elsewhere, in the second pass."""
+        """Shift parts of facades aside or along by a window, and move cars, in the second pass."""
         s, lateral, height, forward, right = self.local(points)
         block = np.floor(s / STRETCH).astype(int) * 2 + (lateral > 0) + 500
         is_front = (np.abs(lateral) > self.front - 0.3) & (height > 0.5) & self.stretches[block]
@@ -118,14 +118,14 @@ class Street:
         )
 
     def window(self, number, points, scanner):
-        """Three stretches of 30 m of facades shifted along by a window, in the second pass."""
+        """Shift three 30 m pieces of facades along by a window in the second pass."""
         s, lateral, height, forward, _ = self.local(points)
         here = (np.abs(s[:, None] - self.places) < 15.0).any(axis=1)
         here &= (np.abs(lateral) > self.front - 0.3) & (height > 0.5) & self.free(points)
         return np.where((here & (number == 1))[:, None], WINDOW * forward, 0.0)
 
     def lorry(self, number, points, scanner):
-        """Lorries on the right in the first pass, which the beams meet before facades."""
+        """Put trucks on the right in the first pass, which the beams meet before facades."""
         length, beside, height = LORRY
         s, lateral, up, _, _ = self.local(points)
         from_s, from_lateral, from_up, _, _ = self.local(scanner)
@@ -138,7 +138,7 @@ class Street:
 
 
 def changed(survey, case, seed):
-    """A SimulatedSurvey whose second pass met what a case says."""
+    """A SimulatedSurvey whose second pass differs according to the case."""
     if case == "clean":
         return survey
     rng = np.random.default_rng([seed, 3])
@@ -168,7 +168,7 @@ def changed(survey, case, seed):
 
 
 def with_control(survey, number):
-    """The survey with control points evenly taken along the street; the others are forgotten."""
+    """The survey with evenly chosen control points along the street, without the others."""
     centred = survey.control.position - survey.control.position.mean(axis=0)
     along = np.linalg.svd(centred)[2][0]  # their longest direction
     order = np.argsort(centred @ along)
@@ -177,7 +177,7 @@ def with_control(survey, number):
 
 
 def measure(survey, true, ties):
-    """RMS (m) of what is left of the trajectory, and the estimate."""
+    """RMS (m) of the residual error of the trajectory, and the estimate."""
     with warnings.catch_warnings(action="ignore"):
         result = mlscorr.correct(survey, ties=ties)
     left = true.at(result.trajectory.gps_time).position - result.trajectory.position
@@ -185,7 +185,7 @@ def measure(survey, true, ties):
 
 
 def missing(survey, true, place, times):
-    """True - recorded place (n, 3) of what was recorded at places and times. Units: m."""
+    """True - recorded place (n, 3) of points recorded at places and times. Units: m."""
     seen = to_scanner(survey.trajectory, survey.mounting, place, times)
     return georeference(true, survey.mounting, seen, times) - place
 
@@ -203,7 +203,7 @@ def wrong_share(survey, true):
 
 
 def truly_left(survey, true, ties):
-    """What the true path leaves of ties (n,), and that over their sigmas."""
+    """Residuals of ties (n,) on the true path, and those over their sigmas."""
     change = [missing(survey, true, ties.place[:, v], ties.gps_time[:, v]) for v in range(2)]
     moved = np.einsum("ni,ni->n", ties.direction, change[0] - change[1])
     left = np.abs(ties.misclosure - moved)

@@ -2,8 +2,8 @@
 Match targets and look at the misclosures
 =========================================
 
-Targets found near surveyed points get their names: all matches are decided together, as
-misclosures (surveyed - observed) change smoothly along the drive. Look at them before you correct.
+Targets found near surveyed points get their names: all matches are decided together, as misclosures
+(surveyed - observed) change smoothly along the drive. Inspect them before you correct.
 """
 
 from small_surveys import output_folder, street
@@ -27,6 +27,6 @@ matches
 matches.to_frame()[["name", "role", "misclosure_easting", "misclosure_northing"]]
 
 # %%
-# Misclosures over time: the drift of the POS shows in them.
+# Misclosures over time, in which the drift of the POS shows.
 
 matches.plot().savefig(out / "misclosures.png", dpi=110)

@@ -2,8 +2,8 @@
 Correct a survey
 ================
 
-``correct`` runs all stages: it finds and matches the targets, estimates the POS error over time
-and gives a result that writes the corrected clouds. Check points take no part in the estimate.
+``correct`` runs all stages: it finds and matches the targets, estimates the POS error over time and
+gives a result that writes the corrected clouds. Check points are not used in the estimate.
 """
 
 from small_surveys import output_folder, street

@@ -2,8 +2,8 @@
 Run the stages by hand
 ======================
 
-Each stage takes and gives a value that you can look at, filter or replace. Here targets with a
-low score are left out before they are matched, and the cloud is corrected with laspy.
+Each stage takes and returns a value that you can inspect, filter or replace. Here targets with a
+low score are removed before matching, and the cloud is corrected with laspy.
 """
 
 import laspy

@@ -2,8 +2,8 @@
 Correct an Open3D cloud, and look
 =================================
 
-A cloud becomes an ``open3d.t.geometry.PointCloud`` about an origin that travels with it, so that
-float32 loses nothing. The correction takes and gives such clouds. Pictures need no display.
+A cloud becomes an ``open3d.t.geometry.PointCloud`` with its own origin, so that float32 loses no
+precision. The correction takes and returns such clouds. Pictures need no display.
 """
 
 import matplotlib.pyplot as plt

@@ -3,7 +3,8 @@ Compare collocation with ICP and affine
 =======================================
 
 ``compare`` corrects one survey by every method and scores them at the same check points. A rigid
-motion, ICP or an affine transformation moves the cloud as one: none can follow a drift over time.
+motion, ICP or an affine transformation moves the cloud as a whole: none can follow a drift over
+time.
 """
 
 from small_surveys import output_folder, street

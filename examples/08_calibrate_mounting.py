@@ -2,9 +2,9 @@
 Calibrate lever arm and boresight
 =================================
 
-A wrong mounting moves points otherwise than a drift of the POS: with the vehicle, not with time.
-Two passes in opposite directions tell both apart. Here 3 cm of lever arm and 0.2 deg of boresight
-are wrong.
+Unlike a drift of the POS, a wrong mounting moves points with the vehicle, not with time. Two passes
+in opposite directions separate the two. Here the lever arm is wrong by 3 cm and the boresight by
+0.2 deg.
 """
 
 import matplotlib.pyplot as plt
@@ -18,7 +18,7 @@ result = mlscorr.calibrate(survey)
 result
 
 # %%
-# What the recorded mounting lacks, with 2 sigma, against the truth that was simulated.
+# Corrections of the recorded mounting, with 2 sigma, against the simulated truth.
 
 figure, panels = plt.subplots(1, 2, figsize=(9, 3.4), layout="constrained")
 table = result.to_frame()

@@ -2,8 +2,8 @@
 Tie two passes
 ==============
 
-Planes, poles and paint that two passes both saw tie the passes together, without control. Ties go
-into the estimate together with the control points.
+Planes, poles and paint observed in two passes tie the passes together without control. Ties enter
+the estimate together with the control points.
 """
 
 import matplotlib.pyplot as plt

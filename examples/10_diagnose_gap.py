@@ -2,7 +2,7 @@
 Diagnose why a survey differs from its simulation
 =================================================
 
-``diagnose`` weighs every error that is known against what the targets show, and names the cause
+``diagnose`` tests every known error against the observations of the targets, and names the cause
 with a probability. In this survey the clock of the scanner is 20 ms off.
 """
 
@@ -16,12 +16,12 @@ gap = mlscorr.diagnose(survey)
 gap
 
 # %%
-# Size of the cause, with its sigma and the smallest size that would show.
+# Size of the cause, with its sigma and the smallest detectable size.
 
 gap.to_frame().head(3)
 
 # %%
-# The effect goes into the simulator: simulator.toml has it.
+# The effect is added to the simulator, as simulator.toml shows.
 
 gap.write(out / "gap", overwrite=True)
 simulator = mlscorr.read_simulator(out / "gap" / "simulator.toml")

@@ -20,7 +20,7 @@ pos = "[pos]\nposition_sigma = 0.03"  # m
 (out / "project.toml").write_text("\n".join(['name = "old town"', control, pos, *blocks]))
 
 # %%
-# ``--workers 1`` takes one process; a workstation takes one for each core.
+# ``--workers 1`` uses one process; on a workstation take one for each core.
 command = [sys.executable, "-m", "mlscorr", "correct", out / "project.toml"]
 command += ["-o", out / "corrected", "--workers", "1", "--overwrite", "--no-report"]
 subprocess.run(command, check=True, capture_output=True)

@@ -1,14 +1,14 @@
 """Correct mobile laser scans with surveyed targets by least squares collocation.
 
-Commands take a Survey and return a result with ``write``; the stages of ``correct`` stand beside
-it: read_cloud, find_targets, match_targets, find_ties, estimate_pos_error, score.
+Commands take a Survey and return a result with a ``write`` method. The stages of ``correct`` are
+public, too: read_cloud, find_targets, match_targets, find_ties, estimate_pos_error, score.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:  # what editors and type checkers see of the names that are loaded when used
-    # as they are called, by which a type checker knows them for public
+if TYPE_CHECKING:  # for editors and type checkers; at run time these names are loaded when used
+    # imported under their own names, which makes them public for a type checker
     from mlscorr import simulate as simulate
     from mlscorr.correction import Correction as Correction
     from mlscorr.io.clouds import read_cloud as read_cloud
@@ -80,7 +80,7 @@ __all__ = [*_HOME_OF, "simulate"]
 
 
 def __getattr__(name: str) -> Any:
-    """Load what is asked for, and the libraries it needs, only then."""
+    """Load a requested name, and the libraries it needs, on first use."""
     if name == "simulate":  # the package: mlscorr.simulate.simulate(scenario, rng)
         return import_module("mlscorr.simulate")
     if name == "__version__":

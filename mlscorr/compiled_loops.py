@@ -1,4 +1,4 @@
-"""How loops are compiled, and where they are kept, so that each is compiled once on a machine."""
+"""Compilation and storage of loops, so that each is compiled once on a machine."""
 
 import os
 import tempfile
@@ -10,22 +10,22 @@ from shutil import rmtree
 from typing import Any
 
 PACKAGE = Path(__file__).parent
-VERSIONS = 4  # of compiled loops that stay, of some 10 MB each: branches, environments
+VERSIONS = 4  # stored sets of compiled loops, about 10 MB each: branches, environments
 
-# numba compiles its own functions (np.empty, max ...) anew for each set of options, so all loops
-# share one. Division by zero gives infinity, as in NumPy: each check of it is code, and so is its
-# message. Nobody calls a loop from C.
+# numba compiles its own functions (np.empty, max ...) for each set of options, so all loops share
+# one set. Division by zero gives infinity, as in NumPy, because each check and its message add
+# code. No loop is called from C.
 OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 
 def loop(function: Callable | None = None, **options: Any) -> Any:
-    """Compile a function of loops over arrays when it is first called: a decorator.
+    """Compile a function of loops over arrays when it is first called (decorator).
 
     Parameters
     ----------
     function : function
     **options
-        Of numba.njit, over those that all loops share.
+        Options of numba.njit that override the shared ones.
     """
     if function is None:
         return partial(loop, **options)
@@ -34,10 +34,10 @@ def loop(function: Callable | None = None, **options: Any) -> Any:
 
 @cache
 def _njit():
-    """The decorator of numba, which is imported only now and keeps this package's loops by _key.
+    """Import numba and return its decorator, with this package's loops stored by _key.
 
-    By itself it keeps them by the place of their module, so that a second environment compiles
-    all again, and loads by the names of modules that may have moved.
+    By default numba stores them by the path of their module, so that a second environment compiles
+    all again and may load modules that have moved.
     """
     from numba import njit
     from numba.core import caching
@@ -50,7 +50,7 @@ def _njit():
         @classmethod
         def from_function(cls, function, file):
             if not Path(file).is_relative_to(PACKAGE):
-                return None  # numba goes on to its own places
+                return None  # numba continues with its own locations
             part = Path(file).relative_to(PACKAGE).parent
             return cls(_folder() / part, function.__code__.co_firstlineno)
 
@@ -66,7 +66,7 @@ def _njit():
         def get_disambiguator(self):
             return str(self._line)
 
-    # the list that all kinds share; numba offers no other way for the loops of one package
+    # the list shared by all caches; numba has no setting for the loops of one package
     caching.CompileResultCacheImpl._locator_classes.insert(0, Locator)  # noqa: SLF001
     return njit
 
@@ -86,7 +86,7 @@ def _key() -> str:
 
 @cache
 def _folder() -> Path:
-    """Folder of the compiled loops of this version, of which the oldest others are removed."""
+    """Folder of the compiled loops of this version; the oldest others are removed."""
     from numba.misc.appdirs import AppDirs
 
     named = os.environ.get("NUMBA_CACHE_DIR")
@@ -105,11 +105,11 @@ def _folder() -> Path:
 
 
 def writable_folder(*places: Path) -> Path:
-    """First of some folders that can be written, made where it is missing.
+    """Return the first writable folder, made if it is missing.
 
-    Where none can, as in many containers and for users without a home, it is one in the system's
-    temporary folder. A folder there that somebody else made is not trusted, for what lies in it is
-    run.
+    If none is writable, as in many containers and for users without a home, it is in the system's
+    temporary folder. A folder there that another user made is not trusted, because its contents are
+    executed.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def writable_folder(*places: Path) -> Path:
     Raises
     ------
     OSError
-        Where no folder can be written at all.
+        If no folder is writable.
     """
     for place in places:
         try:
@@ -127,7 +127,7 @@ def writable_folder(*places: Path) -> Path:
             continue
         if os.access(place, os.W_OK):
             return place
-    if os.name == "nt":  # where each user has a temporary folder
+    if os.name == "nt":  # each user has a temporary folder
         return Path(tempfile.mkdtemp(prefix="mlscorr-"))
     folder = Path(tempfile.gettempdir(), f"mlscorr-{os.getuid()}")
     folder.mkdir(0o700, exist_ok=True)

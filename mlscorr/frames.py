@@ -1,4 +1,4 @@
-"""Angles, body and map axes; from the scanner to the map and back (Mao et al. 2015, Eq. 1-9)."""
+"""Angles, body and map axes; transformation scanner to map and back (Mao et al. 2015, Eq. 1-9)."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -10,7 +10,7 @@ from mlscorr.survey import angles_from_attitude as angles_from_attitude
 from mlscorr.survey import attitude_from_angles as attitude_from_angles
 
 # Roll turns about the body's Y (forward), pitch about X (right), heading about -Z
-BODY_AXES = [1, 0, 2]  # numbers of pitch, roll, heading among roll, pitch, heading; own inverse
+BODY_AXES = [1, 0, 2]  # indices of pitch, roll, heading among roll, pitch, heading; its own inverse
 
 
 def map_root(attitude: Rotation, angle_sigma: np.ndarray) -> np.ndarray:
@@ -33,7 +33,7 @@ def map_root(attitude: Rotation, angle_sigma: np.ndarray) -> np.ndarray:
 
 
 def angle_sigma(attitude: Rotation, covariance: np.ndarray) -> np.ndarray:
-    """One sigma of roll, pitch, heading: what map_root is the root of, back about the body axes.
+    """One sigma of roll, pitch, heading from a covariance about the map axes; inverts map_root.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def from_polar(distance: np.ndarray, angle: np.ndarray, elevation: np.ndarray) -
     distance : (n,) array
         Units: m.
     angle, elevation : (n,) array
-        From X towards Y, and from their plane towards Z. Units: rad.
+        From X toward Y, and from their plane toward Z. Units: rad.
     """
     level = distance * np.cos(elevation)
     axes = level * np.cos(angle), level * np.sin(angle), distance * np.sin(elevation)
@@ -76,14 +76,14 @@ def scanner_position(
     ----------
     trajectory : Trajectory
     mounting : Mounting or None
-        Where it is not known the navigation centre stands for the scanner.
+        If None, the navigation center is used.
     gps_time : (n,) array
         Units: s.
 
     Raises
     ------
     ValueError
-        Where a time lies outside the trajectory.
+        If a time is outside the trajectory.
     """
     pose = trajectory.at(gps_time)
     if mounting is None:
@@ -108,7 +108,7 @@ def georeference(
     Raises
     ------
     ValueError
-        Where a time lies outside the trajectory.
+        If a time is outside the trajectory.
     """
     pose = trajectory.at(gps_time)
     body = mounting.boresight.apply(scanner_xyz) + mounting.lever_arm
@@ -132,7 +132,7 @@ def to_scanner(
     Raises
     ------
     ValueError
-        Where a time lies outside the trajectory.
+        If a time is outside the trajectory.
     """
     pose = trajectory.at(gps_time)
     body = pose.attitude.inv().apply(xyz - pose.position)
@@ -147,15 +147,15 @@ def georeferenced_anew(
     gps_time: np.ndarray,
     scanner: np.ndarray,
 ) -> np.ndarray:
-    """Places that recorded mountings gave, as others give them  (Eq. 1). Units: m.
+    """Recompute positions made with recorded mountings for other mountings  (Eq. 1). Units: m.
 
     Parameters
     ----------
     trajectory : Trajectory
     recorded, mountings : sequence of Mounting
-        Of each scanner: that of the places, and the other.
+        Of each scanner: the mounting behind the positions, and the other one.
     position, gps_time, scanner : (..., 3), (...) array
-        With the number of the scanner of each place. Units: m, s.
+        With the index of the scanner of each position. Units: m, s.
     """
     place = np.empty_like(position)
     for number, (before, after) in enumerate(zip(recorded, mountings, strict=True)):
@@ -187,7 +187,7 @@ def pose_partials(trajectory: Trajectory, position: np.ndarray, gps_time: np.nda
     ----------
     trajectory : Trajectory
     position : (n, 3) array
-        The map points. Units: m.
+        Map points. Units: m.
     gps_time : (n,) array
         Units: s.
     """
@@ -198,17 +198,17 @@ def pose_partials(trajectory: Trajectory, position: np.ndarray, gps_time: np.nda
 def mounting_partials(
     trajectory: Trajectory, mounting: Mounting, position: np.ndarray, gps_time: np.ndarray
 ) -> np.ndarray:
-    """Partial derivatives (n, 3, 6) of map points by the mounting: R_P^G [I, -Phi(P)]  (Eq. 16-18).
+    """Partial derivatives (n, 3, 6) of map points by mounting: R_P^G [I, -Phi(P)]  (Eq. 16-18).
 
     The mounting is the lever arm (m) and a small rotation of the boresight about the body axes
-    (rad). P = R_L^P X_L (Eq. 17) is the point as seen from the scanner, in body axes.
+    (rad). P = R_L^P X_L (Eq. 17) is the vector from scanner to point, in body axes.
 
     Parameters
     ----------
     trajectory : Trajectory
     mounting : Mounting
     position : (n, 3) array
-        The map points. Units: m.
+        Map points. Units: m.
     gps_time : (n,) array
         Units: s.
     """
@@ -221,17 +221,17 @@ def mounting_partials(
 def scanner_partials(
     trajectory: Trajectory, mounting: Mounting, position: np.ndarray, gps_time: np.ndarray
 ) -> np.ndarray:
-    """Partial derivatives (n, 3, 2) of map points by the scanner's ranges and encoder, from Eq. 1.
+    """Partial derivatives (n, 3, 2) of map points by range offset and encoder scale, from Eq. 1.
 
-    The range is longer by so much (m), the scan angle by so much of itself (ratio), from the zero
-    beam X_L about Z_L and from -180 to 180 deg.
+    The range offset is in m. The encoder scale (ratio) acts on the scan angle about Z_L, from -180
+    to 180 deg with zero along X_L.
 
     Parameters
     ----------
     trajectory : Trajectory
     mounting : Mounting
     position : (n, 3) array
-        The map points. Units: m.
+        Map points. Units: m.
     gps_time : (n,) array
         Units: s.
     """
@@ -252,16 +252,16 @@ def partials_by_scanner(
     gps_time: np.ndarray,
     scanner: np.ndarray,
 ) -> np.ndarray:
-    """Partial derivatives (n, 3, q k) by q unknowns of each of k scanners; zero by another's.
+    """Partial derivatives (n, 3, q k) by q unknowns of each of k scanners; zero for other scanners.
 
     Parameters
     ----------
     partials : function
-        mounting_partials or scanner_partials, of the arguments that follow.
+        mounting_partials or scanner_partials, called with the arguments that follow.
     mountings : dict
-        By the number of the scanner.
+        By index of the scanner.
     scanner : (n,) int array
-        Number of the scanner that saw each point.
+        Index of the scanner that measured each point.
     """
     columns = [
         partials(trajectory, mounting, position, gps_time) * (scanner == number)[:, None, None]

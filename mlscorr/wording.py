@@ -1,6 +1,6 @@
-"""Numbers, lengths and lists in words, as a surveyor writes them: the one home of all of them.
+"""Numbers, lengths and lists in words, as a surveyor writes them, for all reports.
 
-Where a value was not determined (None, NaN), its word is a dash.
+A value that was not determined (None, NaN) becomes a dash.
 """
 
 import math
@@ -20,12 +20,12 @@ DASH = "–"
 
 
 def known(value: float | None) -> bool:
-    """Whether a value of a document is a number: what was not determined is None there."""
+    """True if a value of a document was determined; None if it was not."""
     return value is not None and math.isfinite(value)
 
 
 def number(value: float | None, decimals: int = 3) -> str:
-    """A number with fixed decimals, a dash where there is none, and no negative zero.
+    """Format a number with fixed decimals; a dash for None, no negative zero.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def number(value: float | None, decimals: int = 3) -> str:
 
 
 def figures(value: float, count: int) -> str:
-    """A number with so many significant figures, never in powers of ten.
+    """Format a number with a given count of significant figures, never in powers of ten.
 
     Parameters
     ----------
@@ -60,13 +60,13 @@ def figures(value: float, count: int) -> str:
 
 
 def plain(value: float | None, factor: float = 1.0) -> str:
-    """A number for tables: three figures, a dash for none.
+    """Format a number for tables: three figures, a dash for none.
 
     Parameters
     ----------
     value : float or None
     factor : float
-        By which it is multiplied.
+        Multiplier of the value.
 
     >>> plain(-0.0045256), plain(None), plain(357726.276)
     ('-0.00453', '–', '357726.276')
@@ -80,7 +80,7 @@ def plain(value: float | None, factor: float = 1.0) -> str:
 
 
 def thousands(value: float, decimals: int = 0) -> str:
-    """A number with spaces between thousands.
+    """Format a number with spaces between thousands.
 
     Parameters
     ----------
@@ -94,13 +94,13 @@ def thousands(value: float, decimals: int = 0) -> str:
 
 
 def percent(share: float | None, decimals: int = 0) -> str:
-    """A share in percent, with a decimal near nothing and near all, and never rounded to these.
+    """Format a share in percent; near 0 and 100 with a decimal, and never rounded to these.
 
     Parameters
     ----------
     share : float or None
     decimals : int
-        At least.
+        Minimum number.
 
     >>> percent(0.97), percent(0.9952), percent(None), percent(-0.1), percent(0.0)
     ('97 %', '99.5 %', '–', '−10 %', '0 %')
@@ -118,13 +118,13 @@ def percent(share: float | None, decimals: int = 0) -> str:
 
 
 def size(value: float | None, sigma: float | None = None, unit: str = "m") -> str:
-    """A size and its sigma in words; a dash where it was not determined.
+    """Format a size and its sigma; a dash if it was not determined.
 
     Parameters
     ----------
     value, sigma : float or None
     unit : str
-        Of both; the words have one that suits them.
+        Of both; the text uses a suitable unit.
 
     >>> size(0.0045256, 0.000527, "s"), size(0.0932, 0.0041), size(1.7e-5, None, "s per s")
     ('4.5 ms ± 0.5 ms', '93 mm ± 4 mm', '17 ppm')
@@ -141,13 +141,13 @@ def size(value: float | None, sigma: float | None = None, unit: str = "m") -> st
 
 
 def value_and_sigma(value: float, sigma: float, word: str = "") -> str:
-    """A number ± its sigma, with the decimals that the sigma allows.
+    """Format a number ± its sigma, with the decimals that the sigma allows.
 
     Parameters
     ----------
     value, sigma : float
     word : str
-        Behind both, the unit.
+        Unit, placed after both.
 
     >>> value_and_sigma(4.5256, 0.527), value_and_sigma(0.2134, 0.0123), value_and_sigma(-0.02, 1.1)
     ('4.5 ± 0.5', '0.213 ± 0.012', '0.0 ± 1.1')
@@ -157,7 +157,7 @@ def value_and_sigma(value: float, sigma: float, word: str = "") -> str:
 
 
 def _decimals(sigma):
-    """Decimals that show one figure of a sigma, two of one that begins with 1 or 2.
+    """Number of decimals that shows one figure of a sigma, or two if it begins with 1 or 2.
 
     >>> _decimals(0.527), _decimals(0.0123), _decimals(40.0)
     (1, 3, 0)
@@ -169,14 +169,14 @@ def _decimals(sigma):
 
 
 def scale(value: float, sigma: float | None, unit: str) -> tuple[float, str]:
-    """Factor and word of the unit that suits a value, or its sigma where that is larger.
+    """Factor and name of the unit that suits a value, or its sigma if that is larger.
 
     Parameters
     ----------
     value : float
     sigma : float or None
     unit : str
-        Of both; one that nobody else writes stays as it is.
+        Of both; an unknown unit stays unchanged.
     """
     large = max(abs(value), abs(sigma) if known(sigma) else 0.0)
     scales = SCALES.get(unit, ((0.0, 1.0, unit),))
@@ -184,15 +184,15 @@ def scale(value: float, sigma: float | None, unit: str) -> tuple[float, str]:
 
 
 def column(values: Sequence[float | None], unit: str) -> tuple[list[str], str]:
-    """Numbers of a row of a table in the unit that suits the largest, and that unit.
+    """Format numbers of a table in the unit that suits the largest, and return that unit.
 
-    Lengths below a metre are all in mm, so that rows can be compared.
+    Lengths below a meter are all in mm, so that rows can be compared.
 
     Parameters
     ----------
     values : sequence of float or None
     unit : str
-        Of the values.
+        Unit of the values.
 
     >>> column([-0.0045256, 0.000527, None], "s")
     (['-4.53', '0.527', '–'], 'ms')
@@ -206,7 +206,7 @@ def column(values: Sequence[float | None], unit: str) -> tuple[list[str], str]:
 
 
 def length_in_words(value: float) -> str:
-    """A length in words: '7 mm', '4.6 cm', '1.23 m'.
+    """Format a length: '7 mm', '4.6 cm', '1.23 m'.
 
     Parameters
     ----------
@@ -224,7 +224,7 @@ def length_in_words(value: float) -> str:
 
 
 def millimetres(value: float | None) -> str:
-    """A length as millimetres without their unit, with a decimal where it is short.
+    """Format a length in millimeters without the unit, with a decimal if it is short.
 
     Parameters
     ----------
@@ -241,7 +241,7 @@ def millimetres(value: float | None) -> str:
 
 
 def signed(value: float | None, unit: str = "mm") -> str:
-    """A signed gap with one decimal, two below one; below zero it has a true minus sign.
+    """Format a signed difference with one decimal, two below one, and a true minus sign.
 
     Parameters
     ----------
@@ -258,13 +258,13 @@ def signed(value: float | None, unit: str = "mm") -> str:
 
 
 def counted(number: int, noun: str) -> str:
-    """A number of things in words.
+    """Format a count with its noun.
 
     Parameters
     ----------
     number : int
     noun : str
-        Of one of them.
+        In the singular.
 
     >>> counted(1, "pass"), counted(2, "pass"), counted(3, "entry"), counted(0, "cloud file")
     ('1 pass', '2 passes', '3 entries', '0 cloud files')
@@ -277,7 +277,7 @@ def counted(number: int, noun: str) -> str:
 
 
 def joined(words: Iterable[str], last: str = "and") -> str:
-    """Words in a row.
+    """Join words to a list in words.
 
     Parameters
     ----------
@@ -295,7 +295,7 @@ def joined(words: Iterable[str], last: str = "and") -> str:
 
 
 def with_articles(text: str) -> str:
-    """A text put together of parts, with *an* before a vowel.
+    """Correct *a* to *an* before a vowel in a text made from parts.
 
     Parameters
     ----------

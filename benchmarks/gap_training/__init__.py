@@ -1,1 +1,1 @@
-"""Surveys of features, made in memory, on which the decision of the diagnosis is learned."""
+"""Synthetic surveys at feature level, on which the decision of the diagnosis is trained."""

@@ -1,4 +1,4 @@
-"""Cases on which a decision is learned: nothing, noise, effects, or what no library knows."""
+"""Cases on which a decision is trained: nothing, noise, effects, or a mechanism of no library."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ DRIFTS = 0.3  # share of cases of position noise in which drift is larger than s
 
 @dataclass(frozen=True)
 class TrainingCase:
-    """A survey to be diagnosed, and what acts on it.
+    """A survey to diagnose, and the effects in it.
 
     Parameters
     ----------
@@ -47,9 +47,9 @@ class TrainingCase:
     background : Background
     survey : Survey
     signatures : tuple of Signature
-        What the library has.
+        Those of the library.
     likeness : dict
-        Of one effect or mechanism: squared correlation with each effect of the whole library.
+        Squared correlation of one effect or mechanism with each effect of the whole library.
     """
 
     kind: str
@@ -63,14 +63,14 @@ class TrainingCase:
 
     @property
     def truth(self) -> str:
-        """The label that is right."""
+        """The correct label."""
         if self.kind in ("withheld", "outside"):
             return "unknown"
         return "+".join(self.names) or "none"
 
 
 def known_mechanisms(path: Path | None = None) -> Described:
-    """Mechanisms on which a decision may be learned: half of the grammar, and those of a file.
+    """Mechanisms on which a decision may be trained: half of the grammar, and those of a file.
 
     Parameters
     ----------
@@ -90,14 +90,14 @@ def draw_case(
     kind: str | None = None,
     mdb: float | None = None,
 ) -> TrainingCase:
-    """TrainingCase in a world; a clean one where the geometry shows nothing of what was drawn.
+    """Draw a TrainingCase in a world; a clean one if the drawn effect is not observable.
 
     Parameters
     ----------
     world : World
     rng : Generator
     mechanisms : dict
-        Function, unit with largest size, and lead, by name.
+        Function, unit with largest size, and hint, by name.
     kind : str, optional
         One of SHARES; drawn by default.
     mdb : float, optional
@@ -126,7 +126,7 @@ def draw_case(
 
 
 def _changed(case, ruler, rng, size, _):
-    """The case with one effect or two at finite size; without it in the library if withheld."""
+    """The case with one or two effects at finite size; withheld ones are not in the library."""
     number = 2 if case.kind == "pair" else 1
     names = names_to_try(SYSTEMATIC, rng)
     drawn = draw_effects(ruler, case.signatures, names, number, size, rng)
@@ -147,7 +147,7 @@ def _changed(case, ruler, rng, size, _):
 
 
 def _moved(case, ruler, rng, size, mechanisms):
-    """The case with a mechanism that no library knows, unlike all effects."""
+    """The case with a mechanism outside the library, unlike all effects."""
     names = names_to_try(list(mechanisms), rng)
     drawn = draw_mechanism(ruler, case.signatures, names, mechanisms, size, rng)
     if drawn is None:
@@ -163,7 +163,7 @@ def _noisy(case, ruler, rng, size, _):
         shown = RANDOM
     else:
         shown = ("position_noise",)
-    # without roughness the stated noise holds all of a row's own
+    # without roughness, the stated noise comprises all of a row's own
     for name in names_to_try(shown, rng):
         if name == "position_noise" and rng.random() < DRIFTS:
             return _drifting(case, rng, size)
@@ -187,7 +187,7 @@ def _noisy(case, ruler, rng, size, _):
 
 
 def _of_pose(case, effect, rng):
-    """What a noisy position makes of residuals (m,)."""
+    """Residuals (m,) caused by a noisy position."""
     rows = case.rows
     path = case.survey.trajectory
     moved = effect.apply(path, rows.reference, rng).position - path.position
@@ -195,7 +195,7 @@ def _of_pose(case, effect, rng):
 
 
 def _drifting(case, rng, size):
-    """The case with drift that is larger than stated: everywhere, or in a stretch of time."""
+    """The case with more drift than is stated: everywhere, or in an interval."""
     rows = case.rows
     trajectory = case.survey.trajectory
     time = rows.gps_time[rows.metric]
@@ -216,7 +216,7 @@ def _drifting(case, rng, size):
 
 
 def _by_position(rows, moved):
-    """Shift (m,) of the residuals by an error of the position in time."""
+    """Shift (m,) of the residuals by a position error over time."""
     shift = np.einsum("mi,mi->m", rows.partials[:, :3], moved(rows.gps_time))
     second = np.where(rows.two_times, rows.gps_time_2, rows.gps_time)
     return shift + np.einsum("mi,mi->m", rows.partials_2[:, :3], moved(second))

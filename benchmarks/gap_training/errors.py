@@ -1,7 +1,7 @@
-"""Errors of made-up surveys of features, of which none is drawn from the estimator's model.
+"""Errors of synthetic surveys of features, none of them drawn from the estimator's model.
 
-The drift is made by sums of sinusoids or by a random walk with bias instability through a crude
-smoother; survey and extraction errors often have heavier tails than assumed.
+The drift is a sum of sinusoids or a random walk with bias instability through a crude smoother;
+survey and extraction errors often have heavier tails than assumed.
 """
 
 import numpy as np
@@ -12,7 +12,7 @@ from mlscorr.gap.residuals import SETTINGS, Rows
 from mlscorr.survey import Scanner
 
 ODD_SHARE = 0.12  # at most, estimated: of 5 surveys by ray casting 2 have more than a twentieth
-ODD_DEPTH = 0.02  # m from the plane, mode, estimated: a kerb of 10 cm along the edge of a patch
+ODD_DEPTH = 0.02  # m from the plane, mode, estimated: a curb of 10 cm along the edge of a patch
 
 
 def process(rng: Generator, time: np.ndarray, kind: str) -> np.ndarray:
@@ -48,14 +48,15 @@ def process(rng: Generator, time: np.ndarray, kind: str) -> np.ndarray:
 def scatter(rows: Rows, rng: Generator, heavy: bool = True) -> np.ndarray:
     """Errors (m,) of the survey of targets and of each row's own.
 
-    No target is off by as much as an outlier, which is an effect: else what is called clean is not.
+    No target has an error as large as an outlier, which is an effect: clean surveys must stay
+    clean.
 
     Parameters
     ----------
     rows : Rows
     rng : Generator
     heavy : bool
-        Whether these have the tails of Student's t with five degrees of freedom.
+        True for the tails of Student's t with five degrees of freedom.
     """
 
     def draw(n):
@@ -75,7 +76,7 @@ def scatter(rows: Rows, rng: Generator, heavy: bool = True) -> np.ndarray:
 
 
 def odd_patches(rows: Rows, rng: Generator) -> np.ndarray:
-    """What crowns and kerbs make of roughness and return rate (m,), in an eighth of them at most.
+    """Changes in roughness and return rate (m,) by crowns and curbs in some patches.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Made-up surveys of features: a drive there and back, and what a line scanner sees on it."""
+"""Synthetic surveys at feature level: a drive there and back, and the view of a line scanner."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def drive(rng: Generator, passes: int = 2, duration: float = 75.0) -> Trajectory
 
 
 def _sightings(survey, place):
-    """Times at which the scan plane sweeps over places (k, 3), one a pass: index, time, pass."""
+    """Times at which the scan plane sweeps over places (k, 3), one per pass: index, time, pass."""
     trajectory = survey.trajectory
     sightings = []
     for number in range(len(trajectory.gaps) + 1):
@@ -92,7 +92,7 @@ def _sightings(survey, place):
 
 @dataclass(frozen=True)
 class Geometry:
-    """A survey, its rows without errors, and what is made of them."""
+    """A survey, its rows without errors, and quantities derived from them."""
 
     survey: Survey
     rows: Rows
@@ -108,15 +108,15 @@ def geometry(
     shared: bool = False,
     duration: float = 75.0,
 ) -> Geometry:
-    """A survey of features; the residuals are zero.
+    """A survey of features without residuals.
 
     Parameters
     ----------
     seed, targets, patches, passes : int
     rough : bool
-        Whether roughness and return rate are observed.
+        True to observe roughness and return rate.
     shared : bool
-        Whether patches are compared between two passes, instead of with a reference.
+        True to compare patches between two passes, instead of with a reference.
     duration : float
         Of a pass. Units: s.
     """
@@ -265,7 +265,7 @@ def _patch_parts(survey, place, normal, counts, which, time, pass_number, rough,
 
 
 def _shared_part(survey, place, normal, which, time, pass_number, pulses, variance):
-    """Rows that compare the patches that both passes saw."""
+    """Rows that compare the patches of both passes."""
     pairs = [np.flatnonzero(which == k) for k in np.unique(which)]
     first, second = np.array([pair[np.argsort(time[pair])] for pair in pairs if len(pair) == 2]).T
     item = np.arange(len(first))

@@ -1,4 +1,4 @@
-"""A decision learned from records, and how often it is right on worlds that it has not seen."""
+"""Training of a decision on records, and its rate of correct labels on unseen worlds."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FOLDS = 8  # of worlds
 
 
 def fit(records: Sequence[Record]) -> LearnedDecision:
-    """The LearnedDecision that records make most likely.
+    """Fit the LearnedDecision of highest likelihood to records.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def fit(records: Sequence[Record]) -> LearnedDecision:
 
 
 def out_of_fold(records: Sequence[Record]) -> list[dict[str, float]]:
-    """Probabilities of each record by a LearnedDecision that has seen no case of its world.
+    """Probabilities of each record by a LearnedDecision that was not trained on its world.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def out_of_fold(records: Sequence[Record]) -> list[dict[str, float]]:
 
 
 def _best_penalty(records):
-    """That under which truths are most probable out of fold."""
+    """Penalty under which truths are most probable out of fold."""
     return max(PENALTIES, key=lambda penalty: np.mean(_scores(records, penalty)))
 
 
@@ -74,9 +74,7 @@ def _fitted(records, x, y, names, penalty):
 
 
 def _sharpness(records):
-    """By kind the factor on scores, and the share that any label has whatever its score, that make
-    the true label most likely among its kind.
-    """
+    """By kind, the factor on scores and the floor of each label that best fit the true labels."""
     best = {}
     for kind in ("noise", "effect", "pair"):
         of_kind = []
@@ -91,7 +89,7 @@ def _sharpness(records):
 
 
 def _fit_of(of_kind, factor, floor):
-    """Log of the probability of true labels among their kind."""
+    """Log probability of true labels among their kind."""
     shares = [np.exp(factor * true - np.logaddexp.reduce(factor * s)) for true, s in of_kind]
     number = np.array([len(scores) for _, scores in of_kind])
     return float(np.log((1 - floor) * np.array(shares) + floor / number).sum())
@@ -111,7 +109,7 @@ def _out_of_fold(records, penalty):
 
 
 def _scores(records, penalty):
-    """Log of the probability of each truth, out of fold."""
+    """Log probability of each truth, out of fold."""
     return [
         np.log(max(max((p for n, p in each.items() if r.is_right(n)), default=0.0), 1e-4))
         for r, each in zip(records, _out_of_fold(records, penalty), strict=True)
@@ -130,7 +128,7 @@ def _of_p_values(records):
 def figures(
     records: Sequence[Record], probabilities: Sequence[dict[str, float]], costs: Costs
 ) -> dict[str, tuple[float, int]]:
-    """Rates, each with the number of its cases, and the calibration error.
+    """Rates, each with its number of cases, and the calibration error.
 
     Parameters
     ----------
@@ -183,7 +181,7 @@ def figures(
 
 
 def document(decision: LearnedDecision, made_of: dict) -> dict:
-    """A LearnedDecision and what made it, as decision.json has it.
+    """A LearnedDecision and its provenance, in the layout of decision.json.
 
     Parameters
     ----------
@@ -202,7 +200,7 @@ def document(decision: LearnedDecision, made_of: dict) -> dict:
 
 
 def hash_of(texts: Iterable[str]) -> str:
-    """SHA-256 of texts, one after the other.
+    """SHA-256 of concatenated texts.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a diagnosis weighs in many made-up surveys, kept in files: fitting again takes seconds."""
+"""Evidence of diagnoses of many synthetic surveys, kept in files so that a fit takes seconds."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from mlscorr.simulate import Described
 
 @dataclass(frozen=True)
 class Record:
-    """One case: what acted, and what the evidence was.
+    """One case: the effects that acted, and the evidence.
 
     Parameters
     ----------
     world : int
         Seed.
     is_open : bool
-        Whether GNSS was never missing.
+        True if GNSS was never missing.
     kind : str
         clean, noise, single, pair, withheld or outside.
     truth : str
-        The label that is right.
+        The correct label.
     mdb : float
         Size in minimal detectable biases.
     p_value : float or None
@@ -47,7 +47,7 @@ class Record:
     joint: JointScore
 
     def is_right(self, label: str) -> bool:
-        """Whether a label is the truth."""
+        """True if a label is the truth."""
         return sorted(label.split("+")) == sorted(self.truth.split("+"))
 
 
@@ -59,7 +59,7 @@ def collect(
     replicas: int = 0,
     progress: Callable[[str], None] = print,
 ) -> list[Record]:
-    """Records of worlds; those that the folder has already are read.
+    """Collect records of worlds, and read those that are already in the folder.
 
     Parameters
     ----------
@@ -69,11 +69,11 @@ def collect(
     cases : int
         In each world.
     mechanisms : dict
-        That no library knows: function, unit with largest size, and lead, by name.
+        Those outside the library: function, unit with largest size, and hint, by name.
     replicas : int
         For p-values of clean surveys; none by default.
     progress : function
-        Is told of each world that is done.
+        Called after each world.
     """
     folder = Path(folder)
     records = []
@@ -96,7 +96,7 @@ def collect(
 
 
 def read_records(path: Path) -> list[Record]:
-    """Records of one world.
+    """Read the records of one world.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def read_records(path: Path) -> list[Record]:
 
 
 def _records(seed, cases, mechanisms, replicas):
-    """Records of a world that is made anew."""
+    """Records of a newly made world."""
     world = World.random(seed)
     for number in range(cases):
         rng = np.random.default_rng([seed, 1, number])
@@ -123,14 +123,14 @@ def _records(seed, cases, mechanisms, replicas):
 
 
 def first_evidence(seed: int, mechanisms: Described) -> dict[str, float]:
-    """Log evidence of every label in the first case of a world, by which code is recognized.
+    """Log evidence of every label in the first case of a world, which identifies the code version.
 
     Parameters
     ----------
     seed : int
         Of the world.
     mechanisms : dict
-        As of collect.
+        See ``collect``.
     """
     record = next(_records(seed, 1, mechanisms, 0))
     return {label: round(score, 4) for label, score in record.joint.score.items()}

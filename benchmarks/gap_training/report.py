@@ -1,4 +1,4 @@
-"""What is asked of a study of decisions, and its figures at several operating points."""
+"""Arguments of studies of decisions, and their figures at several operating points."""
 
 import argparse
 from collections.abc import Sequence
@@ -10,12 +10,12 @@ from mlscorr.gap.evidence import OPERATING_POINTS
 
 
 def study_arguments(about: str | None, first: int, worlds: int) -> argparse.ArgumentParser:
-    """Arguments of a study: where its records are kept, and of which worlds.
+    """Arguments of a study: the folder of its records, and its worlds.
 
     Parameters
     ----------
     about : str
-        What it does.
+        Description of the study.
     first, worlds : int
         Defaults of the first world's seed, and of their number.
     """
@@ -29,7 +29,7 @@ def study_arguments(about: str | None, first: int, worlds: int) -> argparse.Argu
 
 
 def print_figures(records: Sequence[Record], probabilities: Sequence[dict[str, float]]) -> None:
-    """Print a row each rate, a column each operating point.
+    """Print a row for each rate, with a column for each operating point.
 
     Parameters
     ----------

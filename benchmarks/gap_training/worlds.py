@@ -1,7 +1,7 @@
-"""Made-up surveys of features with errors of all sorts: worlds on which a decision is learned.
+"""Synthetic surveys of features with errors of all sorts: worlds on which a decision is trained.
 
-A world is a drive with targets and patches, what a scanner sees of them, and a sky. Its errors come
-from simulated sensors, from sums of sinusoids, or from a random walk through a crude smoother,
+A world is a drive with targets and patches, the observations of a scanner, and a sky. Its errors
+come from simulated sensors, from sums of sinusoids, or from a random walk through a crude smoother,
 where survey and extraction often have heavier tails than assumed: nothing is drawn from the
 estimator's model.
 """
@@ -38,11 +38,11 @@ class World:
     geometry : Geometry
     signatures : tuple of Signature
     recordings : tuple of (Survey, PosError)
-        What sensors made of the drive, and by how much that is wrong.
+        Recording of the drive by sensors, and its error.
     is_open : bool
-        Whether no stretch lacks GNSS.
+        True if GNSS is available throughout.
     heavy : bool
-        Whether survey and extraction have heavy tails.
+        True if survey and extraction errors have heavy tails.
     """
 
     geometry: Geometry
@@ -78,7 +78,7 @@ class World:
         return cls(made, signs, recordings, is_open, bool(rng.random() < 0.5))
 
     def errors(self, rng: Generator) -> tuple[Rows, Background, Survey]:
-        """Rows in which no effect acts, and the survey that states what they err by.
+        """Rows without an effect, and the survey that states their errors.
 
         Parameters
         ----------
@@ -111,14 +111,14 @@ class World:
         return rows, background(rows, survey), survey
 
     def _growth(self, rng, time, survey):
-        """Factor (n,) on sigma where it is raised: a POS knows its outages, not its errors."""
+        """Factor (n,) on sigma: a POS knows its outages, but not its errors."""
         sigma = np.linalg.norm(survey.trajectory.position_sigma, axis=1)
         raised = np.interp(time, survey.trajectory.gps_time, sigma) > 2 * np.percentile(sigma, 5)
         return np.where(raised, np.exp(RAISED[0] + RAISED[1] * rng.standard_normal()), 1.0)
 
 
 def _scenario(rng, trajectory, is_open):
-    """Sensors and sky: under a bad one there is a canyon or an outage in some pass."""
+    """Sensors and sky: a bad sky means a canyon or an outage in some pass."""
     length = float(np.diff(trajectory.passes[0])[0])
     span = float(rng.uniform(6.0, 25.0))
     spans = ((float(rng.uniform(0.0, max(length - span, 1.0))), span),)
@@ -132,7 +132,7 @@ def _scenario(rng, trajectory, is_open):
 
 
 def _recorded(survey, scenario, rng):
-    """The survey as sensors record it, and their error."""
+    """The survey as recorded by sensors, and its error."""
     true = survey.trajectory
     parts = []
     for start, end in true.passes:

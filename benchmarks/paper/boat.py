@@ -2,7 +2,7 @@
 
     python benchmarks/paper/boat.py [--seeds 20] [--picture FILE.png]
 
-151 s along a river, a bump of the POS error that the POS knows nothing of, 9 control and 15 check
+151 s along a river, a bump of the POS error that its sigmas do not state, 9 control and 15 check
 points; scored at the check points. Literal LSC-4 has dt = 120 s as in the paper, and C0 tuned at
 these check points as there; 'untuned' has the variance that the POS states as C0. The consistent
 mode has all parameters from the control points alone, as it comes and with order 4.
@@ -82,7 +82,7 @@ def residuals(survey):
 
 
 def tell(found):
-    """The table of RMS (seeds, 3) by method, and how often the paper's claims hold."""
+    """Print the table of RMS (seeds, 3) by method, and how often the paper's claims are met."""
     transformed = found["Coordinate transformation"]
     paper_transformed = np.array(TABLE_5["transformation"])
     rows = []
@@ -114,7 +114,7 @@ def tell(found):
 
 
 def draw(survey, left):
-    """Figure 11: residuals at the check points of one survey, in the order they are passed."""
+    """Figure 11: residuals at the check points of one survey, in the order of passing."""
     order = np.argsort(survey.checked.gps_time)
     number = np.arange(1, len(order) + 1)
     drawn = {

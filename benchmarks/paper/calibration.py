@@ -2,9 +2,9 @@
 
     python benchmarks/paper/calibration.py [--seeds 20] [--picture FILE.png]
 
-10 control and 54 check points, and a recorded mounting that lacks what the paper's LSC found in
-its Table 6: here the truth is known, so that errors can be told. Two passes in opposite directions
-and a plane of scan that is askew, without which lever arm and datum could not be told apart. The
+10 control and 54 check points, and a recorded mounting with the errors that the paper's LSC found
+in its Table 6: here the truth is known, so that errors can be stated. Two passes run in opposite
+directions with an oblique scan plane, without which lever arm and datum could not be separated. The
 paper's LSC at check points corrects the POS error at each epoch too: 'LSC with drift'.
 """
 
@@ -34,7 +34,7 @@ from mlscorr.survey import Matched
 
 METHODS = {"raw": "Raw", "ls": "LS", "lsc": "LSC", "lsc with drift": "LSC with drift"}
 LIMITS = np.array([0.014, 0.011, 0.023])  # m, what the paper's LSC reaches
-# deg and m: what a calibration is wished to reach
+# deg and m: goals of a calibration
 BORESIGHT = 0.005
 ACROSS = 0.005
 
@@ -77,7 +77,7 @@ def study(scenario, seed):
 
 
 def table_6(results):
-    """What the mounting lacks: the paper's estimates, and the errors of ours."""
+    """Print the mounting corrections: the paper's estimates, and the errors of ours."""
     errors = {name: np.array([result[name][0] for result in results]) for name in ("ls", "lsc")}
     sigma = np.array([result["lsc"][1] for result in results])
     told_share = np.mean([result["determined"] for result in results], axis=0)
@@ -120,7 +120,7 @@ def table_6(results):
 
 
 def table_7(results):
-    """RMS at the check points."""
+    """Print the RMS at the check points."""
     found = {
         name: np.array([rms(result["residuals"][name]) for result in results]) for name in METHODS
     }

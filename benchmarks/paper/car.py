@@ -3,8 +3,8 @@
     python benchmarks/paper/car.py [--seeds 20] [--picture FILE.png]
 
 186 s in an urban canyon, 21 control points, scored on the true trajectory at 1 Hz. Literal mode is
-Eq. 13-15 as printed, with C0 tuned on that truth as in the paper, which the user of a survey can't
-do; 'untuned' has the variance that the POS states as C0. Consistent mode is what mlscorr does: all
+Eq. 13-15 as printed, with C0 tuned on that truth as in the paper, which is impossible in practice;
+'untuned' has the variance stated by the POS as C0. Consistent mode is that of mlscorr: all
 parameters from the control points alone.
 """
 
@@ -35,7 +35,7 @@ def main(arguments=None):
 
 
 def table_1(drives):
-    """Orders 2 to 5; returns the tuned C0 north (seeds,) by order."""
+    """Print orders 2 to 5; return the tuned C0 north (seeds,) by order."""
     raw = np.array([rms(drive.error) for drive in drives])
     rows = [("Raw", paper_numbers(RAW), told_axes(raw), "", "", "")]
     bases = {}
@@ -80,7 +80,7 @@ def table_1(drives):
 
 
 def table_2(by_count):
-    """21, 15 and 9 control points, order 5."""
+    """Print 21, 15 and 9 control points, order 5."""
     rows = []
     for count, drives in by_count.items():
         fits = [Literal.of(drive.survey, 5) for drive in drives]
@@ -97,7 +97,7 @@ def table_2(by_count):
 
 
 def table_3(count, drives):
-    """Sweep of C0 north; returns C0 over the best (k,), RMS (seeds, k) and the best C0 (seeds,)."""
+    """Sweep C0 north; return C0 over the best (k,), RMS (seeds, k) and the best C0 (seeds,)."""
     paper_base, paper_rms = (np.array(values) for values in TABLE_3[count])
     curve = np.polyfit(paper_base, paper_rms**2, 2)
     factors = np.append(0.0, paper_base / (-curve[1] / 2 / curve[0]))
@@ -126,7 +126,7 @@ def table_3(count, drives):
 
 
 def table_4(count, drives):
-    """Sweep of the correlation time; returns RMS (2, seeds, k) on GRID: C0 fixed, and tuned."""
+    """Sweep the correlation time; return RMS (2, seeds, k) on GRID: C0 fixed, and tuned."""
     times, paper_rms = TABLE_4[count]
     # the paper's
     interval = DURATION / (count - 1)
@@ -169,7 +169,7 @@ def table_4(count, drives):
 
 
 def best_time(curves, rows=slice(None)):
-    """Where curves (seeds, k) over some of GRID are least, as text."""
+    """Minimum of curves (seeds, k) over part of GRID, as text."""
     return told(GRID[rows][np.argmin(curves[:, rows], axis=1)], 1)
 
 

@@ -15,7 +15,7 @@ PAPER = {"linestyle": "none", "marker": "x", "markersize": 5, "markeredgewidth":
 
 
 def draw(by_count, bases, parabolas, grid, curves):
-    """The figure: one drive above, all drives below.
+    """Draw the figure: one drive above, all drives below.
 
     ``bases`` are the best C0 (seeds,) by order; ``parabolas`` and ``curves`` what the sweeps of C0
     and of the correlation time return, by number of control points.
@@ -41,7 +41,7 @@ def draw(by_count, bases, parabolas, grid, curves):
 
 
 def draw_raw(axes, drive):
-    """Figures 5 and 6: the POS error, and what the control points see of it."""
+    """Figures 5 and 6: the POS error, and its observations at the control points."""
     seen = Literal.of(drive.survey, 5)
     for name, colour, error, found in zip(
         ("East", "North", "Height"),
@@ -57,7 +57,7 @@ def draw_raw(axes, drive):
 
 
 def draw_bases(axes, drive):
-    """Figure 7: what is left with too small, best and too large C0, and in consistent mode."""
+    """Figure 7: residual errors with too small, best and too large C0, and in consistent mode."""
     literal = Literal.of(drive.survey, 5)
     time = TIMES[21]
     best = literal.best_base(drive.gps_time, drive.error, time)
@@ -75,7 +75,7 @@ def draw_bases(axes, drive):
 
 
 def draw_times(axes, drive):
-    """Figure 9: what is left with several correlation times."""
+    """Figure 9: residual errors with several correlation times."""
     literal = Literal.of(drive.survey, 5)
     fixed = literal.best_base(drive.gps_time, drive.error, TIMES[21])
     for time, colour in ((10.0, SKY), (30.0, BLUE), (80.0, VERMILLION)):
@@ -86,7 +86,7 @@ def draw_times(axes, drive):
 
 
 def draw_parabolas(axes, parabolas):
-    """Figure 8a: RMS over C0, both in units that two different drives share."""
+    """Figure 8a: RMS over C0, both in units common to two different drives."""
     for count, (factors, found, best) in parabolas.items():
         if any(best > 0):
             relative = middle((found / found[:, :1])[best > 0])
@@ -156,13 +156,13 @@ def since(drive):
 
 
 def finish(axes, horizontal, vertical, where="upper left"):
-    """Labels and a legend."""
+    """Add labels and a legend."""
     axes.set(xlabel=horizontal, ylabel=vertical)
     axes.legend(fontsize=7.5, ncols=2, loc=where)
 
 
 def finish_residuals(axes):
-    """The same for residuals over time, with room for the legend above them."""
+    """Add the same to residuals over time, with room for the legend above them."""
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + 0.3 * (high - low))
     finish(axes, "Time (s)", "Residual (m)")

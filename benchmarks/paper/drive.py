@@ -1,4 +1,4 @@
-"""What is measured on one simulated drive of the car."""
+"""Quantities measured on one simulated drive of the car."""
 
 from dataclasses import dataclass
 
@@ -28,7 +28,7 @@ class Drive:
         return cls(survey, survey.true.gps_time[::10], true - recorded)
 
     def with_control(self, count):
-        """The same with so many control points, evenly chosen."""
+        """The same drive with a number of evenly chosen control points."""
         seen = self.survey.observations
         names = [seen.name[i] for i in np.argsort(seen.gps_time)]
         rows = np.linspace(0, len(names) - 1, count).round().astype(int)
@@ -36,14 +36,14 @@ class Drive:
         return Drive(kept, self.gps_time, self.error)
 
     def consistent(self, order=None):
-        """What is left (q, 3) with all parameters from the control points."""
+        """Residual error (q, 3) with all parameters from the control points."""
         survey = self.survey
         chosen = {} if order is None else {"order": order}
         found = quietly(estimate_correction, survey.recorded, survey.matched, **chosen)
         return survey.position_left(found.correction)[::10]
 
     def least_squares(self, order):
-        """What is left (q, 3) by LS-n, by other code than the literal mode's."""
+        """Residual error (q, 3) of LS-n, by code independent of the literal mode's."""
         survey = self.survey
         found = fit_polynomial(survey.recorded, survey.matched, order)
         return survey.position_left(found)[::10]

@@ -58,7 +58,7 @@ class Literal:
         return solved.predict(at, self._design(at), [partials])[0]
 
     def best_base(self, at, error, correlation_time):
-        """C0 (3,) of the least RMS against the truth ``error`` (q, 3), as the paper tuned it.
+        """C0 (3,) of the smallest RMS against the truth ``error`` (q, 3), as tuned in the paper.
 
         The squared RMS is a parabola in C0. A vertex below zero would turn the signal round: 0.
         """
@@ -68,7 +68,7 @@ class Literal:
         return np.maximum(vertex, 0.0)
 
     def tuned(self, at, error, correlation_time):
-        """What is left (q, 3) of the error with C0 tuned on it, and that C0 (3,)."""
+        """Residual error (q, 3) with C0 tuned on the error, and that C0 (3,)."""
         base = self.best_base(at, error, correlation_time)
         return error - self.predict(at, base, correlation_time), base
 

@@ -1,4 +1,4 @@
-"""The numbers that Mao et al. 2015 print in Tables 1 to 7; E, N, H in m where nothing is said."""
+"""The numbers printed by Mao et al. 2015 in Tables 1 to 7; E, N, H in m unless noted."""
 
 RAW = (0.5476, 2.4528, 0.2900)
 TABLE_1 = {  # order: RMS of LS, of LSC

@@ -1,4 +1,4 @@
-"""What the scripts of this folder share: arguments, simulated surveys, tables beside the paper's.
+"""Arguments, simulated surveys and comparison tables shared by the scripts of this folder.
 
 The paper is Mao et al. 2015, Remote Sensing 7(6), 7402-7424, doi:10.3390/rs70607402.
 """
@@ -19,7 +19,7 @@ sys.path.append(str(ROOT / "benchmarks"))  # where surveys are simulated without
 
 
 def parse(arguments, description, picture):
-    """The scripts' arguments: number of seeds, and where the picture goes."""
+    """Arguments of the scripts: number of seeds, and path of the picture."""
     parser = argparse.ArgumentParser(description=description.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=20, help="simulated surveys (default: 20)")
     parser.add_argument("--picture", type=Path, default=ROOT / "build" / "pictures" / picture)
@@ -30,7 +30,7 @@ def parse(arguments, description, picture):
 
 @cache
 def survey_of(name, seed):
-    """FeatureSurvey of a scenario of this project: target centres with noise, and the truth."""
+    """FeatureSurvey of a scenario of this project: target centers with noise, and the truth."""
     from feature_surveys import feature_survey
 
     from mlscorr.simulate import read_scenario
@@ -39,7 +39,7 @@ def survey_of(name, seed):
 
 
 def quietly(function, *arguments, **options):
-    """A function's result without its warnings: few control points are the point here."""
+    """Call a function without its warnings, because few control points are intended here."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return function(*arguments, **options)
@@ -74,7 +74,7 @@ def told_axes(values):
 
 
 def show(title, head, rows, note=""):
-    """Print a table of text; its columns are as wide as their longest cell."""
+    """Print a table of text with columns as wide as their longest cell."""
     table = [head, *rows]
     widths = [max(len(row[i]) for row in table) for i in range(len(head))]
     print(f"\n{title}")
@@ -87,7 +87,7 @@ def show(title, head, rows, note=""):
 
 
 def introduce(what, seeds):
-    """Say which numbers are whose."""
+    """Print a note on the source of each number."""
     print(
         f"{what}: {seeds} seeds of a simulated clone, not the paper's data. Columns headed 'paper' "
         "are printed\nin Mao et al. 2015; all others are measured here: medians over the seeds, "

@@ -1,4 +1,4 @@
-"""Calibrate lever arm and boresight in Python, and draw what they do to the check points.
+"""Calibrate lever arm and boresight in Python, and draw their effect on the check points.
 
     python benchmarks/pictures/calibrate_mounting.py [SURVEY] [--out FOLDER] [--picture FILE.png]
 
@@ -36,7 +36,7 @@ def main():
     with tempfile.TemporaryDirectory() as scratch:
         path = arguments.survey or simulated(Path(scratch))
 
-        # Three lines do the work.
+        # The whole task takes three lines.
         survey = mlscorr.read_survey(path)
         result = mlscorr.calibrate(survey)
         content = result.write(arguments.out or Path(scratch) / "calibrated")
@@ -94,7 +94,7 @@ def draw(survey, result, truth, picture):
 
 
 def draw_components(axes, calibration, rows, scale, truth):
-    """Three components by both methods with 2 sigma, and the truth where it is known."""
+    """Draw three components by both methods with 2 sigma, and the truth if known."""
     place = np.arange(3)
     for method, color, aside in (("ls", ORANGE, -0.12), ("lsc", BLUE, 0.12)):
         estimate = getattr(calibration, method)
@@ -124,7 +124,7 @@ def draw_components(axes, calibration, rows, scale, truth):
 
 
 def draw_misclosures(axes, survey, result):
-    """Check points in body axes: there a wrong mounting shows as one shift."""
+    """Draw check points in body axes, in which a wrong mounting appears as one shift."""
     matched = result.matched_check
     role = "Check points"
     if len(matched) == 0:

@@ -2,8 +2,8 @@
 
     python benchmarks/pictures/compare_methods.py [SURVEY] [--out FOLDER] [--picture FILE.png]
 
-SURVEY is a survey.toml or its folder. Without it the semi-real drive through Wuhan is taken where
-the shared surveys lie (MLSCORR_SHARED, or ../shared), else a small survey is simulated.
+SURVEY is a survey.toml or its folder. Without it the semi-real drive through Wuhan is taken from
+the shared surveys (MLSCORR_SHARED, or ../shared), else a small survey is simulated.
 """
 
 import argparse
@@ -29,7 +29,7 @@ def main():
     with tempfile.TemporaryDirectory() as scratch:
         path = arguments.survey or (DRIVE if DRIVE.exists() else simulated(Path(scratch)))
 
-        # Two lines do the work.
+        # The whole task takes two lines.
         compared = mlscorr.compare(mlscorr.read_survey(path))
         report = compared.write(arguments.out or Path(scratch) / "compared")
 

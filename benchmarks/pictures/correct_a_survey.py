@@ -1,4 +1,4 @@
-"""Correct a survey in Python, and draw what it did to the check point that lay farthest off.
+"""Correct a survey in Python, and draw its effect on the check point with the largest error.
 
     python benchmarks/pictures/correct_a_survey.py [SURVEY] [--out FOLDER] [--picture FILE.png]
 
@@ -26,7 +26,7 @@ def main():
     with tempfile.TemporaryDirectory() as scratch:
         path = arguments.survey or simulated(Path(scratch))
 
-        # Three lines do the work.
+        # The whole task takes three lines.
         survey = mlscorr.read_survey(path)
         result = mlscorr.correct(survey)
         report = result.write(arguments.out or Path(scratch) / "corrected")
@@ -59,7 +59,7 @@ def simulated(folder):
 
 
 def draw(survey, result, picture):
-    """Close-up of one check point before and after, above the correction over time."""
+    """Draw a close-up of one check point before and after, above the correction over time."""
     worst = farthest(survey, result)
     figure = Figure(figsize=(11, 7.5), layout="constrained")
     upper, lower = figure.subfigures(2, 1, height_ratios=(1.25, 1))
@@ -73,7 +73,7 @@ def draw(survey, result, picture):
 
 
 def farthest(survey, result):
-    """The row of the target that lay farthest off; a check point and a circle if there is one."""
+    """Row of the target with the largest error; a check point and a circle if there is one."""
     surveyed = survey.surveyed
     kind = dict(zip(surveyed.name, surveyed.kind, strict=True))
     rows = [row for row in result.targets if row.is_observed]
@@ -88,7 +88,7 @@ def farthest(survey, result):
 
 
 def points_near(survey, row):
-    """Points of the recorded cloud about a target, at the time when it was seen."""
+    """Points of the recorded cloud about a target, at the time of its sighting."""
     reach = REACH + np.linalg.norm(row.before)
     for file in survey.clouds:
         for chunk in read_chunks(file):
@@ -100,7 +100,7 @@ def points_near(survey, row):
 
 
 def draw_target(axes, survey, points, row, when):
-    """Points about a target, and the outline where it was surveyed, in the target's plane."""
+    """Draw points about a target, and its surveyed outline, in the target's plane."""
     if row.role == "check":
         surveyed = survey.check
     else:
@@ -129,7 +129,7 @@ def draw_target(axes, survey, points, row, when):
 
 
 def draw_correction(axes, result):
-    """Corrected - recorded position over time, with its 1-sigma band and the control epochs."""
+    """Draw corrected - recorded position over time, with its sigma band and the control epochs."""
     recorded = result.estimate.correction.recorded
     corrected = result.trajectory
     time = recorded.gps_time - recorded.gps_time[0]

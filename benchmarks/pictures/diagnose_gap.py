@@ -1,10 +1,10 @@
-"""Find out, round by round, what a simulator does not know of a survey.
+"""Find, round by round, the effects in a survey that a simulator does not model.
 
     python benchmarks/pictures/diagnose_gap.py [--picture FILE.png]
 
-A street is simulated with a scanner clock that is 6 ms off and control in a height datum that is
-6 cm off. The diagnosis sees the survey alone: it names one effect, puts it into the simulator, and
-is asked again until nothing is left.
+A street is simulated with a scanner clock that is 6 ms off and control in a height datum that is 6
+cm off. The diagnosis uses the survey alone: it names one effect, adds it to the simulator, and is
+repeated until nothing is left.
 """
 
 import argparse
@@ -32,7 +32,7 @@ BAND = "0.85"
 
 
 def survey_to_explain(folder):
-    """A survey of two opposite passes, of which only the simulator that made it knows all."""
+    """A survey of two opposite passes, made by a simulator with hidden effects."""
     scenario = Scenario(
         drive={"duration": 40.0, "passes": [{}, {"direction": "back"}]},
         scene={"reference": True},
@@ -45,7 +45,7 @@ def survey_to_explain(folder):
 
 
 def rounds(survey):
-    """Diagnoses, each with the simulator that the one before improved, until none is left."""
+    """Diagnoses, each with the simulator improved by the previous one, until no effect is found."""
     found = []
     simulator = None
     while len(found) < ROUNDS:
@@ -61,7 +61,7 @@ def rounds(survey):
 
 
 def draw(several, path):
-    """The gap of the first round by speed, by what was compared and by axis, and that of all."""
+    """Draw the first round's gap by speed, by quantity and by axis, and that of all rounds."""
     first = several[0]
     figure, axes = plt.subplots(1, 4, figsize=(12, 3.4), width_ratios=[3, 2, 2, 2])
     for axis, by in zip(axes, ("speed", "channel", "axis"), strict=False):
@@ -84,7 +84,7 @@ def draw(several, path):
 
 
 def split(axis, one):
-    """One split of the gap: before, after, and what chance makes of it."""
+    """Draw one split of the gap: before, after, and its range by chance."""
     low, high = np.array(one["null_band"]).T
     if "edges" in one:
         edges = np.array(one["edges"])

@@ -1,12 +1,12 @@
-"""Simulated beside real POS error: how far it drifts without GNSS, and how it hangs together.
+"""Compare simulated with real POS error: drift without GNSS, and autocorrelation.
 
     python benchmarks/pictures/pos_error.py [SERIES.err] [--drives N] [--picture FILE.png]
 
 SERIES.err is the error of a MEMS unit on a real drive, with GNSS withheld for 60 s in every 150 s
 (OB_GINS_TXT.err of i2Nav-WHU/OB_GINS); without it only the simulation is drawn. That series is a
-real-time one: errors grow until GNSS is back, and as a car's odometer limits them, in proportion
-to time. So it is compared with a simulated unit that works the same way, and the same unit after
-smoothing, as surveys are processed, stands beside.
+real-time one: errors grow until GNSS is back and, limited by a car's odometer, in proportion to
+time. So it is compared with a simulated unit of the same kind, and with the same unit after
+smoothing, as in the processing of surveys.
 """
 
 import argparse
@@ -32,7 +32,7 @@ OUTAGE = 60.0
 SETTLED = 65.0, 145.0  # s after an outage began: GNSS is back
 STEP = 0.1  # s
 LAGS = np.arange(0.0, 50.0, STEP)  # s
-KINDS = {  # label of a simulated unit -> its scenario, colour
+KINDS = {  # label of a simulated unit -> its scenario, color
     "simulated, real time with odometer": (
         {"processing": "filtered", "odometer": True},
         "#0072b2",
@@ -88,7 +88,7 @@ def city_drive(duration):
 
 
 def pieces(elapsed, error, inside):
-    """Errors (k, 3) of each outage, or of each time between outages when GNSS has settled."""
+    """Errors (k, 3) of each outage, or of each interval with settled GNSS between outages."""
     first, last = (0.0, OUTAGE) if inside else SETTLED
     starts = np.arange(150.0, elapsed[-1] - PERIOD, PERIOD)
     return [error[(elapsed >= s + first) & (elapsed < s + last)] for s in starts]
@@ -121,7 +121,7 @@ def describe(runs):
 
 
 def draw(runs, picture):
-    """Size of the error over time, above the autocorrelation in and outside outages."""
+    """Draw the size of the error over time, above the autocorrelation in and outside outages."""
     figure = Figure(figsize=(10, 7.5), layout="constrained")
     panels = figure.subplot_mosaic([["over time", "over time"], ["lost", "held"]])
     over_time = panels["over time"]

@@ -1,4 +1,4 @@
-"""Draw a survey before and after its correction, and put three of the pictures together.
+"""Draw a survey before and after its correction, and combine three of the pictures.
 
     python benchmarks/pictures/render_before_after.py [SURVEY] [--out FOLDER] [--picture FILE.png]
 
@@ -74,14 +74,14 @@ def simulated(folder):
 
 
 def farthest(targets):
-    """Name of the picture of the check point that lay farthest off."""
+    """Name of the picture of the check point with the largest error."""
     observed = [row for row in targets if row.is_observed]
     worst = max(observed, key=lambda row: (row.role == "check", np.linalg.norm(row.before)))
     return f"target-{worst.name}"
 
 
 def together(pictures, path):
-    """The pages of some pictures, one below the other, in one PNG."""
+    """Stack the pages of some pictures in one PNG."""
     width, height = PAGE
     figure = Figure(figsize=(width / 100, len(pictures) * height / 100), dpi=100)
     for k, picture in enumerate(pictures):

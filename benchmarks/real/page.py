@@ -1,4 +1,4 @@
-"""What the studies on real data share: where the data is, pictures, and the page."""
+"""Data location, pictures and page shared by the studies on real data."""
 
 import io
 import os
@@ -16,7 +16,7 @@ SHARED = Path(os.environ.get("MLSCORR_SHARED") or ROOT.parent / "shared") / "dat
 
 
 def needed(folder, names, source):
-    """End the study with one sentence where a file that it can't do without is missing."""
+    """End the study with one sentence if a required file is missing."""
     missing = [name for name in names if not (folder / name).exists()]
     if missing:
         print(
@@ -53,9 +53,9 @@ def write_page(path, title, subtitle, sentences, real, parts):
     path : path
     title, subtitle : str
     sentences : list of str
-        What came out, the main thing first.
+        Results, the main one first.
     real : list of (head, list of str)
-        What is real, what is simulated, what is not known.
+        Lists of real, simulated and unknown things.
     parts : list of dict
         title; text, list of str; pictures, list of (PNG file, caption); tables, list of
         (column names, rows, caption).
@@ -71,7 +71,7 @@ def write_page(path, title, subtitle, sentences, real, parts):
 
 
 def picture(path, draw, size, *arguments):
-    """Write what draw(figure, ...) draws as a PNG; returns its path."""
+    """Write the picture that draw(figure, ...) draws as a PNG, and return its path."""
     with rc_context(STYLE):
         figure = Figure(figsize=size, layout="constrained")
         draw(figure, *arguments)

@@ -1,4 +1,4 @@
-"""The real drive with its real error, targets beside it, and what simulators believe of its POS."""
+"""The real drive with its real error, targets along it, and simulators' models of its POS."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -26,15 +26,15 @@ from mlscorr.targets import Candidates
 
 DATA = SHARED / "real_pos_error"
 FILES = ("GNSS_RTK.pos", "OB_GINS_TXT.err")
-# s: GNSS was withheld, by the data's own notes
+# s: GNSS was withheld, according to the notes of the data
 FIRST = 357_900.0
 PERIOD = 150.0
 OUTAGE = 60.0
 LEAD = 45.0  # s with GNSS before each outage; as much follows it
-# s and m at least between targets
+# s and m: smallest distances between targets
 EVERY = 5.0
 MOVED = 3.0
-# m, one sigma: total station; centres as extraction finds them
+# m, one sigma: total station; centers as found by extraction
 SURVEY = 0.003
 EXTRACTION = 0.004
 BELIEF = {"grade": "mems", "odometer": True, "processing": "filtered"}  # a car, in real time
@@ -50,11 +50,11 @@ MOUNTING = true_mounting(ScannerScenario())
 
 @dataclass(frozen=True)
 class Drive:
-    """The real drive with its real error, and targets beside it.
+    """The real drive with its real error, and targets along it.
 
-    true, recorded: Trajectory over the series; error: PosError; lost (n,) bool: withheld GNSS;
-    time (k,), beam (k, 3), centre (k, 3): when each target is seen, where in the scanner's frame,
-    and where it is.
+    true, recorded: Trajectory over the series; error: PosError; lost (n,) bool: withheld GNSS; time
+    (k,), beam (k, 3), centre (k, 3): time of each sighting, position in the scanner's frame, and
+    position on the map.
     """
 
     true: Trajectory
@@ -66,12 +66,12 @@ class Drive:
     centre: np.ndarray
 
     def lost(self, gps_time):
-        """At which times (n,) GNSS was withheld."""
+        """Mask (n,) of the times at which GNSS was withheld."""
         return np.any([(gps_time >= s) & (gps_time < s + d) for s, d in self.outages], axis=0)
 
 
 def real_drive(rng):
-    """The real drive at 10 Hz with its real error, and simulated targets beside it."""
+    """The real drive at 10 Hz with its real error, and simulated targets along it."""
     path = DATA / FILES[0]
     scenario = Scenario(
         start_time=float(read_poses(path).gps_time[0]), drive={"file": path, "pose_rate": 10.0}
@@ -103,7 +103,7 @@ def real_drive(rng):
 
 
 def _times(true):
-    """Times of targets: every 5 s, where the vehicle has moved on."""
+    """Times of targets: every 5 s, provided that the vehicle has moved on."""
     way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(true.position, axis=0), axis=1)))
     times = []
     last = -np.inf
@@ -122,7 +122,7 @@ def simulate_pos(one, settings, seed, outages=()):
 
 
 def belief(one, seed, draws=DRAWS):
-    """Pos as survey.toml would state it: what the simulated POS states while it has GNSS."""
+    """Pos as stated by survey.toml: the sigmas of the simulated POS while it has GNSS."""
     errors = [simulate_pos(one, BELIEF, [seed, k]) for k in range(draws)]
     position = np.sqrt(np.mean([e.position_sigma**2 for e in errors]))
     attitude = np.sqrt(np.mean([e.attitude_sigma**2 for e in errors], axis=(0, 1)))
@@ -148,7 +148,7 @@ def spans(one, windows):
 
 
 def window_rows(one, span, recorded, believed, rng):
-    """Rows of the targets that are seen in a window, and the Survey that recorded them."""
+    """Rows of the targets that are observed in a window, and the Survey that recorded them."""
     inside = (one.true.gps_time >= span[0]) & (one.true.gps_time <= span[1])
     seen = (one.time >= span[0] + 0.5) & (one.time <= span[1] - 0.5)
     n = int(seen.sum())

@@ -11,7 +11,7 @@ LOWER = "Gap between simulated and real; bars: 95 % of it if that simulator is r
 
 
 def draw_summary(figure, one, believed, sigmas, cycles, r):
-    """Errors with both beliefs, and the gap of each outage below."""
+    """Draw errors with both models, and the gap of each outage below."""
     upper, lower = figure.subfigures(2, 1, height_ratios=(2, 1))
     upper.suptitle(UPPER, x=0.01, ha="left", fontsize=9.5)
     draw_errors(upper, one, believed, sigmas, cycles)
@@ -20,7 +20,7 @@ def draw_summary(figure, one, believed, sigmas, cycles, r):
 
 
 def draw_errors(figure, one, believed, sigmas, cycles):
-    """Errors with both beliefs."""
+    """Draw errors with both models."""
     panels = figure.subplots(3, 1, sharex=True)
     time = one.true.gps_time - FIRST
     for axis, panel in enumerate(panels):
@@ -48,7 +48,7 @@ def draw_errors(figure, one, believed, sigmas, cycles):
 
 
 def draw_by_time(figure, cycles, measured):
-    """Gap by the time from the outage's start, by squares and by innovations."""
+    """Draw the gap by time since the outage's start, from squares and from innovations."""
     panels = figure.subplots(1, 2, sharey=True)
     since = np.concatenate([m["time"] - c[0] - LEAD for c, m in zip(cycles, measured, strict=True)])
     edges = np.arange(-LEAD, PERIOD - LEAD + 1, 7.5)
@@ -70,7 +70,7 @@ def draw_by_time(figure, cycles, measured):
 
 
 def draw_by_outage(figure, r):
-    """Gap of each outage before and after, with what chance makes of it."""
+    """Draw the gap of each outage before and after, with its range by chance."""
     axes = figure.subplots()
     place = np.arange(len(r["cycles"]))
     for aside, key, band, color, label in (

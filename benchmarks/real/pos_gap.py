@@ -1,13 +1,13 @@
-"""The gap between a simulated and a REAL POS error: where it lies, which it is, how far it shrinks.
+"""The gap between a simulated and a REAL POS error: its place, its cause, and its closure.
 
     python benchmarks/real/pos_gap.py [--windows N] [--layouts N] [--seed S] [--out FOLDER]
                                     [--picture FILE.png]
 
 Real are the drive (GNSS_RTK.pos) and the error of a MEMS GNSS/INS on it (OB_GINS_TXT.err of
 i2Nav-WHU/OB_GINS), from which GNSS was withheld 60 s in every 150 s. The error series is the
-observation: surveyed targets beside the real drive are seen where that error puts them. Targets,
-their survey and their extraction are simulated. Believed is a POS of that grade that never loses
-GNSS; the diagnosis isn't told of the outages. Without the two files it says so and ends.
+observation: surveyed targets along the real drive are displaced by that error. Targets, their
+survey and their extraction are simulated. The assumed POS is of that grade and never loses GNSS;
+the diagnosis has no knowledge of the outages. Without the two files the script ends with a message.
 """
 
 import argparse
@@ -82,7 +82,7 @@ def parse():
 
 
 def plain(believed):
-    """What is believed of the POS, in m, deg and s."""
+    """Assumptions about the POS, in m, deg and s."""
     return {
         "position_sigma": believed.position_sigma,
         "attitude_sigma_deg": np.degrees(believed.attitude_sigma).tolist(),
@@ -91,7 +91,7 @@ def plain(believed):
 
 
 def named_over(kinds, told, believed, arguments):
-    """How often each label is named, by kind of window, over several layouts of targets."""
+    """Counts of each label by kind of window, over several layouts of targets."""
     counts = {kind: Counter(told[s].verdict.label for s in spans) for kind, spans in kinds.items()}
     for number in range(1, arguments.layouts):
         rng = np.random.default_rng([arguments.seed, number])
@@ -132,7 +132,7 @@ def show(r):
 
 
 def show_whole(r):
-    """What holds of all outages together, as text."""
+    """The results for all outages together, as text."""
     m = r["medians"]
     print(
         f"median over {len(r['cycles'])} outages: gap {interval(m['before'])} -> "

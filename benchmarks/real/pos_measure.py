@@ -1,4 +1,4 @@
-"""The gap of each window: diagnosed, measured before and after, and summed up."""
+"""The gap of each window: diagnosed, measured before and after, and summarized."""
 
 import numpy as np
 from pos_drive import (
@@ -23,15 +23,15 @@ RESAMPLED = 2000  # for bootstrap intervals
 
 
 def diagnosed(rows, survey, rng, replicas=REPLICAS):
-    """Inference of a window: nothing here knows of the outages."""
+    """Inference of a window, without any knowledge of the outages."""
     signs, _ = signatures(rows, survey)
     return infer_causes(rows, background(rows, survey), survey, signs, rng, replicas)
 
 
 def terms(rows, survey, rng=None, replicas=REPLICAS):
-    """What a survey's beliefs don't predict of its n residuals: time, sigma^2 (u^2 - 1) of the
+    """Unpredicted parts of a survey's n residuals: time, sigma^2 (u^2 - 1) of the
     innovations, square of the residual less its variance, log likelihood, and with rng the means
-    of the second of replicas in which the beliefs are right. Units: m^2."""
+    of the second of replicas in which the assumptions are correct. Units: m^2."""
     observed = Observations.of(rows, background(rows, survey))
     whitener = observed.whitener()
     residual = observed.columns(rows.residual[:, None])
@@ -85,7 +85,7 @@ def measure(cycles, rows, one, models, rng, replicas=REPLICAS):
 
 
 def simulated_gaps(one, cycles, believed, seed):
-    """Gap (d, c), in mm, of simulated drives with outages, told by the same belief."""
+    """Gap (d, c), in mm, of simulated drives with outages, by the same assumption."""
     found = []
     for number in range(DRAWS):
         error = simulate_pos(one, BELIEF, [seed, 100 + number], one.outages)
@@ -97,7 +97,7 @@ def simulated_gaps(one, cycles, believed, seed):
 
 
 def verdict_of(one, span, inference):
-    """What one window's diagnosis says, plain."""
+    """Plain summary of one window's diagnosis."""
     cause = inference.causes[0]
     told = inference.verdict
     bursts = [[b[0], b[0] + b[1], b[2]] for b in cause.model.windows]
@@ -119,7 +119,7 @@ def verdict_of(one, span, inference):
 
 
 def within(one, believed, measured, models):
-    """Share of the real errors (E, N, H) within 2 sigma: as believed, and with outages."""
+    """Share of the real errors (E, N, H) within 2 sigma: as assumed, and with outages."""
     before = []
     after = []
     for m in measured:
@@ -150,7 +150,7 @@ def what_stays(one, measured, models):
 
 
 def summary(cycles, told, measured, rng):
-    """Numbers of each cycle and of all, plain."""
+    """Numbers of each cycle and of all cycles."""
     rows = [_of_cycle(s, told[s].verdict, m) for s, m in zip(cycles, measured, strict=True)]
     kinds = ("before", "after", "plain", "left")
     total = {k: np.concatenate([m[k] for m in measured]) for k in (*kinds, "lost")}
@@ -216,7 +216,7 @@ def median_with_interval(values, rng):
 
 
 def shrunk(before, after):
-    """Share of the gap's square that is gone; a gap below zero is left, too."""
+    """Share of the squared gap that is removed; a gap below zero counts as remaining."""
     if before > 0:
         return float(1 - abs(after) / before)
     return float("nan")

@@ -1,4 +1,4 @@
-"""The page of pos_gap.py: what it says, and its tables."""
+"""The page of pos_gap.py: its text and its tables."""
 
 import numpy as np
 from page import counted, picture, words, write_page
@@ -44,7 +44,7 @@ def interval(values, factor=1):
 
 
 def windows_told(row):
-    """Windows that were found, from the first GNSS loss of the data's notes on."""
+    """Number of windows found, from the first GNSS loss in the notes of the data on."""
     return ", ".join(f"{a - FIRST:.0f} to {b - FIRST:.0f} s" for a, b, _ in row["windows"]) or "-"
 
 
@@ -55,18 +55,18 @@ def percent(value):
 
 
 def setting_told(settings):
-    """A simulated POS in words."""
+    """Describe a simulated POS."""
     with_wheels = "with" if settings["odometer"] else "without"
     return f"{settings['grade']}, {with_wheels} odometer, {settings['processing']}"
 
 
 def most_chosen(measured):
-    """Number of the settings that were chosen most often."""
+    """Index of the settings that were chosen most often."""
     return int(np.bincount([m["chosen"] for m in measured]).argmax())
 
 
 def write(out, one, r, cycles, measured, believed, models):
-    """Pictures and the page; returns its path."""
+    """Write pictures and the page; return its path."""
     sigmas = models[most_chosen(measured)]
     drawn = picture(out / "errors.png", draw_errors, (7.6, 5.6), one, believed, sigmas, cycles)
     by_time = picture(out / "gap_by_time.png", draw_by_time, (7.6, 3.4), cycles, measured)
@@ -84,7 +84,7 @@ def write(out, one, r, cycles, measured, believed, models):
 
 
 def headline(r):
-    """Sentences for the top."""
+    """Sentences for the top of the page."""
     pairs = [p for p in r["pairs"] if "position_noise" in p["verdict"].split("+")]
     count = r["named"].get("two outages", {})
     lost = r["all"]["inside"]
@@ -116,7 +116,7 @@ def headline(r):
 
 
 def errors(r, drawn):
-    """What the real error is, beside both beliefs."""
+    """Section on the real error, compared with both models."""
     return {
         "title": "The real error against what the simulator states",
         "text": [
@@ -138,7 +138,7 @@ def errors(r, drawn):
 
 
 def where(r, by_time):
-    """When the gap opens."""
+    """Section on the times at which the gap opens."""
     return {
         "title": "Where",
         "text": [
@@ -166,7 +166,7 @@ def where(r, by_time):
 
 
 def which(r):
-    """What the diagnosis says."""
+    """Section on the result of the diagnosis."""
     return {
         "title": "Which",
         "text": [
@@ -255,7 +255,7 @@ def quiet_table(r):
 
 
 def shrinking(r, by_outage):
-    """How far the gap shrinks once the simulator is told of the outages."""
+    """Section on the closure of the gap once the simulator knows of the outages."""
     head = (
         "outage from (s)",
         "before (mm)",
@@ -326,7 +326,7 @@ def shrinking_told(r):
 
 
 def stays_told(r):
-    """What the simulator with outages still doesn't tell, as a paragraph."""
+    """Remaining differences from the simulator with outages, as a paragraph."""
     return (
         "What stays: in the outages the real errors are {:.1f}, {:.1f} and {:.1f} times the "
         "simulated sigma in E, N and H (RMS). Height ends above the truth in {} of {} outages (by "

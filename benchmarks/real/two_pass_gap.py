@@ -1,12 +1,12 @@
-"""Why two REAL passes of a UAV scanner don't meet: the mounting first, then what it leaves.
+"""Causes of the misfit between two REAL passes of a UAV scanner: the mounting, then the rest.
 
     python benchmarks/real/two_pass_gap.py [--seed S] [--out FOLDER] [--picture FILE.png]
 
 Real are the points, the sensor's positions and attitudes, and so the misfit of planes that both
 passes of a car and of a tent saw (coin-or/Gravity, LANL LA-UR-20-28196). These data were not
 corrected for boresight: planes of both passes give it, and the misfit is measured on planes of
-other squares of the ground. What is left then is diagnosed against a simulator that believes in
-its sensors. Without the points it says so and ends.
+other squares of the ground. The remaining misfit is diagnosed against a simulator that trusts its
+sensors. Without the points the script ends with a message.
 """
 
 import argparse
@@ -46,7 +46,7 @@ AXES = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # right, 
 BEAM = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]])  # turns about forward
 STEP = 0.005  # s between epochs: the attitude is given with each point
 BELIEVED_SCANNER = Scanner(0.02, np.radians(0.01), 10.0)  # Velodyne HDL-32E: 2 cm, 0.01 deg, 10 Hz
-# What our simulator's MEMS unit states with GNSS; 2 cm as RTK does.
+# Sigmas of our simulator's MEMS unit with GNSS; 2 cm as for RTK.
 BELIEVED_POS = Pos(0.02, np.radians([0.0136, 0.0136, 0.10]))
 # held-out planes, by squares of the ground (m)
 FOLDS = 4
@@ -56,7 +56,7 @@ CHANCE = 100  # replicas for the p-value
 
 @dataclass(frozen=True)
 class Scene:
-    """A scene: Survey, points (PointCloud), how far they are from where their pose puts them."""
+    """A scene: Survey, points (PointCloud), and their distances from those given by their poses."""
 
     survey: Survey
     cloud: PointCloud
@@ -137,7 +137,7 @@ def scene(name):
 
 
 def _epochs(time, place, attitude):
-    """Times, positions and attitudes of one pass in even steps, from those of its points."""
+    """Times, positions and attitudes of one pass at even steps, from those of its points."""
     _, first = np.unique(time, return_index=True)
     time = time[first]
     place = place[first]
@@ -149,7 +149,7 @@ def _epochs(time, place, attitude):
 
 
 def study(scene, rng, folds=FOLDS, chance=CHANCE):
-    """All numbers of a scene and its points as calibrated, or None where nothing was seen twice."""
+    """All numbers of a scene and its calibrated points, or None without a common plane."""
     survey = scene.survey
     collector = FeatureCollector(survey)
     collector.add(survey.clouds[0], scene.cloud)
@@ -178,7 +178,7 @@ def study(scene, rng, folds=FOLDS, chance=CHANCE):
 
 
 def misfit(survey, mounting, ties):
-    """How far (n,) both views of ties are apart under another mounting. Units: m."""
+    """Distances (n,) between both views of ties under another mounting. Units: m."""
     time = ties.gps_time.ravel()
     beam = to_scanner(survey.trajectory, survey.mounting, ties.place.reshape(-1, 3), time)
     place = georeference(survey.trajectory, mounting, beam, time).reshape(-1, 2, 3)
@@ -186,7 +186,7 @@ def misfit(survey, mounting, ties):
 
 
 def remounted(scene, mounting):
-    """The scene as another mounting gives it."""
+    """The scene under another mounting."""
     survey = scene.survey
     time = scene.cloud.gps_time
     beam = to_scanner(survey.trajectory, survey.mounting, scene.cloud.xyz, time)
@@ -196,7 +196,7 @@ def remounted(scene, mounting):
 
 
 def left(scene, rng, chance):
-    """What the diagnosis says of planes of both passes, plain; None where there are none."""
+    """Summary of the diagnosis of planes common to both passes; None if there are none."""
     patches = find_patches(scene.survey, chunks=lambda file: [scene.cloud])
     if patches is None:
         rows = None
@@ -218,7 +218,7 @@ def left(scene, rng, chance):
 
 
 def _folds(ties, folds):
-    """Which ties (n,) are held out together: squares of the ground in turn, a list of bool."""
+    """Folds of held-out ties: squares of the ground in turn, a list of bool masks (n,)."""
     place = ties.place[:, 0, :2] - ties.place[:, 0, :2].min(axis=0)
     square = np.floor(place / SQUARE).astype(int)
     number = (square[:, 0] + 2 * square[:, 1]) % folds

@@ -1,4 +1,4 @@
-"""The page of two_pass_gap.py: what it says, its pictures and tables."""
+"""The page of two_pass_gap.py: its text, pictures and tables."""
 
 import numpy as np
 from page import picture, words, write_page
@@ -43,7 +43,7 @@ REAL = [
 
 
 def write(out, scenes, result, turned):
-    """Pictures and the page; turned are the points with the boresight taken out."""
+    """Write pictures and the page; turned are the points after correction of the boresight."""
     parts = [
         {
             "title": name,
@@ -84,7 +84,7 @@ def pictures(out, name, scene, r, xyz):
 
 
 def tables(r):
-    """The boresight, and what the planes of the calibrated cloud may still be explained by."""
+    """Tables of the boresight, and of possible causes in the planes of the calibrated cloud."""
     turned = zip(AXES, r["boresight"], r["sigma"], strict=True)
     rows = [(f"turned about {axis}", f"{v:.3f} deg", f"{s:.3f} deg") for axis, v, s in turned]
     causes = [] if r["left"] is None else r["left"]["causes"]
@@ -114,7 +114,7 @@ def medians(r):
 
 
 def headline(name, r):
-    """What came out of a scene, in a sentence."""
+    """The result of a scene, in a sentence."""
     before, after = medians(r)
     return (
         f"{name}: the boresight is off by {turns(r)}. The misfit of {before:.0f} mm falls to "
@@ -143,7 +143,7 @@ def paragraphs(r):
 
 
 def draw_misfit(figure, r):
-    """Misfit of each plane before and after."""
+    """Draw the misfit of each plane before and after."""
     axes = figure.subplots()
     before = np.array(r["before"])
     after = np.array(r["after"])
@@ -158,7 +158,7 @@ def draw_misfit(figure, r):
 
 
 def draw_slice(figure, scene, xyz, r):
-    """A slice across the drive through both passes, before and after."""
+    """Draw a slice across the drive through both passes, before and after."""
     panels = figure.subplots(1, 2, sharex=True, sharey=True)
     first = scene.passes == 0
     moment = np.array([scene.cloud.gps_time[first].mean()])

@@ -1,9 +1,9 @@
-"""What a correction by collocation is measured against: anything with apply(cloud) will do.
+"""Baselines for comparison with collocation: anything with apply(cloud) works.
 
-The first kind moves the cloud as one body and knows nothing of time: shift, transformation, rigid,
-affine and, in ``mlscorr.baselines.registration``, ICP. The second kind follows time: a polynomial
-per axis, interpolation between control points, a Gaussian process, and the collocation as Mao et
-al. 2015 printed it.
+The first kind moves the cloud as one body, independent of time: shift, transformation, rigid,
+affine and, in ``mlscorr.baselines.registration``, ICP. The second kind varies with time: a
+polynomial per axis, interpolation between control points, a Gaussian process, and the collocation
+as printed by Mao et al. 2015.
 """
 
 from mlscorr.baselines.interpolation import (

@@ -1,4 +1,4 @@
-"""Numbers that the baselines rest on."""
+"""Settings of the baselines."""
 
 from dataclasses import dataclass
 
@@ -11,10 +11,10 @@ class Settings:
     interval_ratio: float = 4.0  # correlation time over control interval: 3 to 5, section 3.1.4
     plane_tolerance: float = 0.03  # m; several sigmas of range noise, less than a frame's depth
     spacing: float = 0.02  # m; between points of a surveyed surface: a fifth of a small target
-    inlier: float = 0.05  # m; beyond it from a surveyed surface a corrected target is still wrong
+    inlier: float = 0.05  # m; a corrected target farther from its surveyed surface is wrong
     poor_fitness: float = 0.5  # share; with fewer inliers no rigid motion fits the targets
-    icp_iterations: int = 200  # ICP from metres away takes more than Open3D's default of 30
-    worsening: float = 0.001  # m; of control RMSE: less is within the targets' own noise
+    icp_iterations: int = 200  # ICP from meters away takes more than Open3D's default of 30
+    worsening: float = 0.001  # m; of control RMSE: less is within the targets' noise
 
 
 SETTINGS = Settings()

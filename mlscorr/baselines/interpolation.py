@@ -1,8 +1,8 @@
-"""Corrections that follow time without a model of the POS.
+"""Corrections that vary with time, without a model of the POS.
 
-As practitioners do it: straight lines or monotone cubics between control points, the same within
-each stretch between the fall-backs of the POS, and a Gaussian process with a stationary covariance.
-As in the paper: polynomials (LS-n), and LSC-n as it is printed.
+As used in practice: straight lines or monotone cubics between control points, the same within each
+segment between re-acquisitions, and a Gaussian process with a stationary covariance. As in the
+paper: polynomials (LS-n), and LSC-n as printed.
 """
 
 import warnings
@@ -23,45 +23,45 @@ Curve = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 
 
 def fit_linear(trajectory: Trajectory, matched: Matched, cut: bool = False) -> Correction:
-    """Straight lines between control epochs, and constants beyond the first and the last one.
+    """Fit straight lines between control epochs, and constants before the first and after the last.
 
     Parameters
     ----------
     trajectory : Trajectory
-        As recorded.
+        Recorded trajectory.
     matched : Matched
         Observed control points.
     cut : bool
-        Whether each stretch between steps of the path has lines of its own.
+        True for separate lines in each segment between steps of the path.
 
     Raises
     ------
     Undetermined
-        Without any control point.
+        If there are no control points.
     """
     return _fit(trajectory, matched, _linear, cut)
 
 
 def fit_pchip(trajectory: Trajectory, matched: Matched) -> Correction:
-    """Monotone cubics between control epochs (Fritsch and Butland 1984), constants beyond them.
+    """Fit monotone cubics between control epochs (Fritsch and Butland 1984), constants outside.
 
     Parameters
     ----------
     trajectory : Trajectory
-        As recorded.
+        Recorded trajectory.
     matched : Matched
         Observed control points.
 
     Raises
     ------
     Undetermined
-        Without any control point.
+        If there are no control points.
     """
     return _fit(trajectory, matched, _pchip, cut=False)
 
 
 def _fit(trajectory, matched, curve: Curve, cut):
-    """The position error of each stretch by a curve through its control epochs."""
+    """Position error of each segment, from a curve through its control epochs."""
     epochs, misclosure = _by_epoch(matched)
     if cut:
         restarts = drift_history(trajectory).steps.middle
@@ -69,7 +69,7 @@ def _fit(trajectory, matched, curve: Curve, cut):
         restarts = np.empty(0)
     of_epoch = np.searchsorted(restarts, epochs)
     of_time = np.searchsorted(restarts, trajectory.gps_time)
-    error = curve(epochs, misclosure, trajectory.gps_time)  # for stretches without control
+    error = curve(epochs, misclosure, trajectory.gps_time)  # for segments without control
     for stretch in np.unique(of_epoch):
         inside = of_epoch == stretch
         rows = of_time == stretch
@@ -78,7 +78,7 @@ def _fit(trajectory, matched, curve: Curve, cut):
 
 
 def _by_epoch(matched):
-    """Control epochs (k,), and the mean misclosure (k, 3) of the targets seen at each."""
+    """Control epochs (k,), and the mean misclosure (k, 3) of the targets observed at each."""
     if len(matched) == 0:
         raise Undetermined("There is no control point in the cloud to interpolate between.")
     starts = control_epochs(matched.gps_time)
@@ -100,24 +100,24 @@ def _pchip(epochs, misclosure, gps_time):
 
 
 def _correction(trajectory, error):
-    """The trajectory less a position error (n, 3), as a Correction."""
+    """Correction of the trajectory by minus a position error (n, 3)."""
     return Correction.by_pose_error(trajectory, np.hstack([error, np.zeros_like(error)]))
 
 
 def fit_gaussian_process(trajectory: Trajectory, matched: Matched) -> Correction:
-    """scikit-learn's Gaussian process per axis: Matern 3/2 and white noise, by likelihood.
+    """Fit scikit-learn's Gaussian process per axis: Matern 3/2 and white noise, by likelihood.
 
     Parameters
     ----------
     trajectory : Trajectory
-        As recorded.
+        Recorded trajectory.
     matched : Matched
         Observed control points.
 
     Raises
     ------
     Undetermined
-        For control points at fewer than 3 epochs.
+        If control points have fewer than 3 epochs.
     """
     from sklearn.exceptions import ConvergenceWarning
     from sklearn.gaussian_process import GaussianProcessRegressor
@@ -133,7 +133,7 @@ def fit_gaussian_process(trajectory: Trajectory, matched: Matched) -> Correction
     first = epochs[0]
     error = np.zeros((len(trajectory), 3))
     for axis, values in enumerate(misclosure.T):
-        size = max(float(np.var(values)), 1e-6)  # m^2; a millimetre where all are the same
+        size = max(float(np.var(values)), 1e-6)  # m^2; a millimeter if all are equal
         kernel = ConstantKernel(size, (1e-4 * size, 1e4 * size)) * Matern(
             span / len(epochs), (span / 1e3, 1e2 * span), nu=1.5
         ) + WhiteKernel(0.01 * size, (1e-6 * size, 1e2 * size))
@@ -146,14 +146,14 @@ def fit_gaussian_process(trajectory: Trajectory, matched: Matched) -> Correction
 
 
 def fit_polynomial(trajectory: Trajectory, matched: Matched, order: int) -> Correction:
-    """LS-n: the position error as a polynomial of time per axis, and no signal  (Eq. 11).
+    """Fit LS-n: a polynomial of time per axis as position error, and no signal  (Eq. 11).
 
-    Outside the control span the polynomial runs on, as in the paper.
+    Outside the control span the polynomial is extrapolated, as in the paper.
 
     Parameters
     ----------
     trajectory : Trajectory
-        As recorded.
+        Recorded trajectory.
     matched : Matched
         Observed control points.
     order : int
@@ -161,7 +161,7 @@ def fit_polynomial(trajectory: Trajectory, matched: Matched, order: int) -> Corr
     Raises
     ------
     Undetermined
-        Unless more than order + 1 epochs see control.
+        If there are not more than order + 1 control epochs.
     """
     solved = _solve(matched, order, [])
     return Correction.by_pose_error(trajectory, _predict(solved, trajectory, matched, order))
@@ -170,20 +170,20 @@ def fit_polynomial(trajectory: Trajectory, matched: Matched, order: int) -> Corr
 def fit_literal(
     trajectory: Trajectory, matched: Matched, pos: Pos, order: int
 ) -> tuple[Correction, dict[str, object]]:
-    """LSC-n as it is printed: Eq. 13-15, a diagonal D_Lambda, C0 as a gain of the signal.
+    """Fit LSC-n as printed: Eq. 13-15, a diagonal D_Lambda, C0 as a gain of the signal.
 
-    D_Lambda holds the variances that the POS states (section 2.5), C0 is the same (section
-    3.1.3: what it is started with), and the correlation time is four times the control interval
-    (section 3.1.4). One C0 for all epochs presumes that the variance hardly changes, so it is
-    the mean over the control epochs; otherwise C0 over variance, the gain, would reach hundreds.
-    The paper then tuned both on what it was scored on; here nothing is.
+    D_Lambda contains the variances that the POS states (section 2.5), C0 has the same value (the
+    initial value of section 3.1.3), and the correlation time is four times the control interval
+    (section 3.1.4). A single C0 requires a nearly constant variance, so the mean over the control
+    epochs is used; otherwise the gain, C0 over variance, would reach hundreds. The paper then tuned
+    both on its check points; here nothing is tuned.
 
     Parameters
     ----------
     trajectory, matched, order
-        As for fit_polynomial.
+        See ``fit_polynomial``.
     pos : Pos
-        Beliefs, used where the trajectory has no sigmas.
+        Assumed accuracy, used if the trajectory has no sigmas.
 
     Returns
     -------
@@ -194,7 +194,7 @@ def fit_literal(
     Raises
     ------
     Undetermined
-        Unless more than order + 1 epochs see control.
+        If there are not more than order + 1 control epochs.
     """
     gps_time = matched.gps_time
     _require_epochs(gps_time, order)
@@ -210,7 +210,7 @@ def fit_literal(
 
 
 def _solve(matched, order, signals):
-    """Literal collocation of the misclosures; without signals least squares."""
+    """Literal collocation of the misclosures, or least squares without signals."""
     gps_time = matched.gps_time
     _require_epochs(gps_time, order)
     survey = matched.surveyed.sigma[:, :, None] ** 2 * np.eye(3)

@@ -1,4 +1,4 @@
-"""Pairs of observed and surveyed places, and whether they determine what is asked of them."""
+"""Pairs of observed and surveyed positions, and tests of whether they determine a method."""
 
 from __future__ import annotations
 
@@ -9,27 +9,29 @@ import numpy as np
 from mlscorr.baselines._settings import SETTINGS
 from mlscorr.survey import Matched
 
-SHAPES = ("point", "line", "plane")  # that targets must not all lie on, by dimensions less one
+SHAPES = ("point", "line", "plane")  # that targets must not all be on, by dimensions minus one
 
 
 class Undetermined(ValueError):
-    """The control points can't determine a method's parameters; the sentence tells why."""
+    """Error: the control points do not determine a method's parameters; the message explains
+    why.
+    """
 
 
 @dataclass(frozen=True)
 class CentredPairs:
-    """Observed and surveyed places about an origin.
+    """Observed and surveyed positions relative to an origin.
 
     Parameters
     ----------
     origin : (3,) array
         Units: m.
     observed, misclosure : (n, 3) array
-        Place about the origin, and surveyed - observed. Units: m.
+        Position relative to the origin, and surveyed - observed. Units: m.
     sigma : (n,) array
-        Of each pair. Units: m.
+        Sigma of each pair. Units: m.
     targets : int
-        How many different targets they are; passes over one add none.
+        Number of different targets; repeated passes do not count.
     """
 
     origin: np.ndarray
@@ -40,7 +42,9 @@ class CentredPairs:
 
     @classmethod
     def of(cls, matched: Matched) -> CentredPairs:
-        """The pairs of matched observations, about their weighted mean; Undetermined for none."""
+        """Make the pairs of matched observations, about their weighted mean; Undetermined for
+        none.
+        """
         if len(matched) == 0:
             raise Undetermined(
                 "A transformation needs control points that were found in the cloud; there is none."
@@ -60,7 +64,7 @@ class CentredPairs:
 
     @property
     def weight(self) -> np.ndarray:
-        """Weights (n, 1) of sum one."""
+        """Weights (n, 1) with sum one."""
         weight = 1.0 / self.sigma**2
         return (weight / weight.sum())[:, None]
 
@@ -70,18 +74,18 @@ class CentredPairs:
         return np.sum(self.weight * self.misclosure, axis=0)
 
     def require(self, dimensions: int, smallest: int, parameters: str, axes: int = 3) -> None:
-        """Refuse places that don't fill so many dimensions.
+        """Refuse positions that span too few dimensions.
 
         Parameters
         ----------
         dimensions : int
-            1: they are apart; 2: not on one line; 3: not on one plane.
+            1: not at one point; 2: not on one line; 3: not on one plane.
         smallest : int
             Number of targets.
         parameters : str
-            What they shall determine, for the sentence.
+            Parameters to determine, for the message.
         axes : int
-            How many of the first axes count.
+            Number of leading axes to use.
 
         Raises
         ------
@@ -105,7 +109,7 @@ class CentredPairs:
             )
 
     def spread(self, axes: int = 3) -> np.ndarray:
-        """RMS extents of the places along their principal axes, longest first. Units: m."""
+        """RMS extents of the positions along their principal axes, longest first. Units: m."""
         extents = np.zeros(axes)
         weighted = np.sqrt(self.weight) * self.observed[:, :axes]
         singular = np.linalg.svd(weighted, compute_uv=False)

@@ -1,4 +1,4 @@
-"""ICP: the targets' own points against the surfaces that were surveyed, with no names given."""
+"""ICP of the targets' points to the surveyed surfaces, without names."""
 
 import warnings
 from dataclasses import dataclass, field
@@ -16,16 +16,17 @@ from mlscorr.wording import percent
 
 @dataclass(frozen=True)
 class Registration(Transformation):
-    """The motion that ICP found, and how well it fits.
+    """Motion found by ICP, and its fit.
 
     Parameters
     ----------
     variant : str
-        ``point-to-point`` or ``point-to-plane``, whichever leaves less at the control points.
+        ``point-to-point`` or ``point-to-plane``, whichever has smaller residuals at the control
+        points.
     fitness : float
         Share of the targets' points within 0.05 m of a surveyed surface.
     inlier_rmse : float
-        Of their distances. Units: m.
+        RMS of their distances. Units: m.
     control_before, control_after : float
         3D RMSE of the control points' misclosures. Units: m.
     """
@@ -38,14 +39,14 @@ class Registration(Transformation):
 
 
 def fit_icp(matched: Matched, cloud: PointCloud, pass_number: np.ndarray) -> Registration:
-    """Rigid motion by iterative closest points, of the targets' points to the surveyed surfaces.
+    """Fit a rigid motion by iterative closest points, from targets' points to surveyed surfaces.
 
-    A surveyed surface is a disc or plate of the target's kind and size at the surveyed centre and
-    normal (the observed one where none was surveyed). Partners are sought coarse to fine: within
-    twice the largest misclosure of a control point first, then within half of that, down to 0.05 m.
-    Each distance starts from the motion of the one before, by point-to-point, and by point-to-plane
-    from there. Of all these motions the one with the smallest RMSE at the control points is taken:
-    where the POS drifts, a small distance fits a part of the targets alone.
+    A surveyed surface is a disc or plate of the target's kind and size at the surveyed center and
+    normal (the observed one if none was surveyed). Partners are searched coarse to fine: first
+    within twice the largest misclosure of a control point, then within half of that, down to 0.05
+    m. Each distance starts from the motion of the previous one, by point-to-point, followed by
+    point-to-plane. The motion with the smallest RMSE at the control points is returned, because
+    with POS drift, a small distance fits only some of the targets.
 
     Parameters
     ----------
@@ -59,7 +60,7 @@ def fit_icp(matched: Matched, cloud: PointCloud, pass_number: np.ndarray) -> Reg
     Returns
     -------
     Registration
-        Warns where few points fit or the control points fit worse than before.
+        Warns if few points fit, or if the control points fit worse than before.
 
     Raises
     ------
@@ -91,7 +92,7 @@ def fit_icp(matched: Matched, cloud: PointCloud, pass_number: np.ndarray) -> Reg
 
 
 def _motions(source, surface, largest):
-    """Variant and 4 x 4 matrix of the ICP of each kind within each distance, coarse to fine."""
+    """Yield variant and 4 x 4 matrix of each kind of ICP within each distance, coarse to fine."""
     motions = []
     point = np.eye(4)
     within = largest
@@ -112,7 +113,7 @@ def _control_rmse(pairs, matrix):
 
 
 def _warn(registration):
-    """Say aloud what makes the registration doubtful."""
+    """Warn of a doubtful registration."""
     variant = registration.variant
     fitness = registration.fitness
     if fitness < SETTINGS.poor_fitness:
@@ -132,7 +133,7 @@ def _warn(registration):
 
 
 def _register(source, surface, largest, start, estimation):
-    """The 4 x 4 matrix of one ICP; points farther than the largest distance are no partners."""
+    """4 x 4 matrix of one ICP; points farther than the largest distance are not paired."""
     icp = open3d.pipelines.registration
     return icp.registration_icp(
         source,
@@ -145,7 +146,7 @@ def _register(source, surface, largest, start, estimation):
 
 
 def _surfaces(matched, cloud, pass_number, origin):
-    """The targets' points and the surveyed surfaces about the origin, as Open3D clouds."""
+    """Targets' points and surveyed surfaces relative to the origin, as Open3D clouds."""
     tree = cKDTree(cloud.xyz)
     source = []
     surface = []
@@ -174,7 +175,7 @@ def _as_open3d(points, normals=None):
 
 
 def _axes(normal):
-    """Two axes in a plane and its normal, as rows (3, 3); the first is level where it can be."""
+    """Two axes in a plane and its normal, as rows (3, 3); the first is horizontal if possible."""
     up = [0.0, 0.0, 1.0]
     if abs(normal[2]) >= 0.9:
         up = [0.0, 1.0, 0.0]
@@ -184,7 +185,9 @@ def _axes(normal):
 
 
 def _points_on(observations, i, axes, tree, cloud, pass_number):
-    """Bright points (n, 2) of one target in its plane, about its observed centre. Units: m."""
+    """Bright points (n, 2) of one target in its plane, relative to its observed center. Units:
+    m.
+    """
     size = observations.size[i]
     radius = size / 2
     if observations.kind[i] != "circle":
@@ -195,12 +198,12 @@ def _points_on(observations, i, axes, tree, cloud, pass_number):
     on_plane = np.abs(local[:, 2]) < SETTINGS.plane_tolerance
     local = local[on_plane, :2]
     intensity = cloud.intensity[rows[on_plane]]
-    core = np.linalg.norm(local, axis=1) < size / 3  # inside of any outline
+    core = np.linalg.norm(local, axis=1) < size / 3  # inside any outline
     return local[intensity >= 0.5 * (np.median(intensity[core]) if core.any() else 0.0)]
 
 
 def _outline(kind, size, local):
-    """Grid (n, 2) over a disc, or over a plate that is turned as the target's points are."""
+    """Grid (n, 2) over a disc, or over a plate oriented like the target's points."""
     half = np.arange(0.0, size / 2 + 1e-9, SETTINGS.spacing)
     line = np.concatenate([-half[:0:-1], half])
     grid = np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2)
@@ -212,5 +215,5 @@ def _outline(kind, size, local):
     directions = np.stack([np.cos(turn), np.sin(turn)])
     across = np.stack([-np.sin(turn), np.cos(turn)])
     area = np.ptp(local @ directions, axis=0) * np.ptp(local @ across, axis=0)
-    best = int(np.argmin(area))  # the smallest rectangle about the points
+    best = int(np.argmin(area))  # smallest rectangle around the points
     return grid @ np.stack([directions[:, best], across[:, best]])

@@ -1,7 +1,7 @@
 """Corrections that move the whole cloud as one: shift, transformation, rigid, affine.
 
-All are fitted by weighted least squares to the misclosures of control points, about a local
-origin. Passes and times are not told apart, which is what these methods lack.
+All are fitted by weighted least squares to the misclosures of control points, about a local origin.
+Passes and times are not separated, which is the limit of these methods.
 """
 
 from dataclasses import dataclass, replace
@@ -15,7 +15,7 @@ from mlscorr.survey import Matched, PointCloud
 
 @dataclass(frozen=True)
 class Transformation:
-    """x' = x + shift + change (x - origin): 12 parameters at most.
+    """Transformation x' = x + shift + change (x - origin) with up to 12 parameters.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ class Transformation:
     shift : (3,) array
         At the origin. Units: m.
     change : (3, 3) array
-        Matrix of the transformation less the identity, which keeps its small digits.
+        Matrix of the transformation minus the identity, which preserves small digits.
 
     >>> from mlscorr.survey import PointCloud
     >>> cloud = PointCloud(np.array([[523000.0, 3378000.0, 20.0]]), np.zeros(1), np.zeros(1))
@@ -38,16 +38,16 @@ class Transformation:
     change: np.ndarray
 
     def apply(self, cloud: PointCloud) -> PointCloud:
-        """The PointCloud, transformed."""
+        """Return the transformed PointCloud."""
         increments = self.shift + (cloud.xyz - self.origin) @ self.change.T
         return replace(cloud, xyz=cloud.xyz + increments)
 
 
-RAW = Transformation(np.zeros(3), np.zeros(3), np.zeros((3, 3)))  # the cloud as it was recorded
+RAW = Transformation(np.zeros(3), np.zeros(3), np.zeros((3, 3)))  # the recorded cloud
 
 
 def fit_shift(matched: Matched) -> Transformation:
-    """Transformation by the weighted mean misclosure: 3 parameters.
+    """Fit a shift by the weighted mean misclosure: 3 parameters.
 
     Parameters
     ----------
@@ -59,11 +59,11 @@ def fit_shift(matched: Matched) -> Transformation:
 
 
 def fit_horizontal_and_height(matched: Matched) -> Transformation:
-    """Transformation with plan and height solved apart (Mao et al. 2015, section 3.1.5).
+    """Fit plan and height separately (Mao et al. 2015, section 3.1.5).
 
-    The paper tells only that the two are solved individually. Here, as is usual, the plan has the
-    4 parameters of a similarity (shift, turn, scale), and the height 3 of an inclined plane, or a
-    mean shift alone where fewer than 4 targets, or targets on a line, would have to incline it.
+    The paper states only that the two are solved individually. Here, as usual, the plan has the 4
+    parameters of a similarity (shift, rotation, scale), and the height the 3 of an inclined plane,
+    or only a mean shift with fewer than 4 targets or with targets on a line.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def fit_horizontal_and_height(matched: Matched) -> Transformation:
     Raises
     ------
     Undetermined
-        Where the targets do not lie apart in plan.
+        If all targets have the same position in plan.
     """
     pairs = CentredPairs.of(matched)
     pairs.require(1, 2, "The 4 parameters in plan", axes=2)
@@ -94,7 +94,7 @@ def fit_horizontal_and_height(matched: Matched) -> Transformation:
 
 
 def fit_rigid(matched: Matched) -> Transformation:
-    """Rigid motion: 6 parameters (Helmert without scale), its turn by Kabsch's algorithm.
+    """Fit a rigid motion: 6 parameters (Helmert without scale), rotation by Kabsch's algorithm.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def fit_rigid(matched: Matched) -> Transformation:
 
 
 def fit_affine(matched: Matched) -> Transformation:
-    """Affine transformation: 12 parameters.
+    """Fit an affine transformation: 12 parameters.
 
     Parameters
     ----------

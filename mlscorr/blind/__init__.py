@@ -1,4 +1,4 @@
-"""The harness that grades the diagnosis on surveys with sealed labels."""
+"""Blind check of the diagnosis on surveys with sealed labels."""
 
 from mlscorr.blind._mix import mix
 from mlscorr.blind.cases import make_case, outside_mechanisms

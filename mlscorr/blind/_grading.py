@@ -1,8 +1,8 @@
-"""The mechanisms that grade a diagnosis: nothing that trains or sets anything may open them."""
+"""Mechanisms that grade a diagnosis; training and settings must not use them."""
 
 from mlscorr.simulate import Mechanism, mechanisms
 
 
 def grading_mechanisms() -> tuple[Mechanism, ...]:
-    """The half of the grammar on which nothing is set."""
+    """Return the half of the grammar that is reserved for grading."""
     return tuple(each for each in mechanisms() if not each.is_for_training)

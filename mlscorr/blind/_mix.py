@@ -1,4 +1,4 @@
-"""What is wrong with each survey of a blind check: of which kind, which effects, of what size."""
+"""Causes in the surveys of a blind check: kinds, effects, and sizes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,8 +11,8 @@ from mlscorr.effects import known_effects
 
 @dataclass(frozen=True)
 class Case:
-    """What one survey should have: kind, names of effects or of a mechanism, size, and names to
-    take instead where the geometry doesn't show one. The library lacks ``without``.
+    """Specification of one survey: kind, names of effects or of a mechanism, size, and
+    alternative names if the geometry does not show one. The library is without ``without``.
     """
 
     kind: str
@@ -22,7 +22,7 @@ class Case:
 
 
 def mix(cases: int, rng: np.random.Generator, mechanisms: Sequence[str] = ()) -> list[Case]:
-    """Draw cases in random order; names of one kind come in turn, so that all are there alike.
+    """Draw cases in random order; names of one kind alternate, so that all are equally frequent.
 
     Parameters
     ----------
@@ -43,12 +43,12 @@ def mix(cases: int, rng: np.random.Generator, mechanisms: Sequence[str] = ()) ->
 
 
 def causes(is_random: bool = False) -> tuple[str, ...]:
-    """Names of the effects that a case may have: the library's, and those that were registered.
+    """Names of the effects for cases: those of the library, and registered ones.
 
     Parameters
     ----------
     is_random : bool
-        Whether they are noise.
+        True for noise effects.
     """
     kinds = known_effects()
     if is_random:
@@ -72,19 +72,19 @@ def _case(kind, turns, rng):
             sizes = SETTINGS.noise_mdb
         mdb = float(rng.uniform(*sizes))
     without = str(rng.choice([name for name in causes() if name not in names]))
-    if kind == "withheld":  # it is drawn all the same: cases after it stay what they were
+    if kind == "withheld":  # drawn in any case, so that later cases do not change
         without = names[0]
     return Case(kind, names, mdb, without)
 
 
 def _turns(names, rng):
-    """Names without end, each once before any comes again."""
+    """Endless names, each once before any repetition."""
     while names:
         yield from map(str, rng.permutation(names))
 
 
 def _whole(total, shares):
-    """Whole numbers of a total in proportion to shares, by the largest remainders."""
+    """Integers of a given total in proportion to shares, by the largest remainders."""
     exact = total * np.array(list(shares.values())) / sum(shares.values())
     whole = exact.astype(int)
     whole[np.argsort(whole - exact, kind="stable")[: total - whole.sum()]] += 1

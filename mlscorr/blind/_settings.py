@@ -1,4 +1,4 @@
-"""What the blind check is made of: shares, sizes and limits, with the reason of each number."""
+"""Settings of the blind check: shares, sizes and limits, with the reason of each number."""
 
 from dataclasses import dataclass
 
@@ -15,17 +15,18 @@ class Settings:
         ("withheld", 0.17),  # a single effect that the library lacks
         ("outside", 0.10),  # a mechanism that no library knows
     )
-    # of the cases: none without effects is rare in practice, so a wrong alarm there costs most
+    # of the cases: surveys without effects are frequent in practice, so a false alarm there costs
+    # most
     single_sizes: tuple[tuple[float, float], ...] = (
         *((0.75, 0.08), (1.5, 0.08), (2.0, 0.27), (3.0, 0.27), (4.0, 0.1), (5.0, 0.1), (8.0, 0.1)),
     )
     # MDB of single effects, and their shares: goals are set at 2 and at 3
     clear_sizes: tuple[float, float] = (3.0, 6.0)
-    # MDB, of pairs, withheld ones and mechanisms: what a diagnosis should not miss
+    # MDB, of pairs, withheld ones and mechanisms: sizes that a diagnosis should find
     noise_mdb: tuple[float, float] = (2.0, 8.0)
     # MDB of noise, whose information grows with the square of its size
     unlikeness: float = 0.5
-    # squared correlation below which another effect is wrongly named
+    # squared correlation below which naming another effect is wrong
 
 
 SETTINGS = Settings()

@@ -25,24 +25,24 @@ def make_case(
     find_targets: Callable,
     mechanisms: Path | None = None,
 ) -> dict:
-    """Write the survey of a Case into a folder, without its truth; returns its label.
+    """Write the survey of a Case into a folder, without its truth; return its label.
 
     Parameters
     ----------
     folder : Path
-        Made here; its name is the survey's.
+        New folder with the name of the survey.
     case : Case
     entropy : tuple of int
-        The same gives the same bytes and label.
+        The same entropy gives the same bytes and label.
     find_targets : function
-        From a Survey to its Finding, as the diagnosis has it.
+        From a Survey to its Finding, as in the diagnosis.
     mechanisms : Path, optional
-        File with MECHANISMS, LEADS and UNITS; those that grade by default.
+        File with MECHANISMS, LEADS and UNITS; by default those for grading.
 
     Raises
     ------
     ValueError
-        When no survey can be made that shows what the case should have.
+        If no survey can be made that shows the case.
     """
     for number in range(ATTEMPTS):
         try:
@@ -65,7 +65,7 @@ def make_case(
 
 
 def _drawn(name, case, entropy, find_targets, mechanisms):
-    """Label and SimulatedSurvey of one try; the label is None when nothing shows."""
+    """Label and SimulatedSurvey of one attempt; the label is None if nothing is visible."""
     from mlscorr.simulate import DisplacedSurvey, random_survey
 
     survey = random_survey((*entropy, 0), name)
@@ -120,7 +120,7 @@ def _drawn(name, case, entropy, find_targets, mechanisms):
 
 
 def _ruler(survey, find_targets):
-    """Ruler of a survey without effects, as a diagnosis would read it."""
+    """Ruler of a survey without effects, as read by a diagnosis."""
     with tempfile.TemporaryDirectory() as place:
         survey.write(Path(place) / "survey")
         read = read_survey(Path(place) / "survey")
@@ -131,7 +131,7 @@ def _ruler(survey, find_targets):
 
 
 def _of_effects(drawn):
-    """The part of a label that tells of effects."""
+    """Part of a label on effects."""
     effects = [(sized, like, sized.effect.name) for sized, like in drawn]
     return {
         "names": [name for *_, name in effects],
@@ -144,7 +144,7 @@ def _of_effects(drawn):
 
 
 def outside_mechanisms(path: Path | None = None) -> Described:
-    """Functions, units and leads of mechanisms by name: those that grade, or those of a file.
+    """Functions, units and hints of mechanisms by name: those for grading, or those of a file.
 
     Parameters
     ----------
@@ -154,9 +154,9 @@ def outside_mechanisms(path: Path | None = None) -> Described:
     Raises
     ------
     ValueError
-        When one of them is missing.
+        If one of them is missing.
     FileNotFoundError
-        When the file is.
+        If the file is missing.
     """
     if path is None:
         return described(grading_mechanisms())

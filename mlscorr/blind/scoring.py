@@ -1,4 +1,4 @@
-"""How often a diagnosis was right: answers against labels, with intervals and goals."""
+"""Score of a diagnosis: answers compared with labels, with intervals and goals."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from mlscorr.gap.evidence import calibration_error
 
 @dataclass(frozen=True)
 class AnsweredCase:
-    """One case: its label and what the diagnosis said.
+    """One case: its label and the answer of the diagnosis.
 
     Parameters
     ----------
     name : str
     label : dict
-        As make_case gives it.
+        From make_case.
     answer : dict
         {"document": gap.json} or {"error": text}.
     """
@@ -32,12 +32,12 @@ class AnsweredCase:
 
     @property
     def document(self) -> dict | None:
-        """That of gap.json; None of a diagnosis that failed."""
+        """Document of gap.json; None for a failed diagnosis."""
         return self.answer.get("document")
 
     @property
     def verdict(self) -> dict:
-        """The verdict; of a diagnosis that failed a label that is never right."""
+        """Verdict; for a failed diagnosis a label that is never right."""
         failed = {"label": "failed", "probability": 1.0, "set": [], "p_value": None, "lead": ""}
         if self.document:
             return self.document["verdict"]
@@ -45,12 +45,12 @@ class AnsweredCase:
 
     @property
     def named(self) -> str:
-        """The label that was named."""
+        """Named label."""
         return self.verdict["label"]
 
     @property
     def kind(self) -> str:
-        """That of the case."""
+        """Kind of the case."""
         return self.label["kind"]
 
     @property
@@ -60,17 +60,17 @@ class AnsweredCase:
 
     @property
     def goal_size(self) -> float:
-        """The size to the nearest half, at which goals are set."""
+        """Size rounded to the nearest half, for which goals are set."""
         return round(2 * self.mdb) / 2
 
     @property
     def is_clear(self) -> bool:
-        """Whether its size is three or more."""
+        """True if its size is three or more."""
         return round(self.mdb, 2) >= 3
 
     @property
     def truth(self) -> str:
-        """The label that is right."""
+        """Correct label."""
         mechanism = self.label["mechanism"]
         if mechanism:
             return mechanism["name"]
@@ -78,23 +78,23 @@ class AnsweredCase:
 
     @property
     def is_noise(self) -> bool:
-        """Whether none, or nothing but noise, was said to be there."""
+        """True if the answer is none, or nothing but noise."""
         return set(self.named.split("+")) <= {"none", *causes(is_random=True)}
 
     @property
     def is_only_noise(self) -> bool:
-        """Whether noise and nothing else was named."""
+        """True if only noise was named."""
         return self.is_noise and self.named != "none"
 
     @property
     def resemblance(self) -> float:
-        """Largest squared correlation of the truth with what was named."""
+        """Largest squared correlation of the truth with the named cause."""
         like = next(iter(self.label["likeness"].values()), {})
         return max(like.get(name, 0.0) for name in self.named.split("+"))
 
     @property
     def is_right(self) -> bool:
-        """Whether the answer is what an honest diagnosis should say."""
+        """True if the answer is correct for an honest diagnosis."""
         if self.kind == "outside":
             return self.named == "unknown"
         if self.kind == "withheld":
@@ -104,19 +104,19 @@ class AnsweredCase:
 
     @property
     def leads(self) -> bool:
-        """Whether the lead has one of the words of each entry."""
+        """True if the hint has one of the words of each entry."""
         lead = self.verdict["lead"]
         entries = self.label["mechanism"]["lead"]
         return all(any(word in lead for word in entry.split("|")) for entry in entries)
 
     def names(self, label: str, by_class: bool = False) -> bool:
-        """Whether a label is the truth.
+        """Return True if a label is the truth.
 
         Parameters
         ----------
         label : str
         by_class : bool
-            Also what the geometry can't tell from it.
+            True to accept labels that the geometry cannot separate from it.
         """
         parts = label.split("+")
         truth = self.label["names"] or ["none"]
@@ -132,7 +132,7 @@ class AnsweredCase:
 
 
 def score(cases: dict[str, tuple[dict, dict]]) -> dict:
-    """Rates, figures and wrong cases of a blind check.
+    """Compute rates, figures and wrong cases of a blind check.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def score(cases: dict[str, tuple[dict, dict]]) -> dict:
     -------
     score : dict
         ``rows``, each with name, cases, value, interval[2], goal[2] and reached; ``wrong``, cases
-        not named rightly; ``failed``, sentences of diagnoses that gave up.
+        with a wrong name; ``failed``, messages of failed diagnoses.
     """
     answered = [AnsweredCase(name, *case) for name, case in sorted(cases.items())]
     rows = [row for row in (*_rates(answered), *_figures(answered)) if row is not None]
@@ -199,7 +199,7 @@ def _rates(answered):
 
 
 def _alarms(clean):
-    """Rows of surveys in which nothing acts."""
+    """Rows of surveys without effects."""
     yield _share("clean: a cause claimed", [not case.is_noise for case in clean], maximum=0.02)
     for sky in ("open", "bad"):
         alarms = [not case.is_noise for case in clean if case.label.get("sky") == sky]
@@ -208,7 +208,7 @@ def _alarms(clean):
 
 
 def _figures(answered):
-    """Rows that are no shares: of them the interval is a bootstrap's."""
+    """Rows of figures that are not shares, with bootstrap intervals."""
     single = [case for case in answered if case.kind == "single"]
     clear = [case for case in single if case.is_clear]
     sizes = [len(case.verdict["set"]) for case in single if case.goal_size >= 2]
@@ -239,7 +239,7 @@ def _share(name, hits, minimum=None, maximum=None):
 
 
 def _figure(name, values, statistic, minimum=None, maximum=None):
-    """Row of what is no share; its interval is a bootstrap's."""
+    """Row of a figure that is not a share, with a bootstrap interval."""
     if not values:
         return None
     values = np.array(values, dtype=float)
@@ -275,8 +275,8 @@ def _row(name, cases, value, interval, minimum, maximum):
 
 
 def _closed(case):
-    """Share of the gap that closed on held-out data, zero where nothing was found; None where the
-    gap was within chance before.
+    """Share of the gap closed on held-out data, zero without a cause; None if the gap before
+    was within chance.
     """
     if case.document:
         return case.document["closure"]["shrink"]
@@ -284,7 +284,7 @@ def _closed(case):
 
 
 def _estimates(case):
-    """Estimated parameters of the named cause by name, or None where the truth wasn't named."""
+    """Estimated parameters of the named cause by name, or None if the truth was not named."""
     if case.document is None or not case.names(case.named):
         return None
     cause = next((c for c in case.document["causes"] if c["effect"] == case.named), None)
@@ -294,7 +294,7 @@ def _estimates(case):
 
 
 def _inside(case):
-    """For each parameter, whether its 95 % interval holds the truth."""
+    """Flag for each parameter if its 95 % interval contains the truth."""
     estimates = _estimates(case)
     true = case.label["parameters"]
     if estimates is None:
@@ -307,7 +307,7 @@ def _inside(case):
 
 
 def _error(case):
-    """Error of the magnitudes over their size, in the metric of what the rows show."""
+    """Error of the magnitudes over their size, in the metric of the rows."""
     estimates = _estimates(case)
     true = case.label["parameters"][case.named]
     true = {name: value for name, value in true.items() if name not in ("time", "width")}
@@ -320,7 +320,7 @@ def _error(case):
 
 
 def _wrong(case):
-    """A case to learn from."""
+    """Wrong case, for analysis."""
     return {
         "case": case.name,
         "kind": case.kind,

@@ -1,4 +1,4 @@
-"""The commands: read, call, write; nothing else. What they do is told by pipeline."""
+"""Commands: reading, calling the pipeline, and writing; nothing else."""
 
 import logging
 import os
@@ -13,7 +13,7 @@ from mlscorr.cli.blind import blind
 from mlscorr.cli.project import STATUS_EXAMPLES, status
 from mlscorr.cli.terminal import as_epilog, deafen, listen, warn
 
-COMMANDS = (  # a module each, in the order of the overview
+COMMANDS = (  # one module each, in the order of the overview
     *("init", "check", "correct", "extract", "ties", "calibrate", "compare", "render", "demo"),
     *("simulate", "diagnose", "apply", "plan", "doctor"),
 )
@@ -49,8 +49,8 @@ def options(
 def main() -> None:
     """Entry point of the command line."""
     listen()
-    os.environ["RUST_BACKTRACE"] = "0"  # of a decoder that meets a damaged file
-    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # of a home without room for its cache
+    os.environ["RUST_BACKTRACE"] = "0"  # of a decoder with a damaged file
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # of a home without space for its cache
     warnings.showwarning = lambda message, *_, **__: warn(f"Warning: {message}")
     try:
         app()

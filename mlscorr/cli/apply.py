@@ -1,4 +1,4 @@
-"""The command that takes out of a survey what was found wrong with it."""
+"""Command that removes known errors from a survey."""
 
 from typing import Annotated
 

@@ -1,4 +1,4 @@
-"""The commands that check the diagnosis blindly: make surveys, diagnose them, score."""
+"""Commands for a blind check of the diagnosis: make surveys, diagnose, score."""
 
 from pathlib import Path
 from typing import Annotated

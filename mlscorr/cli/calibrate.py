@@ -1,4 +1,4 @@
-"""The command that calibrates the mounting of a scanner."""
+"""Command that calibrates the mounting of a scanner."""
 
 from typing import Annotated
 
@@ -61,16 +61,18 @@ def calibrate(
 
 
 def _tell_estimates(content):
-    """What one scanner's mounting lacks, and what that does to its targets."""
+    """Print the corrections of one scanner's mounting, and their effect on its targets."""
     methods = {"LSC": content["lsc"], "LS": content["ls"]}
-    if not content["ls"]["control"]["n"]:  # it takes nothing but control
+    if not content["ls"]["control"]["n"]:  # it uses only control
         del methods["LS"]
     _tell_mounting(content, methods)
     _tell_misclosures(content, methods)
 
 
 def _tell_mounting(content, methods):
-    """Recorded mounting, what it lacks by each method, and what the site determines."""
+    """Print the recorded mounting, its corrections by each method, and the determined
+    components.
+    """
     titles = "".join(f"{title:>9s}{'sigma':>8s}" for title in methods)
     say(f"{'What the recorded mounting lacks':34s}{titles}  determined")
     for start, part, unit in ((0, "lever_arm", "m"), (3, "boresight", "deg")):

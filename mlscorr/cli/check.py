@@ -1,4 +1,4 @@
-"""The command that tells what is wrong with a survey before it is corrected."""
+"""Command that reports the faults of a survey before its correction."""
 
 from __future__ import annotations
 
@@ -67,13 +67,13 @@ def say_checked(checked: CheckedSurvey, with_amounts: bool = True) -> None:
 
 
 def _list(title: str, lines: Sequence[str]) -> None:
-    """Say some lines below a title, where there are any."""
+    """Print lines below a title, if there are any."""
     if lines:
         say("\n".join([title, *(f"  {line}" for line in lines)]))
 
 
 def _amount(amount):
-    """An Amount in one line."""
+    """Format an Amount in one line."""
     if amount.number >= 10 or amount.number == int(amount.number):
         digits = 0
     else:
@@ -83,7 +83,7 @@ def _amount(amount):
 
 
 def check_first(survey: Path) -> None:
-    """Check a survey before the work, and end with what was found where there is a fault.
+    """Check a survey before the work, and end with the result if there is a fault.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def check_first(survey: Path) -> None:
     Raises
     ------
     typer.Exit
-        As say_checked.
+        See say_checked.
     """
     checked = _checked(survey)
     say_checked(checked, with_amounts=False)
@@ -101,7 +101,7 @@ def check_first(survey: Path) -> None:
 
 
 def _checked(survey):
-    """What a check says of a survey or project."""
+    """Check a survey or project."""
     with exit_code(Exit.BAD_DATA), progress_bars() as progress:
         from mlscorr.io.surveys import is_project
 
@@ -123,7 +123,7 @@ def say_dry_run(
     chosen: Mapping[str, Collection[str]] | None = None,
     overwrite: bool = False,
 ) -> None:
-    """Say what a correction would read and write, and what is wrong with its inputs.
+    """Print inputs, outputs and faults of a correction without running it.
 
     Parameters
     ----------
@@ -132,15 +132,15 @@ def say_dry_run(
     out : Path
         Folder of the results.
     written : sequence of str
-        Names of the files in it; none of a project.
+        Names of the files in it; empty for a project.
     chosen : mapping, optional
-        Names that are to be excluded and included.
+        Names to exclude and include.
     overwrite : bool
 
     Raises
     ------
     typer.Exit
-        As say_checked.
+        See say_checked.
     """
     with exit_code(Exit.USAGE):
         from mlscorr.io.store import check_output
@@ -172,7 +172,7 @@ def _check_choice(survey, chosen):
 
 
 def _with_size(file):
-    """A file with its size, unless it is a URL."""
+    """Name of a file with its size, unless it is a URL."""
     from mlscorr.io.store import is_remote
 
     if is_remote(file):

@@ -1,4 +1,4 @@
-"""The command that compares all methods on one survey, or two results of it."""
+"""Command that compares all methods on one survey, or two of its results."""
 
 from pathlib import Path
 from typing import Annotated
@@ -11,7 +11,7 @@ from mlscorr.cli.folders import chosen_out
 from mlscorr.cli.progress import progress_bars
 from mlscorr.cli.work import print_json, work
 
-RESULT_FILES = ("report.json", "trajectory.csv")  # that are read of a result
+RESULT_FILES = ("report.json", "trajectory.csv")  # files read from a result
 
 EXAMPLES = (
     "mlscorr compare survey.toml",
@@ -92,7 +92,7 @@ def compare(
 
 
 def _check_arguments(survey, second, clouds, exclude):
-    """Refuse what is neither one survey nor two results."""
+    """Refuse arguments that are neither one survey nor two results."""
     from mlscorr.pipeline import is_result
 
     if second is None:
@@ -115,7 +115,7 @@ def _check_arguments(survey, second, clouds, exclude):
 
 
 def _compare_results(first, second, out, overwrite, as_json):
-    """Compare two results, and write what was found where a folder is given."""
+    """Compare two results, and write the differences if a folder is given."""
     if out is None:
         with terminal.exit_code(terminal.Exit.BAD_DATA):
             result = mlscorr.compare_results(first, second)
@@ -135,7 +135,7 @@ def _compare_results(first, second, out, overwrite, as_json):
 
 
 def _tell(report, out):
-    """What stands first, the table of scores, and where the results lie."""
+    """Print the first screen, the table of scores, and the location of the results."""
     by = report["scored_by"]
     terminal.say_statements(report["statements"])
     terminal.say(f"{'RMSE (m)':16s}{'E':>8s}{'N':>8s}{'H':>8s}{'3D':>9s}{'fit, 3D':>9s}")

@@ -1,4 +1,4 @@
-"""The command that corrects a survey."""
+"""Command that corrects a survey."""
 
 from __future__ import annotations
 
@@ -203,13 +203,13 @@ def correct(
 
 
 def _corrected(survey, out, overwrite, order, ties, chosen, settings):
-    """The report of a survey that was corrected, once all results are written."""
+    """Report of a corrected survey, after all results are written."""
     from mlscorr.io.clouds import Additions, read_layout, with_additions
     from mlscorr.io.trajectories import check_exports, check_target_exports
 
     with work(out, overwrite, survey) as progress:
         recorded = mlscorr.read_survey(survey).choosing(**chosen)
-        if "survey_toml" in settings:  # which is the name that stays
+        if "survey_toml" in settings:  # this name is kept
             recorded = replace(recorded, path=out / survey.name)
         for sentence in recorded.layouts:
             terminal.say(sentence)
@@ -217,7 +217,7 @@ def _corrected(survey, out, overwrite, order, ties, chosen, settings):
         check_target_exports(settings["targets"], recorded.crs, is_read=True)
         added = Additions(settings["sigma"], settings["displacement"])
         for cloud in recorded.cloud_paths if added.has_fields else ():
-            with_additions(read_layout(cloud), added)  # refuses one that has them, before the work
+            with_additions(read_layout(cloud), added)  # refuses existing ones before the work
         result = mlscorr.correct(recorded, order, progress=progress, ties=ties)
         return result.write(out, overwrite, progress, **settings)
 
@@ -249,7 +249,7 @@ def tell(
     pdf: bool = False,
     worst_first: bool = False,
 ) -> None:
-    """Say what stands first in the report, the RMSE of misclosures, and where the results lie.
+    """Print the report's first screen, the RMSE of misclosures, and the results' location.
 
     Parameters
     ----------
@@ -258,13 +258,13 @@ def tell(
     out : Path
         Folder of the results.
     as_json : bool
-        Whether to print the report on stdout.
+        True to print the report on stdout.
     page : bool
-        Whether report.html was written.
+        True if report.html was written.
     pdf : bool
-        Whether certificate.pdf was written.
+        True if certificate.pdf was written.
     worst_first : bool
-        Whether to print the residual of each point, too.
+        True to print the residual of each point.
     """
     from mlscorr.report import tie_sentences
 
@@ -292,12 +292,13 @@ def tell(
 
 
 def say_residuals(targets: list[dict]) -> None:
-    """Print the residual of each observation, the largest first, and points without one at last.
+    """Print the residual of each observation, the largest first, and points without one last.
 
     Parameters
     ----------
     targets : list of dict
-        Of report.json. That of a control point is leave-one-out, as its own fit is no test.
+        Rows of report.json. For control points they are leave-one-out, because the fit is not a
+        test.
     """
     rows = []
     for row in targets:

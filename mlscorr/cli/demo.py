@@ -1,4 +1,4 @@
-"""The command that a new user runs first."""
+"""Command for new users."""
 
 from pathlib import Path
 from typing import Annotated

@@ -1,4 +1,4 @@
-"""The command that diagnoses the gap between a survey and its simulation."""
+"""Command that diagnoses the gap between a survey and its simulation."""
 
 from pathlib import Path
 from typing import Annotated
@@ -97,7 +97,7 @@ def diagnose(
 
 
 def _costs(text):
-    """Costs by the name of an operating point, or of three numbers."""
+    """Costs from the name of an operating point, or from three numbers."""
     from mlscorr.gap.evidence import OPERATING_POINTS, Costs
 
     if text in OPERATING_POINTS:
@@ -115,7 +115,7 @@ def _costs(text):
 
 
 def _tell(content):
-    """What stands first, and what to do."""
+    """Print the first screen, and the advice."""
     for sentence in content["warnings"]:
         terminal.warn(f"Warning: {sentence}")
     terminal.say_statements(content["statements"])
@@ -126,7 +126,7 @@ def _tell(content):
 
 
 def _tell_rounds(ablation):
-    """The gap with each effect by itself, and after each round."""
+    """Print the gap with each single effect, and after each round."""
     from mlscorr.effects import title
 
     terminal.say(f"{'In the simulator':34s}{'gap before':>12s}{'after':>10s}")

@@ -1,4 +1,4 @@
-"""The command that tells what is missing."""
+"""Command that reports missing components."""
 
 import typer
 

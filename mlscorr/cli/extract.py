@@ -1,4 +1,4 @@
-"""The command that lists target-like objects."""
+"""Command that lists target-like objects."""
 
 import mlscorr
 from mlscorr.cli.folders import chosen_out

@@ -1,4 +1,4 @@
-"""Folders of results: beside the input by default, and a folder of files as a survey."""
+"""Folders of results, by default next to the input, and folders of files as surveys."""
 
 from __future__ import annotations
 
@@ -12,23 +12,24 @@ from mlscorr.cli.terminal import Exit, exit_code, say
 
 
 def chosen_out(out: Path | None, source: Path, command: str, is_by_name: bool = False) -> Path:
-    """The folder for the results; by default FOLDER-COMMAND beside the FOLDER of the input.
+    """Return the folder for the results; by default FOLDER-COMMAND next to the input's FOLDER.
 
     Parameters
     ----------
     out : Path or None
-        As the user gives it.
+        Given by the user.
     source : Path
-        survey.toml or another file, or the folder that holds it.
+        survey.toml or another file, or its folder.
     command : str
         Name of the command.
     is_by_name : bool
-        Take the file's own name, as a folder may hold several, in place of its folder's.
+        True to use the file's own name instead of its folder's, because a folder may contain
+        several.
 
     Raises
     ------
     typer.Exit
-        Where the input is a URL, beside which nothing is written.
+        If the input is a URL, next to which nothing is written.
     """
     if out is not None:
         return out
@@ -48,7 +49,7 @@ def chosen_out(out: Path | None, source: Path, command: str, is_by_name: bool = 
 
 
 def has_toml(folder: Path) -> bool:
-    """Return True for a file, a URL, or a folder with any TOML file: nothing is inferred then.
+    """Return True for a file, a URL, or a folder with any TOML file, for which nothing is inferred.
 
     Parameters
     ----------
@@ -62,12 +63,13 @@ def has_toml(folder: Path) -> bool:
 
 
 class InferredSurvey(NamedTuple):
-    """The survey.toml that was made of a folder without one.
+    """survey.toml that was made for a folder without one.
 
     Attributes
     ----------
     path : Path
-        Of a temporary file, which is as far from the clouds as the one beside the results.
+        Path of a temporary file, in the same position relative to the clouds as the one with the
+        results.
     text : str
     """
 
@@ -77,14 +79,14 @@ class InferredSurvey(NamedTuple):
 
 @contextmanager
 def inferred_survey(folder: Path, out: Path | None) -> Iterator[InferredSurvey]:
-    """Make a survey.toml of the files in a folder, which stays as it is.
+    """Make a survey.toml of the files in a folder, without changing it.
 
     Parameters
     ----------
     folder : Path
     out : Path or None
-        Folder of the results, beside which the file is for the time being; None where nothing is
-        written, and it is in the system's temporary folder.
+        Folder of the results, next to which the temporary file is made; None to use the system's
+        temporary folder, if nothing is written.
 
     Yields
     ------
@@ -93,7 +95,7 @@ def inferred_survey(folder: Path, out: Path | None) -> Iterator[InferredSurvey]:
     Raises
     ------
     ValueError
-        Where files are missing or do not fit, or the user has to answer a question.
+        If files are missing or do not match, or the user has to answer a question.
     """
     import mlscorr
 

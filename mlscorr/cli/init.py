@@ -1,4 +1,4 @@
-"""The command that makes a survey.toml of what lies in a folder."""
+"""Command that makes a survey.toml for the files in a folder."""
 
 import json
 import tomllib
@@ -60,7 +60,7 @@ def init(
 
 
 def _document(given):
-    """Tables of lines such as control.size = 0.6; what is no value of TOML is text."""
+    """Tables of lines such as control.size = 0.6; values that are not TOML become text."""
     lines = []
     for line in given:
         key, _, value = line.partition("=")

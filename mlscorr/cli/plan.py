@@ -1,4 +1,4 @@
-"""The command that says what a survey will show before it is driven."""
+"""Command that predicts the results of a survey before it is driven."""
 
 import mlscorr
 from mlscorr.cli.folders import chosen_out

@@ -1,7 +1,8 @@
-"""Stages of a command on stderr: bars and spinners on a terminal, a line each elsewhere.
+"""Stages of a command on stderr: bars and spinners on a terminal, otherwise lines.
 
-A stage runs until the next one begins. One whose end is known has a bar and the time left; any
-other has a spinner and the time passed. A bar that is full before its stage ends becomes a spinner.
+A stage runs until the next one begins. With a known end it has a bar and the remaining time,
+otherwise a spinner and the elapsed time. A bar that is full before its stage ends becomes a
+spinner.
 """
 
 import logging
@@ -26,18 +27,18 @@ LOG = logging.getLogger(__name__)
 
 
 class Stages:
-    """Stages of a command, which take their turns; these say nothing and are logged alone.
+    """Consecutive stages of a command; this class displays nothing and only logs.
 
     Parameters
     ----------
     title : str
-        Of the stage that runs; empty before the first and after the last.
+        Title of the running stage; empty before the first and after the last.
     start : float
-        Of this stage, on the monotonic clock. Units: s.
+        Start of this stage, on the monotonic clock. Units: s.
     compiled : int
         Number of loops that were compiled.
     compiling : float
-        Time that took. Units: s.
+        Time for compilation. Units: s.
     """
 
     def __init__(self) -> None:
@@ -47,13 +48,13 @@ class Stages:
         self.compiling = 0.0
 
     def begin(self, title: str, total: int | None = None) -> Callable[[int], object]:
-        """End the stage that runs, and begin another.
+        """End the running stage, and begin another.
 
         Parameters
         ----------
         title : str
         total : int, optional
-            Number of points, or of what else is counted; None where the end is not known.
+            Number of points, or other units; None if unknown.
 
         Returns
         -------
@@ -65,7 +66,7 @@ class Stages:
         return self._shown(title, total)
 
     def end(self) -> None:
-        """End the stage that runs."""
+        """End the running stage."""
         if self.title:
             seconds = monotonic() - self.start
             LOG.info("%s: %.1f s", self.title, seconds)
@@ -73,29 +74,29 @@ class Stages:
         self.title = ""
 
     def compile(self, is_begun: bool, seconds: float = 0.0) -> None:
-        """Count a loop that is compiled.
+        """Count a compiled loop.
 
         Parameters
         ----------
         is_begun : bool
-            Or ended.
+            True at the beginning, False at the end.
         seconds : float
-            That it took.
+            Duration.
         """
         if not is_begun:
             self.compiled += 1
             self.compiling += seconds
 
     def _shown(self, _title: str, _total: int | None) -> Callable[[int], object]:
-        """Show that a stage has begun."""
+        """Display that a stage has begun."""
         return lambda _done: None
 
     def _ended(self, _seconds: float) -> None:
-        """Show that the stage has ended."""
+        """Display that the stage has ended."""
 
 
 class Lines(Stages):
-    """A line for each stage, at its end; a long one has a line every minute, too."""
+    """Line for each stage at its end; long stages also have a line every minute."""
 
     def _shown(self, title, total):
         done = 0
@@ -115,14 +116,14 @@ class Lines(Stages):
             say(f"{self.title}: {seconds:.1f} s")
 
     def compile(self, is_begun: bool, seconds: float = 0.0) -> None:
-        """Say once that loops are compiled."""
+        """Report once that loops are compiled."""
         if is_begun and not self.compiled and self.compiling == 0.0:
             say(f"{COMPILING.capitalize()} ...")
         super().compile(is_begun, seconds)
 
 
 class Bars(Stages):
-    """A bar or spinner for each stage on a terminal, redrawn several times a second.
+    """Bar or spinner for each stage on a terminal, redrawn several times per second.
 
     Parameters
     ----------
@@ -143,13 +144,13 @@ class Bars(Stages):
             done += number
             if total is None or done < total:
                 self.bars.update(task, completed=done)
-            else:  # work goes on, and nobody knows for how long
+            else:  # work continues for an unknown time
                 self._pulse(task)
 
         return advance
 
     def _pulse(self, task):
-        """Make a spinner of a bar; rich takes no total of None for a change."""
+        """Turn a bar into a spinner; rich does not accept a total of None for a change."""
         for row in self.bars.tasks:
             if row.id == task:
                 row.total = None
@@ -161,7 +162,7 @@ class Bars(Stages):
             self.bars.update(self.task, description=self.title, total=1, completed=1)
 
     def compile(self, is_begun: bool, seconds: float = 0.0) -> None:
-        """Name it beside the stage, as long as it takes."""
+        """Show compilation next to the stage while it lasts."""
         super().compile(is_begun, seconds)
         if self.title:
             words = f"{self.title}, {COMPILING}" if is_begun else self.title
@@ -170,17 +171,17 @@ class Bars(Stages):
 
 @contextmanager
 def progress_bars() -> Iterator[Progress]:
-    """Bars on a terminal, lines elsewhere, nothing for quick work or when asked to be quiet.
+    """Open bars on a terminal, otherwise lines; nothing for quick work or in quiet mode.
 
     Yields
     ------
     progress : function
-        progress(title, total) begins a stage, and gives a function of the number of points, or of
-        what else is counted, just done. Without a total the end is not known.
+        progress(title, total) begins a stage and returns a function of the number of points, or
+        other units, just done. Without a total, the end is unknown.
     """
     with _stages() as stages:
         start = monotonic()
-        stages.begin(LOADING)  # which takes seconds, before anything else can begin
+        stages.begin(LOADING)  # which takes seconds before anything else can begin
         try:
             with _compilations(stages):
                 yield stages.begin
@@ -198,7 +199,7 @@ def progress_bars() -> Iterator[Progress]:
 
 @contextmanager
 def _stages() -> Iterator[Stages]:
-    """Stages as stderr can show them."""
+    """Open the stages suitable for stderr."""
     if is_quiet():
         yield Stages()
     elif sys.stderr.isatty():
@@ -210,7 +211,7 @@ def _stages() -> Iterator[Stages]:
 
 @contextmanager
 def _compilations(stages: Stages) -> Iterator[None]:
-    """Tell stages of each loop that is compiled; loops within loops count once."""
+    """Report each compiled loop to stages; nested loops count once."""
     from numba.core.event import Listener, install_listener
 
     class Compilation(Listener):
@@ -241,12 +242,12 @@ def _is_shown(task: Any) -> bool:
 
 
 def _rich_bars() -> Any:
-    """Bars of rich: what is done, how far, for how long, how long still."""
+    """Make rich's bars: description, progress, elapsed and remaining time."""
     from rich import progress
     from rich.console import Console
 
     class Remaining(progress.ProgressColumn):
-        """The time left where it can be known."""
+        """Remaining time, if known."""
 
         def render(self, task):
             seconds = task.time_remaining
@@ -255,7 +256,7 @@ def _rich_bars() -> Any:
             return f"{int(seconds) // 60}:{int(seconds) % 60:02d} left"
 
     class Shown(progress.Progress):
-        """Those that take long enough to be read."""
+        """Tasks that last long enough to be read."""
 
         def get_renderables(self):
             yield self.make_tasks_table([task for task in self.tasks if _is_shown(task)])

@@ -1,4 +1,4 @@
-"""What commands do with a project of several drives, and the one that tells how far it is."""
+"""Commands on a project of several drives, and the one that shows its progress."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def correct_drives(
     as_json: bool,
     chosen: Mapping[str, Collection[str]],
 ) -> None:
-    """Correct all drives of a project and tell what became of them.
+    """Correct all drives of a project, and print the results.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def correct_drives(
     out : Path
     options : Options
     gates : list of Gate
-        Each drive has to pass them.
+        Gates that each drive must pass.
     as_json : bool
     chosen : mapping
         Names of control points to exclude and to include.
@@ -46,7 +46,7 @@ def correct_drives(
     Raises
     ------
     typer.Exit
-        Where something failed.
+        If something failed.
     """
     from mlscorr.evaluate import failures
     from mlscorr.io.surveys import read_project, stated_project
@@ -76,7 +76,7 @@ def correct_drives(
 
 
 def tell(statement: Statement) -> None:
-    """Say a statement on the way; warnings and failures in any case.
+    """Print a progress statement; warnings and failures even in quiet mode.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The command that draws pictures of a survey before and after its correction."""
+"""Command that draws pictures of a survey before and after its correction."""
 
 from enum import StrEnum
 from pathlib import Path
@@ -87,7 +87,7 @@ def render(
 
 
 def _read_size(text):
-    """Width and height of a text such as 1920x1080."""
+    """Width and height from a text such as 1920x1080."""
     from mlscorr.report.render import PictureOptions, check_pictures, panel_size
 
     width, times, height = text.lower().partition("x")

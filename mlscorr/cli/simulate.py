@@ -1,4 +1,4 @@
-"""The command that simulates a survey."""
+"""Command that simulates a survey."""
 
 from pathlib import Path
 from typing import Annotated

@@ -1,4 +1,4 @@
-"""What all commands share: options, exit codes, and sentences on stderr."""
+"""Shared parts of all commands: options, exit codes, and sentences on stderr."""
 
 import logging
 import os
@@ -14,27 +14,27 @@ from typing import Annotated
 
 import typer
 
-HANGUP = getattr(signal, "SIGHUP", None)  # Windows knows none
+HANGUP = getattr(signal, "SIGHUP", None)  # missing on Windows
 SIGNALS = tuple(filter(None, (signal.SIGINT, signal.SIGTERM, HANGUP)))
 REPEAT_AFTER = 1.0  # s until an interruption is repeated: libraries load faster
 MARKS = {"green": "  ", "amber": "! ", "red": "!!"}  # before a statement, by its rating
 _voice = {"quiet": False}  # of this process's stderr
-_repeats: list[threading.Timer] = []  # of interruptions, until one is heeded
+_repeats: list[threading.Timer] = []  # of interruptions, until one takes effect
 
 
 def be_quiet(context: typer.Context, quiet: bool) -> bool:
-    """Say nothing more than errors and warnings until the command ends, if so.
+    """Print only errors and warnings until the command ends, if requested.
 
     Parameters
     ----------
     context : typer.Context
-        Of the command.
+        Context of the command.
     quiet : bool
 
     Returns
     -------
     bool
-        The same.
+        The same value.
     """
     _voice["quiet"] = quiet
     context.call_on_close(lambda: _voice.update(quiet=False))
@@ -42,7 +42,7 @@ def be_quiet(context: typer.Context, quiet: bool) -> bool:
 
 
 def is_quiet() -> bool:
-    """Whether only errors and warnings are said."""
+    """Return True if only errors and warnings are printed."""
     return _voice["quiet"]
 
 
@@ -59,25 +59,25 @@ class _Voice(logging.Handler):
         self.start = monotonic()
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Print a record, unless the screen shows it in any case: warnings, times of stages."""
+        """Print a record, unless the screen shows it anyway: warnings, times of stages."""
         if record.levelno < logging.WARNING and record.name != "mlscorr.cli.progress":
             say(f"[{monotonic() - self.start:6.1f} s] {record.getMessage()}")
 
 
 def be_verbose(context: typer.Context, verbose: int) -> int:
-    """Print the log on stderr until the command ends, if so.
+    """Print the log on stderr until the command ends, if requested.
 
     Parameters
     ----------
     context : typer.Context
-        Of the command.
+        Context of the command.
     verbose : int
-        0: not; 1: what is found and decided, with the reasons; 2: details, too.
+        0: off; 1: findings and decisions, with reasons; 2: also details.
 
     Returns
     -------
     int
-        The same.
+        The same value.
     """
     if verbose:
         logger = logging.getLogger("mlscorr")
@@ -104,7 +104,7 @@ def know_effects(path: Path | None) -> Path | None:
     Returns
     -------
     Path or None
-        The same.
+        The same path.
     """
     if path is not None:
         with exit_code(Exit.USAGE):
@@ -144,7 +144,7 @@ Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on 
 
 
 def path_or_url(name: str) -> Path:
-    """The path of a name, or that of a URL; ends with a sentence where there can be none.
+    """Return the path of a name or URL; end with a message if it is invalid.
 
     Parameters
     ----------
@@ -179,7 +179,7 @@ Out = Annotated[
 
 
 def as_epilog(examples: Iterable[str]) -> str:
-    """Examples of a command, as they stand at the end of its --help, a line each.
+    """Format examples of a command for the end of its --help, one per line.
 
     Parameters
     ----------
@@ -202,12 +202,12 @@ class Exit(IntEnum):
 
 
 def interrupt(number: int, frame: object) -> None:
-    """Raise KeyboardInterrupt, and again after a second where a library swallowed it.
+    """Raise KeyboardInterrupt, and again after a second if a library swallowed it.
 
     Parameters
     ----------
     number : int
-        Of the signal.
+        Number of the signal.
     frame : object
 
     Raises
@@ -221,7 +221,7 @@ def interrupt(number: int, frame: object) -> None:
 
 
 def _interrupt_again():
-    """Send this process the signal of Ctrl-C; where the system has no such, to this thread."""
+    """Send this process the signal of Ctrl-C, or interrupt this thread if there is none."""
     if os.name == "posix":  # so that it wakes the main thread
         os.kill(os.getpid(), signal.SIGINT)
     else:
@@ -229,14 +229,14 @@ def _interrupt_again():
 
 
 def listen() -> None:
-    """End in order when the user, a scheduler or a closed terminal interrupts."""
+    """End cleanly if the user, a scheduler or a closed terminal interrupts."""
     for number in SIGNALS:
         if signal.getsignal(number) != signal.SIG_IGN or number != HANGUP:  # nohup
             signal.signal(number, interrupt)
 
 
 def deafen() -> None:
-    """Ignore interruptions from here on, where they were listened to: nothing is left to undo."""
+    """Ignore interruptions from here on, if they were handled, as nothing needs undoing."""
     for number in SIGNALS:
         if signal.getsignal(number) is interrupt:
             signal.signal(number, signal.SIG_IGN)
@@ -246,15 +246,14 @@ def deafen() -> None:
 
 @contextmanager
 def exit_code(code: Exit, has_results: Callable[[], bool | str] = lambda: False) -> Iterator[None]:
-    """End with one sentence and an exit code where the user's input or the system is at fault.
+    """End with one sentence and an exit code for faults of the user's input or the system.
 
     Parameters
     ----------
     code : Exit
         For a ValueError.
     has_results : function
-        Whether results stand already, or what is to be said of them; asked when an interruption
-        comes.
+        Returns True or a remark if there are results; called at an interruption.
 
     Raises
     ------
@@ -265,13 +264,13 @@ def exit_code(code: Exit, has_results: Callable[[], bool | str] = lambda: False)
     except KeyboardInterrupt:
         _stop(has_results())
     except (OSError, ImportError, ValueError, SystemError, MemoryError) as error:
-        if _repeats:  # a library made it of an interruption
+        if _repeats:  # a library made it from an interruption
             _stop(has_results())
         _tell(error, code)
 
 
 def _tell(error, code):
-    """Say what went wrong, and end with its exit code; that of a ValueError is given."""
+    """Print the error, and end with its exit code; that of a ValueError is given."""
     if isinstance(error, SystemError):
         raise error
     if isinstance(error, MemoryError):
@@ -288,7 +287,7 @@ def _tell(error, code):
 
 
 def _fail(message, code):
-    """Say what went wrong and end with an exit code."""
+    """Print a message and end with an exit code."""
     warn(f"Error: {message}")
     raise typer.Exit(code) from None
 
@@ -305,7 +304,7 @@ def _stop(has_results):
 
 
 def say(text: object) -> None:
-    """Print a sentence on stderr, unless it should be quiet.
+    """Print a sentence on stderr, unless in quiet mode.
 
     Parameters
     ----------
@@ -316,30 +315,30 @@ def say(text: object) -> None:
 
 
 def warn(text: object) -> None:
-    """Print a sentence on stderr in any case.
+    """Print a sentence on stderr even in quiet mode.
 
     Parameters
     ----------
     text : str
     """
     shown = "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in str(text))
-    print(shown, file=sys.stderr)  # names of files and points may hold what moves the cursor
+    print(shown, file=sys.stderr)  # names of files and points may contain control characters
 
 
 def end(failed: list[str], is_whole: bool) -> None:
-    """Name the quality gates that failed, and exit unless none did and all was corrected.
+    """List failed quality gates, and exit unless there are none and everything was corrected.
 
     Parameters
     ----------
     failed : list of str
         Sentences.
     is_whole : bool
-        Whether no point was left as it was.
+        True if every point was corrected.
 
     Raises
     ------
     typer.Exit
-        With the code of failed gates, or of results in part.
+        With the code of failed gates, or of partial results.
     """
     for sentence in failed:
         warn(f"Quality gate failed: {sentence}")
@@ -348,12 +347,12 @@ def end(failed: list[str], is_whole: bool) -> None:
 
 
 def say_statements(statements: list[dict]) -> None:
-    """Print the first screen of a document; what is red is said in any case.
+    """Print the first screen of a document; red rows even in quiet mode.
 
     Parameters
     ----------
     statements : list of dict
-        Warnings among them are left out: they were said when they arose.
+        Warnings among them are omitted, because they were printed when they arose.
     """
     for row in statements:
         if row["what"] == "Warnings":
@@ -365,7 +364,7 @@ def say_statements(statements: list[dict]) -> None:
 
 
 def say_results(results: Iterable[tuple[str, object]]) -> None:
-    """Print where the results of a command are, or what it did, below each other.
+    """Print the locations of a command's results, or its actions, one per line.
 
     Parameters
     ----------
@@ -383,9 +382,9 @@ def say_rmse(rows: Iterable[tuple[str, dict, str]], width: int, decimals: int) -
     Parameters
     ----------
     rows : iterable of (title, group, after)
-        A group of points as documents have it, and which of its states comes after ``before``.
+        A group of points as in documents, and the state to show after ``before``.
     width : int
-        Of the titles.
+        Width of the titles.
     decimals : int
     """
     heads = "".join(f"{f'E {when}':>11s}{'N':>8s}{'H':>8s}" for when in ("before", "after"))

@@ -1,4 +1,4 @@
-"""The command that finds what two passes both saw."""
+"""Command that finds tie features in overlaps."""
 
 import mlscorr
 from mlscorr.cli.folders import chosen_out

@@ -1,4 +1,4 @@
-"""What every command does around its own work: refuse what can't be meant, watch, print JSON."""
+"""Shared frame of all commands: argument checks, progress, JSON output."""
 
 import json
 import os
@@ -21,10 +21,10 @@ def work(
     inputs: Sequence[Path] = (),
     planned: bool = False,
 ) -> Iterator[Progress]:
-    """Check where results go, then show progress; bad data end with a sentence and their code.
+    """Check the output folder, then show progress; invalid data end with a message and their code.
 
-    Files that were in the folder before and that the command did not write anew are named at the
-    end: they may be results of an earlier run.
+    Older files in the folder that the command did not overwrite are listed at the end, because they
+    may be results of an earlier run.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def work(
     inputs : sequence of Path
         Further inputs.
     planned : bool
-        Whether the survey may have no cloud.
+        True if the survey may have no cloud.
 
     Yields
     ------
@@ -74,7 +74,7 @@ def work(
 
 @contextmanager
 def _noise_said():
-    """Say in the end how many points were left out as noise, where there were any."""
+    """Report the number of points omitted as noise, if any, at the end."""
     from mlscorr.io.clouds import counted_noise
 
     with counted_noise() as noise:
@@ -86,7 +86,7 @@ def _noise_said():
 
 
 def _entries(out):
-    """Names and numbers of the files in a folder, None without one: whether results were put in."""
+    """Names and states of the files in a folder, None without one, to detect new results."""
     if not out.is_dir():
         return None
     return {
@@ -97,7 +97,7 @@ def _entries(out):
 
 
 def _name_older(out, before):
-    """Name the files of a folder that are the same as before."""
+    """List the files of a folder that have not changed."""
     after = _entries(out) or {}
     older = sorted(name for name, number in before.items() if after.get(name) == number)
     if not older:
@@ -113,7 +113,7 @@ def _name_older(out, before):
 
 
 def print_json(content: dict, as_json: bool) -> None:
-    """Print a document on stdout, if asked to.
+    """Print a document on stdout, if requested.
 
     Parameters
     ----------

@@ -1,12 +1,12 @@
 """Least squares collocation: l = A x + B s + n  (Mao et al. 2015, Eq. 6 and 13-15).
 
 - model: trend, signals and noise, the least squares of the trend, and the result
-- any_rows: of observations of every kind, by that of the next two which suits them
+- any_rows: observations of every kind, by whichever of the next two suits them
 - markov: linear in observations and epochs, by recursion and interpolation between them
-- dense: the same by the formula written out, with work that grows as the observations cubed
-- linked: of rows that see two epochs and more, and errors that any number of them share
+- dense: the same by the explicit formula, with work that grows as the cube of the observations
+- linked: rows that depend on two or more epochs, and errors shared by any number of rows
 - whitening: V of scalar observations, factored once for thousands of columns
-- literal: the paper's own predictor, whose covariances don't fit each other
+- literal: the paper's own predictor, whose covariances are inconsistent
 """
 
 from mlscorr.collocation.any_rows import collocate_rows

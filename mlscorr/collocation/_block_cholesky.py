@@ -1,10 +1,10 @@
-"""Cholesky factor of a sparse symmetric matrix in blocks, and its inverse where the factor stands.
+"""Cholesky factor of a sparse symmetric block matrix, and its inverse in the blocks of the factor.
 
-For front j with the diagonal block L_jj and the blocks B below it, by the order of a Pattern:
+For front j with the diagonal block L_jj and the blocks B below it, in the order of a Pattern:
 
     A_jj = L_jj L_jj^T,   B = A_j L_jj^-T,   A_SS <- A_SS - B B^T,    S the nodes below
 
-and backward, with U = B L_jj^-1, those blocks of Z = A^-1 that stand where the factor has some:
+and backward, with U = B L_jj^-1, those blocks of Z = A^-1 that exist in the factor:
 
     Z_Sj = -Z_SS U,   Z_jj = L_jj^-T L_jj^-1 - U^T Z_Sj
 
@@ -12,8 +12,8 @@ Sources: Davis 2006, Direct Methods for Sparse Linear Systems, chapter 4; Liu, N
 SIAM J. Matrix Anal. Appl. 14, 242-252 (fronts); Takahashi, Fagan and Chin 1973 (selected inverse).
 
 CHOLMOD (scikit-sparse 0.5.0, supernodal part under the GPL) and SelInv (selinv 1.0.2) do the same,
-but neither has wheels: pip compiles both, and the first needs SuiteSparse installed. SuperLU, which
-scipy has, knows no inverse; ``benchmarks/bench_tie_solver.py`` measures it beside these loops.
+but neither has wheels: pip compiles both, and the first needs SuiteSparse installed. SuperLU in
+scipy has no selected inverse; ``benchmarks/bench_tie_solver.py`` compares it with these loops.
 """
 
 import numpy as np
@@ -21,14 +21,14 @@ import numpy as np
 from mlscorr.collocation._pattern import Pattern
 from mlscorr.compiled_loops import loop
 
-STRIP = 16  # columns of a panel factored by loops, a power of two; BLAS takes them to others
-# Products of smaller values are subnormal numbers, for which a processor takes 100 times as long
+STRIP = 16  # columns of a panel factored by loops, a power of two; BLAS does the rest
+# Products of smaller values are subnormal numbers, which a processor handles 100 times slower
 NOTHING = float(np.sqrt(np.finfo(float).tiny))
 
 
 @loop
 def _panel(pattern, values, front):
-    """Values (h, b) of a front's columns, the block on the diagonal first."""
+    """Values (h, b) of a front's columns, starting with the diagonal block."""
     begin = pattern.node[front]
     end = pattern.node[front + 1]
     width = pattern.first[end] - pattern.first[begin]
@@ -48,18 +48,18 @@ def _most_below(pattern):
 
 @loop
 def factorise(pattern: Pattern, values: np.ndarray) -> int:
-    """Cholesky factor of a matrix, in its place.
+    """Factor a matrix by Cholesky, in place.
 
     Parameters
     ----------
     pattern : Pattern
     values : (v,) array
-        Of the matrix, its lower triangle at least; of the factor in the end.
+        Input: the matrix, at least its lower triangle. Output: the factor.
 
     Returns
     -------
     state : int
-        The first that has no positive pivot, in the order of elimination; -1 if all have.
+        First state without a positive pivot, in the order of elimination; -1 if there is none.
     """
     room = np.empty(_most_below(pattern) ** 2)
     for front in range(pattern.start.size - 1):
@@ -81,7 +81,7 @@ def factorise(pattern: Pattern, values: np.ndarray) -> int:
 
 @loop
 def _run_end(pattern, front, k):
-    """End of the run of nodes below a front, from the k-th on, whose columns stand side by side."""
+    """End of the run of nodes below a front, from the k-th on, whose columns are adjacent."""
     row = pattern.row
     end = pattern.column[front + 1]
     target = pattern.front[row[k]]
@@ -93,7 +93,7 @@ def _run_end(pattern, front, k):
 
 @loop
 def _find_row(pattern, front, node, at):
-    """Row of a front's panel where a node begins, and where in ``row`` the next is looked for."""
+    """Row of a front's panel at which a node begins, and start of the next search in ``row``."""
     begin = pattern.node[front]
     end = pattern.node[front + 1]
     if node < end:
@@ -105,10 +105,10 @@ def _find_row(pattern, front, node, at):
 
 @loop
 def _factorise_panel(panel):
-    """L_jj and B in the place of A_jj and A_j; the column without a positive pivot, or -1."""
+    """Replace A_jj and A_j by L_jj and B; return the column without a positive pivot, or -1."""
     height, width = panel.shape
     for begin in range(0, width, STRIP):
-        if begin > 0:  # the largest power of two in it: as many columns before tell as many after
+        if begin > 0:  # the largest power of two in it: as many columns before it as after it
             span = begin & -begin
             end = min(begin + span, width)
             done = panel[begin:, begin - span : begin].copy()
@@ -133,7 +133,7 @@ def _factorise_panel(panel):
 
 @loop
 def _drop_nothing(panel):
-    """Zero in the place of values that are far below any rounding error."""
+    """Set values far below any rounding error to zero."""
     for i in range(panel.shape[0]):
         for a in range(panel.shape[1]):
             if abs(panel[i, a]) < NOTHING:
@@ -151,7 +151,7 @@ def _subtract(pattern, values, product, front, k, run_end):
     panel = _panel(pattern, values, target)
     at = pattern.column[target]
     column = first[row[k]] - first[pattern.node[target]]
-    # of all blocks below
+    # for all blocks below
     left = height[k]
     top = height[pattern.column[front]]
     for other in range(k, pattern.column[front + 1]):
@@ -165,7 +165,7 @@ def _subtract(pattern, values, product, front, k, run_end):
 
 @loop
 def solve_in_place(pattern: Pattern, values: np.ndarray, x: np.ndarray) -> None:
-    """X <- A^-1 x by the factor.
+    """Replace x by A^-1 x, by the factor.
 
     Parameters
     ----------
@@ -219,7 +219,7 @@ def _subtract_below(pattern, front, change, x):
 
 @loop
 def _substitute(lower, x):
-    """X <- L^-1 x, L the first rows of lower."""
+    """Replace x by L^-1 x, with L the first rows of lower."""
     for a in range(x.shape[0]):
         for k in range(a):
             for m in range(x.shape[1]):
@@ -230,7 +230,7 @@ def _substitute(lower, x):
 
 @loop
 def _substitute_back(lower, x):
-    """X <- L^-T x, L the first rows of lower."""
+    """Replace x by L^-T x, with L the first rows of lower."""
     for a in range(x.shape[0] - 1, -1, -1):
         for m in range(x.shape[1]):
             x[a, m] /= lower[a, a]
@@ -241,7 +241,7 @@ def _substitute_back(lower, x):
 
 @loop
 def _inverted(lower):
-    """L^-1, L the first rows of lower: strips on the diagonal, then twice as many together."""
+    """L^-1, with L the first rows of lower: diagonal strips first, then pairs of them."""
     width = lower.shape[1]
     inverse = np.eye(width)
     for begin in range(0, width, STRIP):
@@ -260,13 +260,13 @@ def _inverted(lower):
 
 @loop
 def invert_in_place(pattern: Pattern, values: np.ndarray) -> None:
-    """Blocks of the inverse where the factor has some, in its place.
+    """Compute the blocks of the inverse that exist in the factor, in its place.
 
     Parameters
     ----------
     pattern : Pattern
     values : (v,) array
-        Of the factor; of the inverse in the end.
+        Input: the factor. Output: the inverse.
     """
     room = np.empty(_most_below(pattern) ** 2)
     for front in range(pattern.start.size - 2, -1, -1):

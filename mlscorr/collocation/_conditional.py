@@ -1,13 +1,13 @@
-"""A process at any epoch from its states at the two nodes about it.
+"""Interpolation of a process at any epoch from its states at the two adjacent nodes.
 
-Given both states a Markov process between them knows nothing of the rest, so for each process
+Given both states, a Markov process between them is independent of the rest, so for each process
 
     E s(t) = a s_i + b s_i+1,   b = c Q^-1,   a = e F1 - b F(dt),   var = q1 - b c^T
     c = e Q1 F2^T,   Q = Q(dt),   dt = t_i+1 - t_i
 
 with F1, Q1 over t - t_i, F2 over t_i+1 - t, e the first state and q1 the first element of Q1
-(Rasmussen and Williams 2006, appendix B; Särkkä and Solin 2019, section 10). Before the first
-and past the last node the missing neighbour stands at infinity.
+(Rasmussen and Williams 2006, appendix B; Särkkä and Solin 2019, section 10). Before the first and
+past the last node the missing neighbor is at infinity.
 """
 
 import numpy as np
@@ -21,23 +21,23 @@ from mlscorr.compiled_loops import loop
 def conditional_gains(
     layout: Layout, before: np.ndarray, after: np.ndarray, cell: np.ndarray, clocks: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Gains a, b of the states at the nodes about q epochs, and the variance that remains.
+    """Gains a, b of the states at the nodes adjacent to q epochs, and the remaining variance.
 
-    Quickest where epochs of one cell follow each other.
+    Fastest if epochs of one cell are consecutive.
 
     Parameters
     ----------
     layout : Layout
     before, after : (u, s) array
-        Clocks of the nodes about each cell, infinite where there is none.
+        Clocks of the nodes at both ends of each cell, infinite if there is none.
     cell : (q,) int array
-        Of each epoch.
+        Cell of each epoch.
     clocks : (q, s) array
 
     Returns
     -------
     gains, remaining : (q, s, 2 d), (q, s) array
-        Of d states at most, those of each signal without a space between a and b.
+        For up to d states; those of each signal have no space between a and b.
     """
     number = layout.states.size
     largest = 0
@@ -57,8 +57,8 @@ def conditional_gains(
                 entered = u
                 span = rate * (after[u, s] - before[u, s])
                 whole = transition(kind, span)
-                # L D L^T of Q between the nodes, with ones for states that there are not. It acts
-                # on the elements' ratios, so no small step harms it
+                # L D L^T of Q between the nodes, with ones for missing states. It works on ratios
+                # of the elements, so small steps do no harm
                 q0, q1, q2, q3, q4, q5 = process_noise(kind, span)
                 l10 = q1 / q0
                 l20 = q2 / q0
@@ -103,12 +103,12 @@ def process_moments(
     ----------
     layout : Layout
     cell : (q,) int array
-        Of each epoch.
+        Cell of each epoch.
     gains, remaining
-        As of ``conditional_gains``.
+        See ``conditional_gains``.
     columns : (u, 2 d, c) array
-        Estimates of the states about each cell: process by process, those before it and then those
-        after it; zeros where there is no node.
+        Estimates of the states at both ends of each cell, process by process, first before and then
+        after it; zero if there is no node.
     joint : (u, 2 d, 2 d) array
         Their covariance.
 

@@ -1,18 +1,18 @@
-"""Knots: epochs at which the states of a signal are unknowns, and its prior there.
+"""Knots: epochs at which the states of a signal are unknowns, and the prior of these states.
 
-Given its states at two knots a process between them knows nothing of the rest (``conditional``),
-so what a row sees is f(t) = a f_k + b f_k+1 + r, and as long as r stays far below any noise the
-rows of one interval may have each an r of its own. The prior of the states is a sum of squares of
+Given its states at two knots, a process between them is independent of the rest (``conditional``).
+A row then depends on f(t) = a f_k + b f_k+1 + r, and as long as r is far below any noise, each row
+of an interval may have an independent r. The prior of the states is a sum of squares of
 
     W (f_k+1 - F f_k),   W Q W^T = I,      so L0 is block tridiagonal in Q^-1, F^T Q^-1 F, -Q^-1 F
 
-(Särkkä and Solin 2019, section 12.3). Q falls as the step to the power 2 d - 1, and where the
-steps of smooth signals are too small no digit is left of L0. So each signal has knots of its own,
-a step apart after which r in the middle, Q_11(step / 4), is ``SHARE`` of the signal's sigma: a
-22nd of the correlation time for Matern 5/2, a 350th for 3/2, 1/184 on the clock of an integrated
-random walk; the exponential one has them at all epochs. Where rows tell less, longer steps do
-(``sufficient_steps``). A knot may leave out epochs within a quarter of a step, where r is no
-larger.
+(Särkkä and Solin 2019, section 12.3). Q decreases as the step to the power 2 d - 1, and L0 loses
+all digits if the steps of smooth signals are too small. Each signal therefore has its own knots.
+After one step, r in the middle, Q_11(step / 4), is ``SHARE`` of the signal's sigma: 1/22 of the
+correlation time for Matern 5/2, 1/350 for Matern 3/2, 1/184 on the clock of an integrated random
+walk. The exponential signal has knots at all epochs. If rows carry less information, longer steps
+suffice (``sufficient_steps``). Epochs within a quarter of a step of a knot need none, as r is no
+larger there.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from mlscorr.collocation._states import Layout, fill_noise, fill_transition
 from mlscorr.collocation.covariance import Covariance, process_noise
 from mlscorr.compiled_loops import loop
 
-SHARE = 5e-5  # of a signal's sigma that knots may leave: 0.05 mm of a drift of 1 m
+SHARE = 5e-5  # of a signal's sigma as interpolation error between knots: 0.05 mm of a drift of 1 m
 
 
 class Knots(NamedTuple):
@@ -38,13 +38,13 @@ class Knots(NamedTuple):
     Parameters
     ----------
     first : (s + 1,) int array
-        Number of each signal's first knot.
+        Index of each signal's first knot.
     clock : (k,) array
-        Of each knot, its signal's.
+        Of each knot, by its signal's clock.
     times : (u,) array
         All knots' times, sorted and distinct. Units: s.
     cells : (u + 1, s, 2) int array
-        Numbers of each signal's knots about a time between two of ``times``, -1 where there is
+        Indices of each signal's knots before and after an interval of ``times``, -1 if there is
         none.
     """
 
@@ -55,12 +55,12 @@ class Knots(NamedTuple):
 
     @classmethod
     def of(cls, gps_time: np.ndarray, clocks: np.ndarray, steps: Sequence[float]) -> Knots:
-        """The knots that signals need at given epochs.
+        """Choose the knots that signals need at given epochs.
 
         Parameters
         ----------
         gps_time, clocks : (q,), (q, s) array
-            Of the epochs, in any order and more than once. Units: s.
+            Of the epochs, in any order, with repetitions. Units: s.
         steps : sequence of float
             Largest step of each signal between its knots, on its clock.
         """
@@ -79,15 +79,15 @@ class Knots(NamedTuple):
 
 
 def knot_step(covariance: Covariance, share: float = SHARE) -> float:
-    """Largest step between knots among epochs, on the signal's clock.
+    """Largest step between knots at epochs, on the signal's clock.
 
     Parameters
     ----------
     covariance : Covariance
     share : float
-        Of the signal's sigma that knots may leave.
+        Allowed interpolation error as a share of the signal's sigma.
     """
-    small = 1e-3  # where Q_11 has only its first power
+    small = 1e-3  # below it Q_11 has only its first power
     power = 1.0 / (2 * covariance.states - 1)
     variance = process_noise(covariance.kind, small)[0]
     return float(4 * small * (share**2 / variance) ** power / covariance.rate)
@@ -95,15 +95,15 @@ def knot_step(covariance: Covariance, share: float = SHARE) -> float:
 
 @loop
 def thinned(clock: np.ndarray, step: float) -> np.ndarray:
-    """Numbers of the epochs that are knots.
+    """Indices of the epochs that are knots.
 
-    From one to the next is at most a step, or there is no epoch between but those within a quarter
+    Two adjacent knots are at most one step apart, or all epochs between them are within a quarter
     of a step of the first.
 
     Parameters
     ----------
     clock : (n,) array
-        That never falls.
+        Non-decreasing.
     step : float
     """
     knots = np.empty(clock.size, dtype=np.int64)
@@ -129,7 +129,7 @@ def thinned(clock: np.ndarray, step: float) -> np.ndarray:
 
 @loop
 def prior_roots(layout: Layout, knots: Knots) -> tuple[np.ndarray, np.ndarray]:
-    """W and W F of the step to each knot; the stationary prior's W and zero for a first one.
+    """W and W F of the step to each knot; for a first knot W of the stationary prior, and zero.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ def add_prior(
     carried: np.ndarray,
     values: np.ndarray,
 ) -> None:
-    """Add L0 to the values of a matrix: of the knots, and one for each state of other nodes.
+    """Add L0 to the values of a matrix: prior of the knots, and 1 for each state of other nodes.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ def add_prior(
     knots : Knots
     pattern : Pattern
     roots, carried : (k, 3, 3) array
-        As of prior_roots.
+        See prior_roots.
     values : (v,) array
     """
     place = pattern.place
@@ -202,7 +202,7 @@ def add_prior(
 
 @loop
 def _add_to_processes(pattern, values, i, j, block):
-    """Add a block to that of each process in block (i, j), if that stands in the lower triangle."""
+    """Add a block to that of each process in block (i, j), if it is in the lower triangle."""
     position = locate(pattern, i, j)
     d = block.shape[0]
     if position < 0:
@@ -217,13 +217,13 @@ def _add_to_processes(pattern, values, i, j, block):
 
 
 def cell_clocks(knots: Knots) -> tuple[np.ndarray, np.ndarray]:
-    """Clocks (u + 1, s) of each signal's knots before and after each cell, infinite for none.
+    """Clocks (u + 1, s) of each signal's knots before and after each cell, infinite if none.
 
     Parameters
     ----------
     knots : Knots
     """
-    clock = np.append(knots.clock, np.nan)  # for -1
+    clock = np.append(knots.clock, np.nan)  # NaN for index -1
     before = np.where(knots.cells[..., 0] >= 0, clock[knots.cells[..., 0]], -np.inf)
     after = np.where(knots.cells[..., 1] >= 0, clock[knots.cells[..., 1]], np.inf)
     return before, after
@@ -232,14 +232,14 @@ def cell_clocks(knots: Knots) -> tuple[np.ndarray, np.ndarray]:
 def knot_gains(
     layout: Layout, knots: Knots, cell: np.ndarray, clocks: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Gains of each signal's states at the knots about q epochs; see ``conditional_gains``.
+    """Gains of each signal's states at the knots adjacent to q epochs; see ``conditional_gains``.
 
     Parameters
     ----------
     layout : Layout
     knots : Knots
     cell : (q,) int array
-        Of each epoch.
+        Cell of each epoch.
     clocks : (q, s) array
 
     Returns

@@ -4,12 +4,12 @@ import numpy as np
 
 from mlscorr.compiled_loops import loop
 
-SINGULAR = 1e-15  # share of an observation's prior variance below which nothing is left of it
+SINGULAR = 1e-15  # share of an observation's prior variance below which the rest is rounding error
 
 
 @loop
 def assign(out: np.ndarray, values: np.ndarray) -> None:
-    """Put values in the place of a matrix; by slices the words of an error take long to compile.
+    """Assign values to a matrix by loops, because slices with their error text compile slowly.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ def assign(out: np.ndarray, values: np.ndarray) -> None:
 
 @loop
 def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """A b. Plain loops: on matrices this small they are as fast as BLAS, and quick to compile.
+    """A b by plain loops, which are as fast as BLAS on small matrices, and compile quickly.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def multiply_transposed(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 @loop
 def whitening_root(s: np.ndarray, prior: np.ndarray) -> np.ndarray:
-    """L^-1 with L L^T = s (r, r); a first element that is no number where s is singular.
+    """L^-1 with L L^T = s (r, r); the first element is NaN if s is singular.
 
     Parameters
     ----------

@@ -1,12 +1,12 @@
-"""Where the blocks of a sparse symmetric matrix and of its Cholesky factor stand.
+"""Block pattern of a sparse symmetric matrix and of its Cholesky factor.
 
-A matrix has a node for each block of rows, and an edge for each block that may hold something.
-Nodes are eliminated in an order of minimum degree, and all that depends on the edges alone is
-worked out once.
+A matrix has a node for each block of rows, and an edge for each block that may be nonzero. Nodes
+are eliminated in an order of minimum degree. Everything that depends on the edges only is computed
+once.
 
 Sources: George and Liu 1989, SIAM Review 31, 1-19 (minimum degree); Davis 2006, Direct Methods for
 Sparse Linear Systems, chapter 4 (fill, postorder); Ashcraft and Grimes 1989, ACM Trans. Math.
-Software 15, 291-309 (fronts that hold some zeros).
+Software 15, 291-309 (fronts with some zeros).
 """
 
 from __future__ import annotations
@@ -22,28 +22,28 @@ from mlscorr.compiled_loops import loop
 
 
 class Pattern(NamedTuple):
-    """Where the blocks of a matrix, of its factor and of its inverse stand.
+    """Block pattern of a matrix, of its factor and of its inverse.
 
-    Nodes and states are in the order of elimination. Nodes in a row below which the factor has the
-    same blocks, or nearly, are a front, whose columns are a panel in ``values``: the block on the
-    diagonal, of which the lower triangle counts, then those below it, each row after the other.
+    Nodes and states are in the order of elimination. Consecutive nodes with the same blocks below
+    them in the factor, or nearly so, form a front. Its columns are a panel in ``values``: the
+    diagonal block, of which the lower triangle counts, then the blocks below it, row by row.
 
     Parameters
     ----------
     place : (k,) int array
-        Of each node, as the caller numbers them, in the order of elimination.
+        Position of each of the caller's nodes in the order of elimination.
     first : (k + 1,) int array
         State at which each node begins.
     front : (k,) int array
-        That each node belongs to.
+        Front of each node.
     node : (g + 1,) int array
-        At which each front begins.
+        Node at which each front begins.
     start : (g + 1,) int array
-        Where the panel of each front begins in values.
+        Index in values at which the panel of each front begins.
     column : (g + 1,) int array
-        Where the nodes below the diagonal of each front begin in ``row``.
+        Index in ``row`` at which the nodes below the diagonal of each front begin.
     row, height : (l,) int array
-        These nodes, in order, and how many rows of the panel stand above each.
+        These nodes, in order, and the number of rows of the panel above each.
     """
 
     place: np.ndarray
@@ -57,14 +57,14 @@ class Pattern(NamedTuple):
 
     @classmethod
     def of(cls, sizes: np.ndarray, edges: np.ndarray) -> Pattern:
-        """The pattern of a matrix.
+        """Make the pattern of a matrix.
 
         Parameters
         ----------
         sizes : (k,) int array
             Number of states of each node.
         edges : (e, 2) int array
-            Pairs of nodes, in any order and more than once.
+            Pairs of nodes, in any order, with repetitions.
         """
         place = _elimination_order(len(sizes), edges)
         place = _postorder(*_filled(place, edges))[place]
@@ -91,40 +91,41 @@ class Pattern(NamedTuple):
 
     @property
     def zeros(self) -> np.ndarray:
-        """Values of a matrix without anything in it."""
+        """Values of a zero matrix."""
         return np.zeros(self.start[-1])
 
 
 def _elimination_order(count, edges):
-    """Place of each node, by SuperLU."""
+    """Position of each node in the order of elimination, by SuperLU."""
     if count == 0:
         return np.zeros(0, dtype=np.int64)
     distinct = edges[edges[:, 0] != edges[:, 1]]
     both = np.vstack([distinct, distinct[:, ::-1]]).T
     graph = coo_array((np.full(both.shape[1], -1.0), tuple(both)), shape=(count, count)).tocsc()
     graph.data[:] = -1.0
-    graph.setdiag(np.diff(graph.indptr) + 1.0)  # dominant: nothing is swapped
+    graph.setdiag(np.diff(graph.indptr) + 1.0)  # dominant, so that there is no pivoting
     symmetric = {"diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
-    nothing = {"drop_tol": 1.0, "fill_factor": 1}  # of a factor that nobody wants
+    nothing = {"drop_tol": 1.0, "fill_factor": 1}  # the factor itself is not needed
     factor = spilu(graph.tocsc(), permc_spec="MMD_AT_PLUS_A", **symmetric, **nothing)
     return factor.perm_c.astype(np.int64)
 
 
 def _filled(place, edges):
-    """Nodes below the diagonal of each column of the factor, and where each column begins."""
+    """Nodes below the diagonal of each column of the factor, and start of each column."""
     low, high = np.sort(place[edges].reshape(-1, 2), axis=1).T
     graph = coo_array((np.ones(len(low)), (low, high)), shape=(len(place), len(place))).tocsr()
     return _fill_in(graph.indptr.astype(np.int64), graph.indices.astype(np.int64))
 
 
 def _postorder(row, column):
-    """Place (k,) of each node in the order in which it follows those that wait for it alone.
+    """Position (k,) of each node in postorder, after the nodes whose parent it is.
 
-    A node's parent is the first one below it. Of several children that with the longest column
-    stands next to its parent. The factor is the same, but children and parents can be fronts.
+    A node's parent is the first node below it in the factor. Of several children, the one with the
+    longest column comes directly before its parent. The factor is the same, but children and
+    parents can form fronts.
     """
     below = np.diff(column)
-    # the root of all
+    # root of all
     count = len(below)
     parent = np.full(len(below), len(below))
     parent[below > 0] = row[column[:-1][below > 0]]
@@ -137,9 +138,9 @@ def _postorder(row, column):
 
 @loop
 def _ends_front(row, column, first):
-    """Which nodes (k,) end a front: the next isn't their parent, or they cost less apart.
+    """Flag (k,) of nodes that end a front: their parent is not next, or splitting is cheaper.
 
-    What counts are multiplications, and values moved: those of a front's product are written and
+    The cost counts multiplications and moved values: those of a front's product are written and
     read, and so are those of the matrix from which it is subtracted.
     """
     ends = np.ones(column.size - 1, np.bool_)
@@ -167,9 +168,9 @@ def _work(width, below):
 
 @loop
 def _fill_in(pointer, index):
-    """Nodes below the diagonal of each column of the factor, and where each column begins.
+    """Nodes below the diagonal of each column of the factor, and start of each column.
 
-    A column's nodes are those of the matrix and those of the columns whose first node it is.
+    They are the nodes of the matrix and of the columns whose first node this column is.
     """
     count = pointer.size - 1
     row = np.empty(4 * index.size + count, dtype=np.int64)
@@ -180,7 +181,7 @@ def _fill_in(pointer, index):
     end = 0
     for j in range(count):
         begin = end
-        if row.size - end < count - j:  # a column has no more nodes than follow it
+        if row.size - end < count - j:  # a column has at most as many nodes as follow it
             larger = np.empty(2 * row.size + count, dtype=np.int64)
             larger[:end] = row[:end]
             row = larger
@@ -200,7 +201,7 @@ def _fill_in(pointer, index):
 
 @loop
 def _enter(nodes, j, mark, row, end):
-    """Write those of some nodes behind the end that column j lacks; its new end."""
+    """Append those of some nodes that column j does not have yet; return the new end."""
     for i in nodes:
         if i > j and mark[i] != j:
             mark[i] = j
@@ -211,7 +212,7 @@ def _enter(nodes, j, mark, row, end):
 
 @loop
 def locate(pattern: Pattern, i: int, j: int) -> int:
-    """Where block (i, j) of the lower triangle begins in values.
+    """Index in values at which block (i, j) of the lower triangle begins.
 
     Parameters
     ----------
@@ -221,7 +222,7 @@ def locate(pattern: Pattern, i: int, j: int) -> int:
     Returns
     -------
     position : int
-        -1 where there is no such block, or it stands above the diagonal.
+        -1 if there is no such block, or it is above the diagonal.
     """
     if i < j:
         return -1
@@ -247,7 +248,7 @@ def locate(pattern: Pattern, i: int, j: int) -> int:
 
 @loop
 def panel_width(pattern: Pattern, j: int) -> int:
-    """Number of values from one row of a block below node j to the next.
+    """Stride in values between rows of a block below node j.
 
     Parameters
     ----------

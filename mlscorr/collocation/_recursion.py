@@ -1,8 +1,8 @@
-"""The Markov recursion: V^-1 of all observations in one pass forward and one backward.
+"""Markov recursion: V^-1 of all observations in one forward and one backward pass.
 
-Forward runs the Kalman filter, whose innovations are the whitened observations; backward run the
-adjoints of de Jong 1989 (J. Am. Stat. Assoc. 84, 1085-1088), which need no inverse of a state's
-covariance, so that two targets a millisecond apart do no harm:
+The forward pass is the Kalman filter, whose innovations are the whitened observations. The backward
+pass uses the adjoints of de Jong 1989 (J. Am. Stat. Assoc. 84, 1085-1088), which need no inverse of
+a state's covariance, so that two targets one millisecond apart do no harm:
 
     P- = F P F^T + Q            S = H P- H^T + R            K = P- H^T S^-1
     P  = (I - K H) P- (I - K H)^T + K R K^T                 (Joseph)
@@ -31,7 +31,7 @@ from mlscorr.compiled_loops import loop
 
 
 class Recursion(NamedTuple):
-    """The factor of V0 of n epochs, as the compiled loops take it.
+    """Factor of V0 of n epochs, as passed to the compiled loops.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class Recursion(NamedTuple):
 def filter_covariance(
     layout: Layout, size: int, steps: np.ndarray, mixing: np.ndarray, noise: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Kalman filter of the covariances over n epochs.
+    """Run the Kalman filter of the covariances over n epochs.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def filter_covariance(
     size : int
         Number d of states.
     steps : (n, s) array
-        Times since the epoch before, by each signal's clock.
+        Times since the previous epoch, by each signal's clock.
     mixing, noise : (n, r, k), (n, r, r) array
 
     Returns
@@ -71,13 +71,13 @@ def filter_covariance(
     gains : (n, r, d) array
         K^T.
     whiteners : (n, r, r) array
-        Of the innovations; not a number at the epoch where V is not positive definite.
+        Of the innovations; NaN at the epoch where V is not positive definite.
     covariances : (n, d, d) array
         P.
     """
     n, r, _ = mixing.shape
     spans = steps.copy()
-    spans[:1] = np.inf  # the stationary covariance
+    spans[:1] = np.inf  # start from the stationary covariance
     transitions = np.zeros((*steps.shape, 3, 3))
     spread = np.zeros_like(transitions)
     fill_transition(layout, spans, transitions)
@@ -90,7 +90,9 @@ def filter_covariance(
 
 @loop
 def _filter_covariance(layout, transitions, spread, mixing, noise, gains, whiteners, covariances):
-    """Fill K^T, whiteners and P; from the first epoch where V is not positive definite NaN."""
+    """Compute K^T, whiteners and P in place; NaN from the first epoch where V is not positive
+    definite.
+    """
     n, r, k = mixing.shape
     size = gains.shape[2]
     first = layout.first
@@ -214,7 +216,7 @@ def filter_columns(recursion: Recursion, columns: np.ndarray) -> tuple[np.ndarra
 
 @loop
 def smooth_columns(recursion: Recursion, whitened: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """From whitened columns back.
+    """Smooth whitened columns in the backward pass.
 
     Parameters
     ----------
@@ -255,20 +257,20 @@ def smooth_columns(recursion: Recursion, whitened: np.ndarray) -> tuple[np.ndarr
 def smooth_covariance(
     recursion: Recursion, steps: np.ndarray, covariances: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The backward pass of N.
+    """Run the backward pass of N.
 
     Parameters
     ----------
     recursion : Recursion
     steps, covariances : (n, s), (n, d, d) array
-        As of filter_covariance.
+        See filter_covariance.
 
     Returns
     -------
     blocks : (n, r, r) array
         On the diagonal of V^-1.
     same, following : (n, d, d), (n - 1, d, d) array
-        Covariances of the smoothed states with themselves, and with those of the next epoch.
+        Covariances of the smoothed states, and with those of the next epoch.
     """
     layout, transitions, mixing, gains, whiteners = recursion
     n, _, size = gains.shape
@@ -309,7 +311,7 @@ def _carried_back(steps, gained):
             for k in range(d):
                 for b in range(d):
                     out[i - 1, a, b] += steps[i, k, a] * half[k, b]
-        for a in range(d):  # symmetric to the last digit
+        for a in range(d):  # exactly symmetric
             for b in range(a):
                 mean = 0.5 * (out[i - 1, a, b] + out[i - 1, b, a])
                 out[i - 1, a, b] = mean

@@ -1,7 +1,7 @@
-"""The states of all signals' processes, and how time carries and observations see them.
+"""States of all signals' processes, their transition in time and their observation.
 
-H, which observes them, is B (mixing) on the first state of each process; F and Q are blocks, one
-for each process. None of them is ever written out.
+H, which observes them, is B (mixing) on the first state of each process; F and Q have one block for
+each process. None of them is ever stored as a full matrix.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 
 
 class Layout(NamedTuple):
-    """Where the states of k processes of s signals stand in the d states of all.
+    """Positions of the states of k processes of s signals among all d states.
 
     Parameters
     ----------
     first, signal : (k,) int array
-        First state of each process, and its signal.
+        First state of each process, and index of its signal.
     states, kinds : (s,) int array
-        Number of states of a process, and that of its covariance family.
+        Number of states of a process, and number of its covariance family.
     rates : (s,) array
         Units: 1/s.
     """
@@ -39,7 +39,7 @@ class Layout(NamedTuple):
 
     @classmethod
     def of(cls, signals: Sequence[Signal]) -> Layout:
-        """The layout of Signals."""
+        """Make the layout of Signals."""
         states = np.array([s.covariance.states for s in signals], dtype=np.int64)
         count = np.array([s.mixing.shape[2] for s in signals], dtype=np.int64)
         signal = np.repeat(np.arange(len(signals)), count)
@@ -50,13 +50,13 @@ class Layout(NamedTuple):
 
     @property
     def size(self) -> int:
-        """Number of states in all."""
+        """Total number of states."""
         return int(self.states[self.signal].sum())
 
 
 @loop
 def fill_transition(layout: Layout, spans: np.ndarray, out: np.ndarray) -> None:
-    """F of each signal over n spans of its clock.
+    """Compute F of each signal over n spans of its clock, in place.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def fill_transition(layout: Layout, spans: np.ndarray, out: np.ndarray) -> None:
 
 @loop
 def fill_noise(layout: Layout, spans: np.ndarray, out: np.ndarray) -> None:
-    """Q of each signal over n spans of its clock.
+    """Compute Q of each signal over n spans of its clock, in place.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def fill_noise(layout: Layout, spans: np.ndarray, out: np.ndarray) -> None:
 
 @loop
 def carry(layout: Layout, blocks: np.ndarray, x: np.ndarray, transposed: bool) -> None:
-    """X <- F x, or F^T x, in place.
+    """Replace x by F x, or by F^T x.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def carry(layout: Layout, blocks: np.ndarray, x: np.ndarray, transposed: bool) -
             f01, f10 = f10, f01
             f02, f20 = f20, f02
             f12, f21 = f21, f12
-        for c in range(x.shape[1]):  # written out: twice as fast as loops over the states
+        for c in range(x.shape[1]):  # unrolled: twice as fast as loops over the states
             x0 = x[a, c]
             if states == 1:
                 x[a, c] = f00 * x0
@@ -145,7 +145,7 @@ def dense_blocks(layout: Layout, blocks: np.ndarray) -> np.ndarray:
     ----------
     layout : Layout
     blocks : (n, s, 3, 3) array
-        Of each signal.
+        Block of each signal.
     """
     out = np.zeros((len(blocks), layout.size, layout.size))
     for first, signal in zip(layout.first, layout.signal, strict=True):

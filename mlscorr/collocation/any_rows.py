@@ -1,12 +1,12 @@
-"""Collocation of rows of any kind: by the recursion where it is exact, by knots elsewhere.
+"""Collocation of rows of any kind: by the recursion where it is exact, otherwise by knots.
 
-The recursion sees one epoch after the other. A row of two epochs, B_1 f(t_1) + B_2 f(t_2) = l, is
-two rows of one epoch each that look at one place u of which nothing is known,
+The recursion processes one epoch after another. A row of two epochs, B_1 f(t_1) + B_2 f(t_2) = l,
+equals two rows of one epoch each that share an unknown place u with a diffuse prior,
 
     B_1 f(t_1) + u = l,     -B_2 f(t_2) + u = 0,     u ~ N(0, S^2),   S -> infinity,
 
-whose difference is the row itself; log S is taken from the likelihood. Places cost a column each,
-so this serves the few steps of a path, and thousands of ties are solved by knots.
+whose difference is the row itself; log S is removed from the likelihood. Each place costs a column,
+so this is used for a few steps of a path, while thousands of ties are solved by knots.
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ from mlscorr.collocation.markov import collocate
 from mlscorr.collocation.model import Collocation, Noise, Signal
 from mlscorr.collocation.sparse_rows import SparseRows
 
-FREE = 1e4  # S over the sigma of what is seen there: u takes 1e-8 of the variance
+FREE = 1e4  # S over the sigma of the rows there: u takes 1e-8 of the variance
 PLACES = 600  # columns of places: more of them cost more than knots; guard
 
 
@@ -32,16 +32,16 @@ def collocate_rows(
     r"""Separate the misclosures of sparse rows into trend, signal and noise.
 
     Solves l = A x + B s + n. Rows of one epoch each, and a few of two, are solved exactly (1e-9) by
-    ``collocate``, others to 1e-5 m by ``collocate_by_knots``.
+    ``collocate``; others to 1e-5 m by ``collocate_by_knots``.
 
     Parameters
     ----------
     rows : sequence of SparseRows
         With the same signals and trend: targets, steps of the path, ties.
     like, tolerance
-        As of ``collocate_by_knots``.
+        See ``collocate_by_knots``.
     believed : (k, p + 1) array, optional
-        Of the trend, as of a Collocation.
+        Prior of the trend; see Collocation.
 
     Returns
     -------
@@ -51,11 +51,11 @@ def collocate_rows(
     Raises
     ------
     ValueError
-        As these two do.
+        See these two functions.
 
     Examples
     --------
-    A step of 0.3 m in the path, before which the drift is held to 1 mm:
+    A step of 0.3 m in the path, before which control constrains the drift to 1 mm:
 
     >>> from mlscorr.collocation import Covariance, Noise, Signal, SparseRows, collocate_rows
     >>> drift, none = Covariance("matern32", 30.0), np.zeros((1, 1, 0))
@@ -78,7 +78,7 @@ def collocate_rows(
 
 
 def _is_in_time(rows):
-    """True where the recursion takes the rows: as many to each observation, few of two epochs."""
+    """True if the recursion can solve the rows: equal size of observations, few with two epochs."""
     heights = {part.misclosure.shape[1] for part in rows}
     links = [part for part in rows if _epochs(part) == 2]
     columns = sum(part.misclosure.size for part in links)
@@ -88,7 +88,7 @@ def _is_in_time(rows):
 
 
 def _in_time(rows):
-    """Input of ``collocate``: all first views, then the second ones of rows of two epochs."""
+    """Input of ``collocate``: all first views, then the second views of rows with two epochs."""
     links = [part for part in rows if _epochs(part) == 2]
     views = [_view(part, 0) for part in rows] + [_view(part, 1) for part in links]
     gps_time, misclosure, design, own, clocks = (
@@ -119,7 +119,7 @@ class _View(NamedTuple):
 
 
 def _view(part, side):
-    """The view of one side: a second one shows the place alone, from which a row is subtracted."""
+    """View of one side; a second view has only the place, from which a row is subtracted."""
     n, epochs = part.gps_time.shape
     r = part.misclosure.shape[1]
     sign = 1.0 - 2.0 * side
@@ -136,7 +136,7 @@ def _view(part, side):
 
 
 def _free(part):
-    """Sigma (n, r) of the places, far above all that is seen there, and above its noise."""
+    """Sigma (n, r) of the places, far above their signals and noise."""
     noise = np.sqrt(np.einsum("nii->ni", part.noise.own).max(axis=1))
     size = np.hypot(noise, np.abs(part.misclosure).max(axis=1))
     for signal in part.signals:
@@ -146,7 +146,9 @@ def _free(part):
 
 
 def _groups(rows, free):
-    """Group of each view and shared sigmas: of targets in all passes, and of both views' places."""
+    """Group of each view, and shared sigmas: of targets in all passes, and of the places of two
+    views.
+    """
     groups = []
     places = []
     shared = []

@@ -1,7 +1,8 @@
-"""Covariance functions of time lag, as correlations: one at lag zero.
+"""Covariance functions of time lag, as correlations with value one at lag zero.
 
-All are Markov, in one, two and three states. The paper calls the first one Gaussian (Eq. 20); it
-is exponential. Inertial drift is an integrated process, which the smoother two describe better.
+All are Markov processes with one, two or three states. The paper calls the first one Gaussian (Eq.
+20), but it is exponential. Inertial drift is an integrated process, which the two smoother ones
+describe better.
 
 In state-space form (Särkkä and Solin 2019, section 12.3) a process of d states is s and its first
 d - 1 derivatives, each divided by the rate to its order, so that every state is of order one:
@@ -10,8 +11,8 @@ d - 1 derivatives, each divided by the rate to its order, so that every state is
     F(x) = exp(-x) sum_k (N x)^k / k!,       N nilpotent (all poles of the process are -rate)
     Q(x) = q int_0^x f(u) f(u)^T du,         f the last column of F
 
-The integrals are incomplete gamma functions, summed without cancellation: Q is right to its last
-digits at any step, though its elements fall as x to the power 2 d - 1.
+The integrals are incomplete gamma functions, summed without cancellation, so Q is accurate to the
+last digits at any step although its elements decrease as x to the power 2 d - 1.
 
 An integrated random walk from zero at t = 0 is stationary too, on a logarithmic clock x = log t and
 over its own sigma, which grows as t^1.5 (Lamperti's transformation): with its velocity over t^0.5
@@ -31,7 +32,7 @@ FAMILIES = ("exponential", "matern32", "matern52")  # of 1, 2, 3 states, which n
 INTEGRATED = "integrated"
 INTEGRATED_KIND = len((*FAMILIES, INTEGRATED))
 SERIES_BELOW = 1.0  # beyond it 1 - exp(-y) sum loses no more than three digits
-LARGEST_LAG = float(-np.log(np.finfo(float).tiny))  # exp(-x) is the smallest number there is
+LARGEST_LAG = float(-np.log(np.finfo(float).tiny))  # exp(-x) is the smallest positive number
 
 
 @dataclass(frozen=True)
@@ -43,14 +44,14 @@ class Covariance:
     Parameters
     ----------
     family : str
-        Of FAMILIES, or INTEGRATED, which is one of lags of a logarithmic clock.
+        One of FAMILIES, or INTEGRATED, a function of lags on a logarithmic clock.
     correlation_time : float
-        A number for the integrated family. Units: s.
+        Dimensionless for the integrated family. Units: s.
 
     Raises
     ------
     ValueError
-        For another family, and for a correlation time that isn't positive.
+        If the family is unknown or the correlation time is not positive.
 
     Examples
     --------
@@ -69,7 +70,7 @@ class Covariance:
             raise ValueError(f"Correlation time {self.correlation_time} s should be positive.")
 
     def __call__(self, lag: np.ndarray) -> np.ndarray:
-        """Correlation at time lags of any shape. Units: s."""
+        """Return the correlation at time lags of any shape. Units: s."""
         return _correlations(self.kind, np.asarray(self.rate * lag).ravel()).reshape(np.shape(lag))
 
     @property
@@ -88,7 +89,7 @@ class Covariance:
 
     @property
     def rate(self) -> float:
-        """Rate of the process's poles. Units: 1/s."""
+        """Rate of the poles of the process. Units: 1/s."""
         if self.family == INTEGRATED:
             scale = 1.0
         else:
@@ -98,7 +99,7 @@ class Covariance:
 
 @loop
 def correlation(kind: int, x: float) -> float:
-    """Correlation at a time lag, which may be negative.
+    """Correlation at a time lag of either sign.
 
     Parameters
     ----------
@@ -129,7 +130,7 @@ def _correlations(kind, lags):
 
 @loop
 def transition(kind: int, x: float) -> tuple[float, ...]:
-    """F(x), row by row; zeros where there are fewer than three states.
+    """F(x), row by row, padded with zeros below three states.
 
     Parameters
     ----------
@@ -138,7 +139,7 @@ def transition(kind: int, x: float) -> tuple[float, ...]:
     x : float
         Time lag in units of 1 / rate.
     """
-    x = min(x, LARGEST_LAG)  # not infinite
+    x = min(x, LARGEST_LAG)  # avoid infinity
     e = np.exp(-x)
     if kind == 1:
         return e, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -156,7 +157,7 @@ def transition(kind: int, x: float) -> tuple[float, ...]:
 
 @loop
 def process_noise(kind: int, x: float) -> tuple[float, ...]:
-    """Q(x), the upper triangle row by row, with zeros as transition; Q(inf) is stationary.
+    """Q(x), upper triangle row by row, padded with zeros; Q(inf) is stationary.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""The formula written out, with the covariance matrix of all observations (Eq. 13-15).
+"""Collocation by the explicit formula, with the covariance matrix of all observations (Eq. 13-15).
 
-Its work grows with the cube of the observations: the oracle of the others, the way for noise that
-is correlated in any manner, and the fastest for a few hundred rows of which each sees two epochs.
-Of its likelihood it also knows how that changes with signals and trend.
+Its work grows with the cube of the observations. It is the reference for the other solvers, handles
+noise with any correlation, and is the fastest for a few hundred rows of two epochs each. It also
+gives the derivatives of its likelihood with respect to signals and trend.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,26 +19,26 @@ from mlscorr.collocation.model import LARGEST_ERROR, NOT_POSITIVE, Collocation, 
 from mlscorr.collocation.sparse_rows import SparseRows
 from mlscorr.compiled_loops import loop
 
-CHUNK = 10_000_000  # covariances computed at once in a prediction, which bounds the memory
-# Time lag in units of 1 / rate at which rounding leaves no correlation, of exp(-x / 2) neither
+CHUNK = 10_000_000  # covariances computed at once in a prediction, which limits the memory
+# Time lag in units of 1 / rate beyond which correlation vanishes by rounding, also exp(-x / 2)
 UNCORRELATED_LAG = float(-np.log(np.square(np.finfo(float).eps)))
 
 
 def collocate_rows_dense(
     rows: Sequence[SparseRows], believed: np.ndarray | None = None
 ) -> Collocation:
-    """Collocation of rows that see an epoch or more by the dense formula: as of collocate_rows.
+    """Solve rows of any number of epochs by the dense formula; see collocate_rows.
 
     Parameters
     ----------
     rows : sequence of SparseRows
     believed : (k, p + 1) array, optional
-        Of the trend, as of a Collocation.
+        Prior of the trend; see Collocation.
 
     Raises
     ------
     ValueError
-        Where the covariance is not positive definite or the trend is not determined.
+        If the covariance is not positive definite or the trend is not determined.
 
     Examples
     --------
@@ -74,26 +74,26 @@ def covariance_given(
     sought: Sequence[SparseRows],
     believed: np.ndarray | None = None,
 ) -> np.ndarray:
-    r"""Covariance (q, q) of the error of what rows hold without their noise, given others (Eq. 15).
+    r"""Error covariance (q, q) of noise-free rows predicted from other observations (Eq. 15).
 
-    Of trend and signals together, all rows with all: what another observation would leave of it is
-    known before that is made. Misclosures don't matter.
+    It includes trend and signals, between all pairs of rows, and does not depend on misclosures.
+    The effect of a further observation is thus known before it is made.
 
     Parameters
     ----------
     observations, sought : sequences of SparseRows
-        Of the same signals and trend.
+        With the same signals and trend.
     believed : (k, p + 1) array, optional
-        Of the trend, as of a Collocation.
+        Prior of the trend; see Collocation.
 
     Raises
     ------
     ValueError
-        As of collocate_rows_dense.
+        See collocate_rows_dense.
 
     Examples
     --------
-    Half a correlation time from a point that is held to a millimetre:
+    Half a correlation time from a point that is constrained to one millimeter:
 
     >>> from mlscorr.collocation import Noise, Signal, SparseRows, covariance_given
     >>> from mlscorr.collocation.covariance import Covariance
@@ -120,26 +120,26 @@ def likelihood_changes(
     changed: Sequence[Sequence[SparseRows]],
     believed: Sequence[np.ndarray] | None = None,
 ) -> np.ndarray:
-    r"""How the restricted log-likelihood (k,) changes with the signals, of first order in dV.
+    r"""First-order changes (k,) of the restricted log-likelihood with changed signals.
 
     d log L = (w^T dV w - tr(P dV)) / 2 with w = V^-1 (l - A x) and P = V^-1 less the trend's part
-    (Rasmussen and Williams 2006, Eq. 5.9): one factor of V for any number of parameters.
+    (Rasmussen and Williams 2006, Eq. 5.9): one factorization of V serves any number of parameters.
 
     Parameters
     ----------
     solved : Collocation
-        By ``collocate_rows_dense``.
+        Solved by ``collocate_rows_dense``.
     rows : sequence of SparseRows
-        That it solved.
+        Rows that were solved.
     changed : sequence of k sequences of SparseRows
-        The same with signals that are a little different.
+        The same rows with slightly different signals.
     believed : sequence of k arrays, optional
-        Of the trend beside each of these; as solved by default.
+        Prior of the trend for each of these; by default that of the solution.
 
     Examples
     --------
-    A misclosure of 2 m where 1 m is believed: with a thousandth more its log-likelihood rises by
-    (4 - 1) / 2 of dV, 0.002 m^2.
+    A misclosure of 2 m with a prior sigma of 1 m: if sigma grows by 0.1 %, the log-likelihood
+    increases by (4 - 1) / 2 of dV, 0.002 m^2.
 
     >>> from mlscorr.collocation import Noise, Signal, SparseRows
     >>> from mlscorr.collocation import collocate_rows_dense, likelihood_changes
@@ -154,7 +154,7 @@ def likelihood_changes(
     """
     slope = np.outer(solved.weights, solved.weights)
     slope -= solved.precision_of(np.arange(len(slope)))
-    slope = np.tril(slope) - np.diag(np.diag(slope) / 2)  # each of a pair counts a half
+    slope = np.tril(slope) - np.diag(np.diag(slope) / 2)  # each off-diagonal pair counts twice
     by_variance = np.einsum("mi,mi->i", solved.design, slope @ solved.design)  # dV = A dS A^T
     before: dict[tuple, np.ndarray] = {}
     changes = []
@@ -169,13 +169,13 @@ def likelihood_changes(
 
 
 def _variance(believed):
-    """Of each coefficient (p,); zero where nothing is believed, so that it is always the same."""
+    """Prior variance of each coefficient (p,); zero without a prior, so that it never changes."""
     precision = np.sum(believed[:, :-1] ** 2, axis=0)
     return np.divide(1.0, precision, out=np.zeros_like(precision), where=precision > 0)
 
 
 def _differing(rows, others):
-    """Numbers of the signals that differ in other rows."""
+    """Indices of the signals that differ between rows."""
     same = [
         [
             here.covariance == there.covariance
@@ -189,18 +189,18 @@ def _differing(rows, others):
 
 
 def _with_signals(rows, numbers):
-    """The rows with some of their signals alone."""
+    """Return the rows with some of their signals only."""
     return [replace(part, signals=[part.signals[k] for k in numbers]) for part in rows]
 
 
 def signal_covariance(rows: Sequence[SparseRows]) -> np.ndarray:
-    """The part (m, m) of the signals in V of SparseRows, by its lower triangle."""
+    """Part (m, m) of the signals in V of SparseRows, as a lower triangle."""
     size = sum(part.misclosure.size for part in rows)
     return _covariance(_all_sides(rows), np.zeros((size, size)))
 
 
 class _Sides(NamedTuple):
-    """The sides of all rows: first (m,) of each row, clocks (q, s), mixings (q, k) of signals."""
+    """Sides of all rows: first (m,) of each row, clocks (q, s), mixings (q, k) of signals."""
 
     layout: Layout
     first: np.ndarray
@@ -216,7 +216,7 @@ def _all_sides(rows):
 
 
 def _covariance(sides, noise):
-    """V by its lower triangle, of the noise's covariance (m, m)."""
+    """V as a lower triangle, given the noise covariance (m, m)."""
     total = np.array(noise, dtype=float)
     row = np.repeat(np.arange(len(total)), np.diff(sides.first, append=len(sides.clocks)))
     mixing = np.column_stack([np.zeros((len(row), 0)), *sides.mixings])
@@ -232,7 +232,7 @@ def _design(rows):
 
 @loop
 def _add_signals(layout, clocks, mixing, row, total):
-    """Add B D_Lambda B^T of sides, of which each belongs to a row, to the lower triangle of V."""
+    """Add B D_Lambda B^T of sides, each of which belongs to a row, to the lower triangle of V."""
     processes = np.searchsorted(layout.signal, np.arange(layout.states.size + 1))
     for i in range(row.size):
         for j in range(row.size):
@@ -250,7 +250,7 @@ def _add_signals(layout, clocks, mixing, row, total):
 
 
 def _sides(part):
-    """Number (n r) of each row's sides, their clocks (n r e, s), and mixings of each signal."""
+    """Index (n r) of each row's sides, their clocks (n r e, s), and mixings of each signal."""
     n, r = np.shape(part.misclosure)
     e = np.shape(part.gps_time)[1]
     s = len(part.signals)
@@ -270,11 +270,11 @@ class DenseSolver:
     Parameters
     ----------
     clocks : (q, s) array
-        Of the rows' sides.
+        Clocks of the rows' sides.
     mixings : tuple of (q, k) arrays
     covariances : tuple of Covariance
     first : (m,) int array
-        First side of each row.
+        Index of the first side of each row.
     factor : (m, m) array
     """
 
@@ -290,7 +290,7 @@ class DenseSolver:
 
     @property
     def log_determinant(self) -> float:
-        """Of V."""
+        """Log determinant of V."""
         return 2 * np.log(np.diag(self.factor)).sum()
 
     def solve(self, columns: np.ndarray) -> np.ndarray:
@@ -298,7 +298,7 @@ class DenseSolver:
         return solve_triangular(self.factor, self.whiten(columns), lower=True, trans="T")
 
     def precision(self, rows: np.ndarray) -> np.ndarray:
-        """A block of V^-1."""
+        """Return a block of V^-1."""
         return self._inverse[np.ix_(rows, rows)]
 
     @cached_property
@@ -307,14 +307,14 @@ class DenseSolver:
         return root.T @ root
 
     def predictor(self, columns: np.ndarray, trend: np.ndarray, trend_root: np.ndarray) -> Callable:
-        """The predictor of these columns; see Collocation.predict.
+        """Make the predictor of these columns; see Collocation.predict.
 
         Parameters
         ----------
         columns : (m, p + 1) array
             [A, l - A x].
         trend, trend_root : (p,), (p, p) array
-            The root is None where only means are asked for.
+            The root is None if only means are needed.
         """
         whitened = self.whiten(columns)
 
@@ -331,7 +331,7 @@ class DenseSolver:
             mean = design @ trend + half @ whitened[:, -1]  # Eq. 15
             if trend_root is None:
                 return (mean,)
-            # Covariance of the error: signal, less what was observed of it, plus trend
+            # Covariance of the error: prior signal minus the observed part, plus trend
             left = (design - half @ whitened[:, :-1]) @ trend_root
             return mean, prior - half @ half.swapaxes(1, 2) + left @ left.swapaxes(1, 2)
 

@@ -1,4 +1,4 @@
-"""Signal at any epoch from the states at the two nodes about it.
+"""Interpolation of the signal at any epoch from the states at the two adjacent nodes.
 
 Nodes are the epochs of the observations in the recursion, and knots in the information form.
 """
@@ -13,7 +13,7 @@ from mlscorr.collocation._pattern import Pattern, locate, panel_width
 from mlscorr.collocation._states import Layout
 from mlscorr.compiled_loops import loop
 
-CHUNK = 1 << 13  # epochs predicted at once: covariances of the states about them stay small
+CHUNK = 1 << 13  # epochs predicted at once, which keeps the covariances of their states small
 
 
 def interpolate(
@@ -26,21 +26,21 @@ def interpolate(
     gps_time: np.ndarray,
     asked: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Estimates (q, k, p + 1) and covariance (q, k, k) of the processes at q epochs.
+    """Estimates (q, k, p + 1) and covariances (q, k, k) of the processes at q epochs.
 
     Parameters
     ----------
     nodes : (n,) array
         Times of the observations, sorted.
     clocks : (n, s) array
-        The signals' clocks there.
+        The signals' clocks at the nodes.
     layout : Layout
     states : (n, d, p + 1) array
         Smoothed states of the columns [A, l - A x].
     same, following : (n, d, d), (n - 1, d, d) array
-        Covariances of the smoothed states, and with those of the next node.
+        Covariances of the smoothed states at a node, and with those at the next node.
     gps_time, asked : (q,), (q, s) array
-        The epochs, and the signals' clocks there.
+        The queried epochs, and the signals' clocks there.
     """
     n, size, columns = states.shape
     after, cell = np.unique(np.searchsorted(nodes, gps_time, side="right"), return_inverse=True)
@@ -69,7 +69,7 @@ def interpolate(
 
 
 def _places(layout):
-    """Places (d,) of the states before a cell and of those after it, process by process."""
+    """Positions (d,) of the states before and after a cell, process by process."""
     states = layout.states[layout.signal]
     first = np.repeat(layout.first, states)
     earlier = np.arange(len(first)) + first
@@ -77,12 +77,12 @@ def _places(layout):
 
 
 def _slots(layout):
-    """Signal (2 d,) of each state about a cell, its side (0 before), and its place in a knot."""
+    """Signal (2 d,) of each state of a cell, its side (0 before), and its position in a knot."""
     earlier, later = _places(layout)
     processes = layout.signal
     states = layout.states[processes]
     signal = np.repeat(processes, states)
-    begin = layout.first[np.searchsorted(processes, processes)]  # of the first of each signal
+    begin = layout.first[np.searchsorted(processes, processes)]  # first process of each signal
     local = np.arange(len(signal)) - np.repeat(begin, states)
     slots = np.empty((3, 2 * len(signal)), dtype=np.int64)
     slots[:, earlier] = [signal, np.zeros_like(signal), local]
@@ -92,7 +92,7 @@ def _slots(layout):
 
 @loop
 def _selected(pattern, nodes, place, inverse, joint):
-    """Fill joint (u, v, v) with the selected inverse at states of nodes (u, v), -1 for none."""
+    """Copy the selected inverse at states of nodes (u, v), -1 for none, to joint (u, v, v)."""
     for u in range(nodes.shape[0]):
         for a in range(nodes.shape[1]):
             position = -1
@@ -119,7 +119,7 @@ def interpolate_knots(
     gps_time: np.ndarray,
     asked: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Estimates (q, k, p + 1) and covariance (q, k, k) of the processes at q epochs.
+    """Estimates (q, k, p + 1) and covariances (q, k, k) of the processes at q epochs, from knots.
 
     Parameters
     ----------
@@ -131,9 +131,9 @@ def interpolate_knots(
     states : (n, p + 1) array
         Estimated from the columns [A, l - A x].
     inverse : (v,) array
-        Values of the selected inverse; none where only means are asked for.
+        Values of the selected inverse; empty if only means are needed.
     gps_time, asked : (q,), (q, s) array
-        The epochs, and the signals' clocks there.
+        The queried epochs, and the signals' clocks there.
     """
     entered, cell = np.unique(
         np.searchsorted(knots.times, gps_time, side="right"), return_inverse=True
@@ -153,7 +153,7 @@ def interpolate_knots(
 def predictor_by(
     moments: Callable, layout: Layout, trend: np.ndarray, trend_root: np.ndarray
 ) -> Callable:
-    """A predictor as ``Collocation.predict`` calls it, in chunks: mean and covariance.
+    """Make a predictor for ``Collocation.predict``, which returns mean and covariance in chunks.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def predictor_by(
         covariance (q, k, k), at epochs gps_time (q,) and clocks (q, s).
     layout : Layout
     trend, trend_root : (p,), (p, p) array
-        The root is None where only means are asked for.
+        The root is None if only means are needed.
     """
     processes = np.bincount(layout.signal, minlength=layout.states.size).tolist()
 
@@ -187,7 +187,7 @@ def predictor_by(
             mean[part] = design[part] @ trend + (mixing @ values[..., -1:])[..., 0]
             if trend_root is None:
                 continue
-            # of the trend's covariance, what the signal does not absorb
+            # the part of the trend's covariance that the signal does not absorb
             left = (design[part] - mixing @ values[..., :-1]) @ trend_root
             covariance[part] = mixing @ spread @ mixing.swapaxes(1, 2) + left @ left.swapaxes(1, 2)
         if trend_root is None:

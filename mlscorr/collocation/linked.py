@@ -1,19 +1,20 @@
-"""Collocation of rows that link epochs: ties between passes, targets seen in any number of them.
+"""Collocation of rows that link epochs: ties between passes, targets observed in several passes.
 
-Beside ``collocate``, which is exact to 1e-9 and for rows of one epoch each. With H what the rows
-see of the states at knots (and of errors that they share), R their noise and L0 the information of
-the prior,
+``collocate`` is exact to 1e-9, but takes only rows of one epoch each. With H the partial
+derivatives of the rows by the states at knots (and by shared errors), R their noise and L0 the
+information of the prior,
 
     L = L0 + H^T R^-1 H,   V^-1 = R^-1 - R^-1 H L^-1 H^T R^-1,   |V| = |R| |L| / |L0|
 
 and S = A^T V^-1 A and the rest is least squares of the trend (``solve_trend``). L is factored in
-blocks; L^-1 is known where rows, and epochs between knots, need it, so sigmas, leave-one-out
-residuals and redundancy numbers are exact: linear in rows and knots, whatever epochs a row links.
+blocks. L^-1 is computed where rows, and epochs between knots, need it, so sigmas, leave-one-out
+residuals and redundancy numbers are exact. The work is linear in rows and knots, whichever epochs a
+row links.
 
-What knots leave of a signal, r, is taken for noise that each row has alone, though rows near each
-other share it. It does no harm while it is small beside what all rows between two knots together
-leave open of the signal, sigma / sqrt(n): a signal below the noise needs knots a good part of its
-correlation time apart, where one far above it needs dozens in that time.
+The interpolation error r of a signal between knots is treated as independent noise of each row,
+though adjacent rows share it. It does no harm while it is small compared with the uncertainty that
+all rows between two knots leave in the signal, sigma / sqrt(n). A signal below the noise needs
+about one knot per correlation time, one far above it dozens.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ from mlscorr.collocation.sparse_rows import (
     row_covariances,
 )
 
-LARGEST_SHARE = 0.3  # of a signal's sigma; for larger ones Q_11 is no power of the step any more
+LARGEST_SHARE = 0.3  # of a signal's sigma; beyond it Q_11 is no longer a power of the step
 
 
 def collocate_by_knots(
@@ -52,22 +53,22 @@ def collocate_by_knots(
 ) -> Collocation:
     r"""Separate the misclosures of sparse rows into trend, signal and noise.
 
-    Solves l = A x + B s + n as ``collocate`` does, to 1e-5 m and 1 % of sigma where signals have a
-    sigma of some metres. Work and memory grow with rows and knots, and an error that passes share
-    costs no more than a knot. Observations in the order of time are solved twice as fast as others.
+    Solves l = A x + B s + n as ``collocate`` does, to 1e-5 m and 1 % of sigma for signals with a
+    sigma of a few meters. Work and memory are linear in rows and knots, and a shared error costs no
+    more than a knot. Observations sorted by time are solved twice as fast.
 
     Parameters
     ----------
     rows : sequence of SparseRows
         With the same signals and trend: control, ties, steps.
     like : InformationSolver, optional
-        Of the same epochs: its knots and order of elimination are used again. A likelihood is
-        smooth in the signals' parameters only where knots stay.
+        Solver of the same epochs, whose knots and order of elimination are used again. A likelihood
+        is smooth in the signals' parameters only if the knots do not change.
     tolerance : float
-        What knots may leave over what the observations of an interval between two of them leave
-        open together: fewer knots, where those for all digits would only cost time.
+        Allowed ratio of the interpolation error between two knots to the uncertainty that the
+        observations between them leave; a larger one needs fewer knots.
     believed : (k, p + 1) array, optional
-        Of the trend, as of a Collocation.
+        Prior of the trend; see Collocation.
 
     Returns
     -------
@@ -77,11 +78,11 @@ def collocate_by_knots(
     Raises
     ------
     ValueError
-        As ``collocate`` does, and where knots stand so close that rounding is all that is left.
+        See ``collocate``; also if knots are so close that only rounding errors remain.
 
     Examples
     --------
-    A step of 0.3 m that a tie sees between two passes, of which the first is held to 1 mm:
+    A step of 0.3 m that a tie observes between two passes, the first constrained to 1 mm:
 
     >>> from mlscorr.collocation import Noise, Signal, SparseRows, collocate_by_knots
     >>> from mlscorr.collocation.covariance import Covariance
@@ -99,22 +100,22 @@ def collocate_by_knots(
 
 
 def reweight(solved: Collocation, weights: Sequence[np.ndarray]) -> Collocation:
-    """The same rows with their own noise's variance divided by weights.
+    """Solve the same rows with the variance of their own noise divided by weights.
 
-    Only numbers are worked out again, neither knots nor the order of elimination: for robust
-    estimation, which changes weights in each round.
+    Knots and order of elimination are kept, only numbers are recomputed. Used for robust
+    estimation, which changes weights in each iteration.
 
     Parameters
     ----------
     solved : Collocation
-        By ``collocate_by_knots``.
+        Solved by ``collocate_by_knots``.
     weights : sequence of (n,) arrays
-        Of the observations of each SparseRows, positive; one for the noise they have.
+        Weights of the observations of each SparseRows, positive; one for their stated noise.
 
     Raises
     ------
     ValueError
-        Where a weight isn't positive.
+        If a weight is not positive.
     """
     return _solve(solved.solver.reweighted(weights), solved.believed)
 
@@ -125,17 +126,17 @@ def _solve(solver, believed):
 
 @dataclass(frozen=True)
 class LeftOut:
-    """What the other observations say of each of n, of r rows.
+    """Leave-one-out prediction of each of n observations of r rows from all others.
 
     Parameters
     ----------
     residual : (n, r) array
-        l less its prediction by all others.
+        l minus its prediction from all others.
     covariance : (n, r, r) array
         Of the residual, with the observation's own noise.
     redundancy : (n, r) array
-        Share of an error in a row that its residual shows. All sum to the redundancy of the
-        solution, m - p less what the signals take up.
+        Share of an error in a row that appears in its residual. Their sum is the redundancy of the
+        solution, m - p minus the part absorbed by the signals.
     """
 
     residual: np.ndarray
@@ -144,15 +145,15 @@ class LeftOut:
 
 
 def leave_each_out(solved: Collocation) -> list[LeftOut]:
-    """Leave each observation out in turn: of each SparseRows a LeftOut.
+    """Leave-one-out prediction of every observation, with a LeftOut for each SparseRows.
 
-    Not a number where the others don't determine the trend. Passes of a target that share its
-    survey are left out together by ``Collocation.leave_out``.
+    NaN if the others do not determine the trend. ``Collocation.leave_out`` omits passes of a target
+    that share its survey together.
 
     Parameters
     ----------
     solved : Collocation
-        By ``collocate_by_knots``.
+        Solved by ``collocate_by_knots``.
     """
     solver = solved.solver
     projected = solver.by_rows(solved.projected)
@@ -172,7 +173,7 @@ def leave_each_out(solved: Collocation) -> list[LeftOut]:
 
 @dataclass(frozen=True)
 class InformationSolver:
-    """V of sparse rows by L.
+    """Solver of V of sparse rows by means of L.
 
     Parameters
     ----------
@@ -181,7 +182,7 @@ class InformationSolver:
     knots : Knots
     pattern : Pattern
     sides : tuple of Sides
-        Of each SparseRows, with nodes in the order of elimination.
+        Sides of each SparseRows, with nodes in the order of elimination.
     """
 
     rows: tuple[SparseRows, ...]
@@ -194,7 +195,7 @@ class InformationSolver:
     def of(
         cls, rows: Sequence[SparseRows], like: InformationSolver | None, tolerance: float = 0.0
     ) -> InformationSolver:
-        """The solver of rows; see ``collocate_by_knots``."""
+        """Make the solver of rows; see ``collocate_by_knots``."""
         signals = rows[0].signals
         layout = Layout.of(signals)
         if like is None:
@@ -220,7 +221,7 @@ class InformationSolver:
         return cls(tuple(rows), layout, knots, pattern, placed)
 
     def reweighted(self, weights: Sequence[np.ndarray]) -> InformationSolver:
-        """The same with other weights; see ``reweight``."""
+        """Return the solver with other weights; see ``reweight``."""
         sides = []
         for side, part, weight in zip(self.sides, self.rows, weights, strict=True):
             if not (weight > 0).all():
@@ -232,7 +233,7 @@ class InformationSolver:
         return replace(self, sides=tuple(sides))
 
     def by_rows(self, columns: np.ndarray) -> list[np.ndarray]:
-        """Columns (m, c) in parts (n, r, c), one for each SparseRows.
+        """Split columns (m, c) into parts (n, r, c), one for each SparseRows.
 
         Parameters
         ----------
@@ -244,7 +245,7 @@ class InformationSolver:
         return [part.reshape(*shape, columns.shape[1]) for part, shape in parts]
 
     def whiten(self, columns: np.ndarray) -> np.ndarray:
-        """Few rows, of which W^T W = c^T V^-1 c: residuals and steps of the prior, triangular."""
+        """Whiten columns to few triangular rows with W^T W = c^T V^-1 c."""
         states, residuals = self._solved(columns)
         parts = chain(residuals, self._prior_steps(states))
         triangles = [np.linalg.qr(p.reshape(-1, columns.shape[1]), mode="r") for p in parts]
@@ -252,10 +253,10 @@ class InformationSolver:
 
     @property
     def log_determinant(self) -> float:
-        """Of V."""
+        """Log determinant of V."""
         processes = np.bincount(self.layout.signal, minlength=len(self.layout.states))
         roots = np.einsum("kii->ki", self._prior[0])
-        roots = np.log(np.where(roots > 0, roots, 1.0)).sum(axis=1)  # states that a signal has
+        roots = np.log(np.where(roots > 0, roots, 1.0)).sum(axis=1)  # unused states excluded
         total = np.log(diagonal(self.pattern, self._factor)).sum()
         total -= roots @ np.repeat(processes, np.diff(self.knots.first))
         total -= sum(np.log(np.einsum("nii->ni", part.white)).sum() for part in self.sides)
@@ -270,7 +271,7 @@ class InformationSolver:
         return np.concatenate([part.reshape(-1, part.shape[2]) for part in weights])
 
     def precision(self, rows: np.ndarray) -> np.ndarray:
-        """A block of V^-1: of one observation by the selected inverse, else by solving."""
+        """Return a block of V^-1, for one observation from the selected inverse."""
         ends = np.cumsum([part.sigma.size for part in self.sides])
         of_part = np.searchsorted(ends, rows, side="right")
         number, row = np.divmod(rows - ends[of_part], self._heights[of_part])  # from the end
@@ -306,7 +307,7 @@ class InformationSolver:
         return white.swapaxes(1, 2) @ (np.eye(white.shape[1]) - known) @ white
 
     def predictor(self, _: np.ndarray, trend: np.ndarray, trend_root: np.ndarray) -> Callable:
-        """The predictor of the rows' own columns, whatever is given; see Collocation.predict."""
+        """Make the predictor of the rows' own columns; the argument is ignored."""
         states = self._own_solution[0].copy()
         states[:, -1] -= states[:, :-1] @ trend
         inverse = np.empty(0) if trend_root is None else self._inverse
@@ -321,7 +322,7 @@ class InformationSolver:
     @cached_property
     def _cells(self):
         """Knots.cells in the order of elimination."""
-        return np.append(self.pattern.place, -1)[self.knots.cells]  # -1 stays
+        return np.append(self.pattern.place, -1)[self.knots.cells]  # -1 is kept
 
     @cached_property
     def _prior(self):
@@ -355,7 +356,7 @@ class InformationSolver:
     def _inverse(self):
         """Values of the selected inverse of L, in the place of its factor.
 
-        Who needs both has the factor worked out again: it is most of the memory.
+        If both are needed, the factor is computed again, because it takes most of the memory.
         """
         values = self._factor
         _ = self._own_solution
@@ -372,11 +373,11 @@ class InformationSolver:
 
     @cached_property
     def _own_solution(self):
-        """States and residuals by these columns, which outlast the factor."""
+        """States and residuals by these columns, which are kept longer than the factor."""
         return self._estimate(self.columns)
 
     def _refuse(self, error):
-        """Say where knots stand too close, by the error of each state's pivot."""
+        """Report knots that are too close, by the error of each state's pivot."""
         place = np.searchsorted(self.pattern.first, np.argmax(error), side="right") - 1
         node = np.flatnonzero(self.pattern.place == place)[0]
         where = "of a shared error"
@@ -431,7 +432,7 @@ class InformationSolver:
             local = np.arange(d * np.sum(self.layout.signal == s))
             for begin in range(first[s], first[s + 1], CHUNK):
                 knots = np.arange(begin, min(begin + CHUNK, first[s + 1]))
-                before = np.maximum(knots - 1, first[s])  # nothing is carried to the first
+                before = np.maximum(knots - 1, first[s])  # no transition to the first knot
                 roots, carried = (part[knots, None, :d, :d] for part in self._prior)
                 here, there = (
                     self.pattern.first[place[k]][:, None] + local for k in (knots, before)
@@ -446,15 +447,15 @@ class InformationSolver:
 def information_edges(layout: Layout, knots: Knots, sides: Sequence[Sides]) -> np.ndarray:
     """Pairs (h, 2) of nodes.
 
-    All knots about a time are linked, so that the inverse knows what is needed at any epoch, and
-    so are all that an observation sees.
+    All knots adjacent to an interval are linked, so that the inverse is available for any epoch,
+    and so are all nodes of an observation.
 
     Parameters
     ----------
     layout : Layout
     knots : Knots
     sides : sequence of Sides
-        Numbered as the knots are, and not in the order of elimination.
+        With nodes numbered as the knots, not in the order of elimination.
     """
     about = list(knots.cells.reshape(len(knots.cells), -1).T)
     pairs = [_distinct(combinations(about, 2))]
@@ -467,7 +468,7 @@ def information_edges(layout: Layout, knots: Knots, sides: Sequence[Sides]) -> n
 
 
 def _visible(layout, knots, sides, e):
-    """Nodes (n,) visible to side e of each observation, -1 for none: two for each signal."""
+    """Nodes (n,) that side e of each observation depends on, two for each signal; -1 for none."""
     for s, d in enumerate(layout.states):
         before, after = knots.cells[sides.cell[:, e], s].T
         yield before
@@ -476,12 +477,12 @@ def _visible(layout, knots, sides, e):
 
 
 def _distinct(pairs):
-    """Distinct pairs (h, 2) of nodes of some pairs of arrays, where both are some."""
+    """Distinct pairs (h, 2) of valid nodes from pairs of arrays."""
     bits = 32
     codes = [np.zeros(0, dtype=np.int64)]
     codes += [(a << bits | b)[(a >= 0) & (b >= 0)] for a, b in pairs]
     codes = np.sort(np.concatenate(codes))
-    codes = codes[np.diff(codes, prepend=-1) > 0]  # sooner than np.unique, which fills a table
+    codes = codes[np.diff(codes, prepend=-1) > 0]  # faster than np.unique, which builds a table
     return np.column_stack([codes >> bits, codes & ((1 << bits) - 1)])
 
 
@@ -492,8 +493,8 @@ def sufficient_steps(rows: Sequence[SparseRows], tolerance: float) -> list[float
     ----------
     rows : sequence of SparseRows
     tolerance : float
-        Largest sigma of r over that of the mean of the rows between two knots; of zero, r is
-        ``SHARE`` of the signal's sigma whatever the rows tell.
+        Largest sigma of r over that of the mean of the rows between two knots. With zero, r is
+        ``SHARE`` of the signal's sigma regardless of the rows.
     """
     steps = []
     for number, signal in enumerate(rows[0].signals):
@@ -505,13 +506,13 @@ def sufficient_steps(rows: Sequence[SparseRows], tolerance: float) -> list[float
 
 
 def _information(rows, number):
-    """What a view tells of a signal on average, and how many views there are a unit of its clock.
+    """Mean information of a view on a signal, and number of views per unit of its clock.
 
-    The first is the square of the signal's sigma in a row over that of the row's noise.
+    The information is the squared sigma of the signal in a row over that of the row's noise.
     """
     signal = rows.signals[number]
     variance = np.einsum("nii->ni", rows.noise.separate)
-    variance = np.maximum(variance, np.finfo(float).eps ** 2)  # where there is none, others refuse
+    variance = np.maximum(variance, np.finfo(float).eps ** 2)  # zero noise is refused later
     n, r = variance.shape
     square = (signal.mixing**2).sum(axis=2).reshape(n, rows.gps_time.shape[1], r)
     ratio = (square / variance[:, None]).mean(axis=2).ravel()
@@ -521,13 +522,13 @@ def _information(rows, number):
     clock = np.ravel(clock)[ratio > 0]
     if len(clock) == 0:
         return 0.0, 0.0
-    away = 1.0 / signal.covariance.rate  # beyond it views tell nothing of each other
+    away = 1.0 / signal.covariance.rate  # beyond it views are independent
     covered = np.minimum(np.diff(np.unique(clock)), away).sum() + away
     return ratio.sum() / len(clock), len(clock) / covered
 
 
 def _share(covariance: Covariance, information, density, tolerance):
-    """The share s of sigma with s^2 information max(1, density step(s)) <= tolerance^2."""
+    """Share s of sigma with s^2 information max(1, density step(s)) <= tolerance^2."""
     if information == 0.0:
         return LARGEST_SHARE
     largest = tolerance / np.sqrt(information)

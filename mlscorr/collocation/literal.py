@@ -1,12 +1,12 @@
-"""The paper's predictor as printed (Mao et al. 2015, Eq. 13-15, 19 and 20).
+"""Predictor of the paper as printed (Mao et al. 2015, Eq. 13-15, 19 and 20).
 
-Two covariances there describe the same signal and don't fit each other: D_Lambda, between the
-control epochs, is diagonal and holds the variances v(Lambda) that the POS states; D_Lambda'Lambda,
-between them and other epochs, is C0 exp(-t / dt). C0 stands in the second alone, so the predicted
-signal is proportional to it: the squared RMS of any residuals is exactly a parabola in C0, whose
-value at C0 = 0 is that of the trend alone. The paper's Table 3 shows it: parabolas through its
-rows leave R^2 = 1 - 1e-6, and the one of 21 points starts at 0.1619 m, LS of order 5 having
-0.1618 m. If C0 stood in D_Lambda too, the signal would grow less than in proportion.
+Two covariances there describe the same signal, but are inconsistent. D_Lambda, between the control
+epochs, is diagonal and contains the variances v(Lambda) that the POS states. D_Lambda'Lambda,
+between control and other epochs, is C0 exp(-t / dt). C0 appears only in the second, so the
+predicted signal is proportional to it: the squared RMS of any residuals is exactly a parabola in
+C0, whose value at C0 = 0 is that of the trend only. The paper's Table 3 confirms this: parabolas
+through its rows have R^2 = 1 - 1e-6, and the one of 21 points starts at 0.1619 m, where LS of order
+5 has 0.1618 m. If C0 also appeared in D_Lambda, the signal would grow less than proportionally.
 """
 
 from collections.abc import Sequence
@@ -44,15 +44,15 @@ class LiteralSignal:
 
 @dataclass(frozen=True)
 class LiteralCollocation:
-    """A solved literal collocation.
+    """Solved literal collocation.
 
-    Covariances of predictions are None. The paper gives none, and its own covariances can't: as
-    they are no joint covariance, the error variance that follows from them may be negative.
+    Covariances of predictions are None. The paper gives none, and its covariances cannot give any:
+    they do not form a joint covariance, so the resulting error variance may be negative.
 
     Parameters
     ----------
     gps_time, misclosure, signals
-        As in collocate_literal.
+        See collocate_literal.
     least_squares : Collocation
         Of the trend, with V = B D_Lambda B^T + D_omega.
     """
@@ -64,13 +64,13 @@ class LiteralCollocation:
 
     @property
     def trend(self) -> np.ndarray:
-        """The trend's parameters (p,): x of Eq. 13."""
+        """Parameters (p,) of the trend, x of Eq. 13."""
         return self.least_squares.trend
 
     def predict(
         self, gps_time: np.ndarray, design: np.ndarray, partials: Sequence[np.ndarray]
     ) -> tuple[np.ndarray, None]:
-        """Trend plus signal at other epochs: (q, r), and None for its covariance.
+        """Predict trend plus signal at other epochs: (q, r), and None for its covariance.
 
         Parameters
         ----------
@@ -78,7 +78,7 @@ class LiteralCollocation:
             Units: s.
         design : (q, r, p) array
         partials : sequence of (q, r, k) arrays
-            By which each signal's Lambda' enters.
+            Partial derivatives by each signal's Lambda'.
         """
         weights = self.least_squares.weights.reshape(self.misclosure.shape)  # V^-1 (l - A x)
         mean = design @ self.trend
@@ -101,21 +101,21 @@ def collocate_literal(
     design: np.ndarray,
     signals: Sequence[LiteralSignal],
 ) -> LiteralCollocation:
-    """Collocation as the paper prints it; for its experiments, not for surveys.
+    """Solve the collocation as the paper prints it; for its experiments, not for surveys.
 
-    Without signals, or with C0 = 0, it is least squares of the trend: with weights
-    (B D_Lambda B^T + D_omega)^-1, so plain LS where these are the same at all epochs.
+    Without signals, or with C0 = 0, it is least squares of the trend with weights (B D_Lambda B^T +
+    D_omega)^-1, which is plain LS if these are the same at all epochs.
 
     Parameters
     ----------
     gps_time, misclosure, noise, design
-        As in collocate.
+        See collocate.
     signals : sequence of LiteralSignal
 
     Raises
     ------
     ValueError
-        As collocate does.
+        See collocate.
 
     Examples
     --------

@@ -39,33 +39,33 @@ def collocate(
     Solves l = A x + B s + n with one covariance function throughout (Mao et al. 2015,
     Eq. 13-15; the paper's diagonal D_Lambda is no valid joint covariance with Eq. 20).
 
-    Work and memory grow with epochs times the square of the states (the processes' 1, 2 or 3
-    each). What the passes of a target share costs r columns for each target seen more than once,
-    filtered along with the misclosures, and a dense factor of all these columns: fit for dozens
-    of such targets, 8 n c (r + 3 d) bytes with c columns and d states. For rows that see two
-    epochs ``collocate_rows`` is there.
+    Work and memory grow with epochs times the square of the states (the processes' 1, 2 or 3 each).
+    Errors shared by the passes of a target cost r columns for each target with several passes,
+    filtered with the misclosures, and a dense factor of all these columns. This suits dozens of
+    such targets: 8 n c (r + 3 d) bytes with c columns and d states. For rows of two epochs use
+    ``collocate_rows``.
 
     Parameters
     ----------
     gps_time : (n,) array
-        Time of each epoch, in any order and more than once. Units: s.
+        Time of each epoch, in any order, with repetitions. Units: s.
     misclosure : (n, r) array
         Surveyed - observed. Units: m.
     noise : Noise
-        Survey and extraction (Eq. 19).
+        Noise of survey and extraction (Eq. 19).
     design : (n, r, p) array
-        A. May have no column.
+        A. May have zero columns.
     signals : sequence of Signal
     believed : (k, p + 1) array, optional
-        Of the trend, as of a Collocation.
+        Prior of the trend; see Collocation.
     second_views : (h, r) array, optional
-        Sigmas of the places that the last h epochs share with others, see ``collocate_rows``.
+        Sigmas of the places that the last h epochs share with others; see ``collocate_rows``.
 
     Raises
     ------
     ValueError
-        Where a number is not finite, the trend is not determined (rank of A) or the covariance of
-        the observations is not positive definite.
+        If a number is not finite, the trend is not determined (rank of A) or the covariance of the
+        observations is not positive definite.
 
     Examples
     --------
@@ -106,7 +106,7 @@ def collocate(
 
 
 def check_finite(gps_time: np.ndarray, *arrays: np.ndarray) -> None:
-    """Refuse epochs with what is no number, which a solver would carry on to all others.
+    """Refuse epochs with non-finite numbers, which a solver would spread to all others.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def check_finite(gps_time: np.ndarray, *arrays: np.ndarray) -> None:
     Raises
     ------
     ValueError
-        Where a number is not finite.
+        If a number is not finite.
     """
     wrong = np.zeros(len(gps_time), dtype=bool)
     for values in (gps_time, *arrays):
@@ -131,31 +131,31 @@ def check_finite(gps_time: np.ndarray, *arrays: np.ndarray) -> None:
 
 
 def _steps(clocks):
-    """Times (n, s) since the epoch before, zero for the first."""
+    """Times (n, s) since the previous epoch, zero for the first."""
     return np.diff(clocks, prepend=clocks[:1], axis=0)
 
 
 @dataclass(frozen=True)
 class MarkovSolver:
-    """V = V0 + U U^T: V0 of signals and separate noise by the recursion, U the shared errors.
+    """Solver of V = V0 + U U^T: V0 of signals and separate noise by recursion, U shared errors.
 
-    With C = [W U; I] = Q T, W the whitener of V0, the whitener of V is [W; 0] less its part in the
+    With C = [W U; I] = Q T, W the whitener of V0, the whitener of V is [W; 0] minus its part in the
     columns of Q, and V^-1 = V0^-1 - Y Y^T with Y = V0^-1 U T^-1 (Woodbury).
 
     Parameters
     ----------
     order : (n,) int array
-        Of time; all that follow but shared are in it.
+        Order of time; all arrays below except shared use it.
     gps_time, clocks : (n,), (n, s) array
     layout : Layout
     mixing : (n, r, k) array
     transitions, gains, whiteners, covariances
-        As of filter_covariance.
+        See filter_covariance.
     shared : (n r, c) array
         U, in the caller's order.
     second_views : (h, r) array
-        Of the last h epochs in the caller's order, as of ``collocate_rows``: their rows are no
-        observations of their own, and hidden from whoever asks.
+        Of the last h epochs in the caller's order; see ``collocate_rows``. Their rows are not
+        observations, and are hidden from callers.
     """
 
     order: np.ndarray
@@ -171,7 +171,7 @@ class MarkovSolver:
     second_views: np.ndarray
 
     def whiten(self, columns: np.ndarray) -> np.ndarray:
-        """Columns of which W^T W = c^T V^-1 c, in the order of time."""
+        """Whiten columns so that W^T W = c^T V^-1 c, in the order of time."""
         columns = self._padded(columns)
         whitened = self._filter(columns)[0].reshape(columns.shape)
         if not self.shared.size:
@@ -182,11 +182,11 @@ class MarkovSolver:
 
     @property
     def log_determinant(self) -> float:
-        """Of V."""
+        """Log determinant of V."""
         total = -2 * np.log(np.einsum("nii->ni", self.whiteners)).sum()
         if self.shared.size:
             total += 2 * np.log(np.abs(np.diag(self._woodbury[1]))).sum()
-        return total - 2 * np.log(self.second_views).sum()  # of the places, which nobody asked for
+        return total - 2 * np.log(self.second_views).sum()  # remove the places
 
     def solve(self, columns: np.ndarray) -> np.ndarray:
         """V^-1 c."""
@@ -194,7 +194,7 @@ class MarkovSolver:
         return solved[: len(columns)]
 
     def precision(self, rows: np.ndarray) -> np.ndarray:
-        """A block of V^-1."""
+        """Return a block of V^-1."""
         r = self.mixing.shape[1]
         rows = np.asarray(rows)
         position = self._position[rows // r]
@@ -211,14 +211,14 @@ class MarkovSolver:
         return 0.5 * (block + block.T)
 
     def predictor(self, columns: np.ndarray, trend: np.ndarray, trend_root: np.ndarray) -> Callable:
-        """The predictor of these columns; see Collocation.predict.
+        """Make the predictor of these columns; see Collocation.predict.
 
         Parameters
         ----------
         columns : (m, p + 1) array
             [A, l - A x].
         trend, trend_root : (p,), (p, p) array
-            The root is None where only means are asked for.
+            The root is None if only means are needed.
         """
         nodes = self._smooth(self._without_shared(self._padded(columns)))[1]
         table = (self.gps_time, self.clocks, self.layout, nodes, *self._node_covariances)
@@ -230,7 +230,7 @@ class MarkovSolver:
 
     @cached_property
     def _position(self):
-        """Place of each epoch in the order of time."""
+        """Position of each epoch in the order of time."""
         return np.argsort(self.order)
 
     @property
@@ -262,7 +262,9 @@ class MarkovSolver:
         return np.linalg.qr(np.vstack([whitened, np.eye(self.shared.shape[1])]))
 
     def _without_shared(self, columns):
-        """Columns less the shared errors estimated from them: V0^-1 of it is V^-1 of them."""
+        """Columns minus the shared errors estimated from them; V0^-1 of the result is V^-1 of the
+        columns.
+        """
         if not self.shared.size:
             return columns
         basis, triangle = self._woodbury
@@ -278,7 +280,7 @@ class MarkovSolver:
 
     @cached_property
     def _node_covariances(self):
-        """Covariances of the smoothed states with themselves and those of the next epoch."""
+        """Covariances of the smoothed states, and with those of the next epoch."""
         same, following = self._smoothed[1:]
         if not self.shared.size:
             return same, following

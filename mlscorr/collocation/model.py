@@ -1,4 +1,4 @@
-"""The model l = A x + B s + n: trend, signals and noise, and the least squares of the trend."""
+"""Model l = A x + B s + n: trend, signals and noise, and least squares of the trend."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ import numpy as np
 from mlscorr.collocation.covariance import Covariance
 from mlscorr.survey import SAME_EPOCH
 
-SMALLEST_INFORMATION = 1e-9  # least share of the trend's information left without some rows
-LARGEST_ERROR = 0.01  # of the log-likelihood by rounding: parameters differ by more than that
+SMALLEST_INFORMATION = 1e-9  # smallest share of the trend's information without some rows
+LARGEST_ERROR = 0.01  # of the log-likelihood by rounding; parameters differ by more than that
 NOT_POSITIVE = (
     "The covariance of the {} misclosures is not positive definite: two observations of one time "
     "without noise, or a sigma of zero. Give each observation and control point the sigma it has."
@@ -33,13 +33,13 @@ def polynomial_design(
         First and last control epoch. Units: s.
     order : int
     extrapolate : bool
-        Whether the polynomial runs on outside the span, as in the paper; else it keeps its value
-        at the end, as it would run away there.
+        True to extend the polynomial beyond the span, as in the paper. Otherwise it keeps its value
+        at the end, because it would diverge there.
 
     Returns
     -------
     (q, 3, 3 (order + 1)) array
-        Parameters of one degree, three axes, follow each other.
+        Parameters are ordered by degree, then by axis.
     """
     first, last = span
     middle = (first + last) / 2
@@ -53,7 +53,7 @@ def polynomial_design(
 
 @dataclass(frozen=True)
 class Signal:
-    """Random processes of one covariance function, and how they enter the observations.
+    """Random processes with one covariance function, and their effect on the observations.
 
     Parameters
     ----------
@@ -61,10 +61,10 @@ class Signal:
         B times the sigmas of k independent processes, each of unit variance, at n epochs with r
         observations each.
     covariance : Covariance
-        Of the lags of ``clock``.
+        Function of lags of ``clock``.
     clock : (n,) array, optional
-        The processes' own time, which never falls as gps_time rises; a leap of more than all
-        correlation times lets them start anew. gps_time by default. Units: s.
+        The processes' own time, non-decreasing with gps_time; a jump much longer than all
+        correlation times restarts them. gps_time by default. Units: s.
     """
 
     mixing: np.ndarray
@@ -85,7 +85,7 @@ def signal_clocks(signals: Sequence[Signal], gps_time: np.ndarray) -> np.ndarray
 
 
 def _clock_columns(gps_time, clocks):
-    """Clocks (n, s) of which those that are None are gps_time."""
+    """Clocks (n, s), with gps_time in place of None."""
     columns = np.tile(gps_time[:, None], (1, len(clocks)))
     for number, clock in enumerate(clocks):
         if clock is not None:
@@ -100,11 +100,11 @@ class Noise:
     Parameters
     ----------
     own : (n, r, r) array
-        Covariance of what each epoch has alone: the extraction. Units: m^2.
+        Covariance of the independent noise of each epoch, from the extraction. Units: m^2.
     group : (n,) int array, optional
-        Which target each epoch has seen, as a row of ``shared``.
+        Target of each epoch, as a row of ``shared``.
     shared : (g, r) array, optional
-        Sigmas of the error that all epochs of a target have in common: its survey. Units: m.
+        Sigmas of the error common to all epochs of a target, from its survey. Units: m.
     """
 
     own: np.ndarray
@@ -113,7 +113,7 @@ class Noise:
 
     @cached_property
     def separate(self) -> np.ndarray:
-        """Covariance (n, r, r) of each epoch's noise, without what it shares with others."""
+        """Covariance (n, r, r) of each epoch's noise, without the errors shared with others."""
         if self.group is None:
             return self.own
         is_single = ~np.isin(self.group, self.repeated)
@@ -132,7 +132,7 @@ class Noise:
 
     @cached_property
     def repeated(self) -> np.ndarray:
-        """Groups that have several epochs and an error to share."""
+        """Groups with several epochs and a shared error."""
         if self.group is None:
             return np.zeros(0, dtype=np.int64)
         groups, count = np.unique(self.group, return_counts=True)
@@ -140,32 +140,32 @@ class Noise:
 
     @property
     def matrix(self) -> np.ndarray:
-        """All of it as one covariance matrix (n r, n r)."""
+        """Return the full noise covariance matrix (n r, n r)."""
         return self.block(np.arange(self.own.shape[0] * self.own.shape[1]))
 
     def block(self, rows: np.ndarray) -> np.ndarray:
-        """Covariance of some rows, numbered as in a Collocation."""
+        """Return the covariance of some rows, numbered as in a Collocation."""
         epoch, row = np.divmod(np.asarray(rows, dtype=int), self.own.shape[1])
         separate = self.separate[epoch[:, None], row[:, None], row]
         common = self.common[rows]
         return np.where(epoch[:, None] == epoch, separate, 0.0) + common @ common.T
 
     def select(self, epochs: np.ndarray) -> Noise:
-        """The noise of some epochs: their numbers, or an (n,) mask."""
+        """Return the noise of some epochs, by their indices or an (n,) mask."""
         group = None if self.group is None else self.group[epochs]
         return Noise(self.own[epochs], group, self.shared)
 
 
 @dataclass(frozen=True)
 class Collocation:
-    """A solved collocation: trend, and what is needed to predict the signal at any epoch.
+    """Solved collocation: trend, and all that is needed to predict the signal at any epoch.
 
     Rows are numbered as in ``misclosure.ravel()``: observation j of epoch i is row i r + j.
 
     Parameters
     ----------
     solver : DenseSolver or MarkovSolver
-        Of V = B D B^T + N.
+        Solver of V = B D B^T + N.
     misclosure, design : (m,), (m, p) array
         l and A.
     trend, trend_root : (p,), (p, p) array
@@ -173,11 +173,11 @@ class Collocation:
     log_likelihood : float
         Restricted log-likelihood of the misclosures.
     sigma0 : float
-        Square root of the weighted residual sum of squares over the redundancy, m - p and what is
-        believed of the trend; one if the model is right.
+        Square root of the weighted residual sum of squares over the redundancy, m - p plus the
+        priors of the trend; one if the model is right.
     believed : (k, p + 1) array
-        What is believed of the trend: further rows of A, a coefficient each, and their misclosures,
-        all with a sigma of one.
+        Prior of the trend: further rows of A, one coefficient each, and their misclosures, all with
+        a sigma of one.
     """
 
     solver: Any
@@ -206,7 +206,7 @@ class Collocation:
         mixings: Sequence[np.ndarray],
         clocks: Sequence[np.ndarray | None] | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Trend plus signal at other epochs, with covariance  (Eq. 15).
+        """Predict trend plus signal at other epochs, with covariance  (Eq. 15).
 
         Parameters
         ----------
@@ -216,12 +216,12 @@ class Collocation:
         mixings : list of (q, r, k) arrays, one for each signal
             Row q of the result is design @ x + sum of mixing @ s(gps_time).
         clocks : list of (q,) arrays or None, optional
-            Of the signals that have a clock of their own, there.
+            Clocks at these epochs, for the signals that have their own.
 
         Returns
         -------
         mean, covariance : (q, r), (q, r, r) array
-            The covariance is that of the error: it falls where there are observations, and it
+            The covariance is that of the prediction error: it decreases near observations, and
             includes that of the trend.
         """
         gps_time = np.asarray(gps_time, dtype=float)
@@ -236,7 +236,7 @@ class Collocation:
         mixings: Sequence[np.ndarray],
         clocks: Sequence[np.ndarray | None] | None = None,
     ) -> np.ndarray:
-        """The mean (q, r) of ``predict`` by itself, which sparse rows know without an inverse."""
+        """Predict the mean (q, r) only, which sparse rows give without an inverse."""
         return replace(self, trend_root=None).predict(gps_time, design, mixings, clocks)[0]
 
     @cached_property
@@ -246,7 +246,7 @@ class Collocation:
 
     @cached_property
     def _leverage(self):
-        """Orthonormal basis (m + k, p) of the columns of A and of what is believed of the trend."""
+        """Orthonormal basis (m + k, p) of the columns of A and of the prior of the trend."""
         return np.linalg.qr(np.vstack([self.design, self.believed[:, :-1]]))[0]
 
     @cached_property
@@ -260,18 +260,18 @@ class Collocation:
         return self.solver.solve(np.column_stack([self.design, self.misclosure]))
 
     def determined_without(self, rows: np.ndarray) -> bool:
-        """Whether the observations other than these determine the trend."""
+        """Return True if the observations other than these determine the trend."""
         basis = self._leverage[rows]
         limit = 1.0 - SMALLEST_INFORMATION
-        is_small = np.sum(basis**2) < limit  # of all singular values, which is quick
+        is_small = np.sum(basis**2) < limit  # sum over all singular values, which is fast
         return bool(is_small or np.linalg.svd(basis, compute_uv=False)[0] ** 2 < limit)
 
     def leave_out(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What the other observations say of some: residuals (l - prediction) and covariance.
+        """Predict some observations from all others: residuals (l - prediction) and covariance.
 
-        The covariance includes the noise of the observations left out, which is what a test of
-        them needs. Both come from the block of V^-1 less the trend's part, without solving again
-        (Dubrule 1983, Math. Geology 15, 687-699).
+        The covariance includes the noise of the omitted observations, as a test of them requires.
+        Both come from the block of V^-1 minus the trend's part, without solving again (Dubrule
+        1983, Math. Geology 15, 687-699).
 
         Parameters
         ----------
@@ -280,7 +280,7 @@ class Collocation:
         Raises
         ------
         ValueError
-            Where the others don't determine the trend.
+            If the others do not determine the trend.
         """
         if not self.determined_without(rows):
             raise ValueError(
@@ -291,7 +291,7 @@ class Collocation:
         return covariance @ self.weights[rows], covariance
 
     def precision_of(self, rows: np.ndarray) -> np.ndarray:
-        """Inverse covariance (k, k) of rows that are left out, the trend unknown."""
+        """Return the inverse covariance (k, k) of omitted rows, with the trend unknown."""
         projected = self.projected[rows]
         return self.solver.precision(rows) - projected @ projected.T
 
@@ -299,26 +299,26 @@ class Collocation:
 def solve_trend(
     solver: Any, misclosure: np.ndarray, design: np.ndarray, believed: np.ndarray | None = None
 ) -> Collocation:
-    """Generalised least squares, x = (A^T V^-1 A)^-1 A^T V^-1 l  (Eq. 13).
+    """Solve generalized least squares, x = (A^T V^-1 A)^-1 A^T V^-1 l  (Eq. 13).
 
-    What is believed of the trend stands below the whitened misclosures. The likelihood is the
-    restricted one, of what the trend leaves (Rasmussen and Williams 2006, Eq. 2.43; 2.45 with the
-    trend's prior infinitely wide where nothing is believed).
+    The prior of the trend is appended below the whitened misclosures. The likelihood is the
+    restricted one (Rasmussen and Williams 2006, Eq. 2.43; 2.45 with an infinitely wide prior for
+    coefficients without one).
 
     Parameters
     ----------
     solver : DenseSolver or MarkovSolver
-        Of V. It has ``whiten(columns)``, of which W^T W = c^T V^-1 c; ``log_determinant``;
+        Solver of V. It has ``whiten(columns)``, with W^T W = c^T V^-1 c; ``log_determinant``;
         ``solve(columns)``, V^-1 c; ``precision(rows)``, a block of V^-1; ``predictor(columns,
-        trend, root)``, of means alone where the root is None.
+        trend, root)``, of means only if the root is None.
     misclosure, design : (m,), (m, p) array
     believed : (k, p + 1) array, optional
-        As of a Collocation.
+        See Collocation.
 
     Raises
     ------
     ValueError
-        Where the rank of A is less than its columns.
+        If the rank of A is less than its number of columns.
     """
     p = design.shape[1]
     if believed is None:
@@ -326,7 +326,7 @@ def solve_trend(
     whitened = np.vstack([solver.whiten(np.column_stack([design, misclosure])), believed])
     basis, triangle = np.linalg.qr(whitened[:, :p])
     values = np.linalg.svd(triangle, compute_uv=False)
-    smallest = len(whitened) * np.finfo(float).eps  # of a rank, as numpy's matrix_rank has it
+    smallest = len(whitened) * np.finfo(float).eps  # for the rank, as in numpy's matrix_rank
     redundancy = len(misclosure) + len(believed) - p
     if redundancy < 0 or (p and values[-1] <= smallest * values[0]):
         raise ValueError(

@@ -1,9 +1,9 @@
-"""Rows that see the signals at an epoch or more, as sums over the states at knots.
+"""Rows that observe the signals at one or more epochs, as sums over the states at knots.
 
-A row is l = sum over its sides of B(t) f(t), plus A x, u of the target that it shares with other
-rows, and noise. It is whitened by W with W R W^T = I, R the noise and what the knots leave. H,
-which observes the states, is never written out: each loop over rows expands W H of the observation
-that it comes to, some dozen columns that are not zero.
+A row is l = sum over its sides of B(t) f(t), plus A x, an error u shared with other rows of the
+target, and noise. It is whitened by W with W R W^T = I, where R is the noise and the interpolation
+error between knots. H, which observes the states, is never stored: each loop over rows expands W H
+of the current observation, about a dozen nonzero columns.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from mlscorr.compiled_loops import loop
 
 @dataclass(frozen=True)
 class SparseRows:
-    """Observations of r rows each, that see the signals at e epochs, their sides.
+    """Observations of r rows each, which depend on the signals at e epochs, their sides.
 
-    A control target has one side and three rows, a tie two sides and one row: as ``Ties`` has its
-    misclosure, the mixing of its first side is n^T P(t_1), that of the second -n^T P(t_2).
+    A control target has one side and three rows, a tie two sides and one row. With the misclosure
+    of ``Ties``, the mixing of its first side is n^T P(t_1), that of the second -n^T P(t_2).
 
     Parameters
     ----------
@@ -38,10 +38,10 @@ class SparseRows:
         Units: m.
     noise : Noise
     design : (n, r, p) array
-        A. May have no column.
+        A. May have zero columns.
     signals : sequence of Signal
-        With mixings (n e, r, k) and clocks (n e,) at the sides, those of an observation after each
-        other. Of the same covariances wherever rows are solved together.
+        With mixings (n e, r, k) and clocks (n e,) at the sides, those of an observation in
+        sequence. Rows that are solved together must have the same covariances.
     """
 
     gps_time: np.ndarray
@@ -62,27 +62,27 @@ class SparseRows:
         n, r = np.shape(self.misclosure)
         shape = (n, np.shape(self.gps_time)[1], r)
         parts = [signal.mixing.reshape(*shape, signal.mixing.shape[-1]) for signal in self.signals]
-        if len(parts) == 1:  # without a copy: it is most of what many ties hold
+        if len(parts) == 1:  # no copy, because many ties take most memory here
             return np.ascontiguousarray(parts[0], dtype=float)
         return np.concatenate([np.zeros((*shape, 0)), *parts], axis=3)
 
 
 class Sides(NamedTuple):
-    """What n observations of r rows each see of the states.
+    """Dependence of n observations of r rows each on the states.
 
     Parameters
     ----------
     cell : (n, e) int array
-        Of the knots, for each side.
+        Cell of the knots, for each side.
     gains : (n, e, s, 2 d) array
-        Of the states at the knots about it.
+        Gains of the states at the two adjacent knots.
     mixing : (n, e, r, k) array
     unknown : (n,) int array
         Node of the shared error, -1 for none.
     sigma : (n, r) array
-        Of the shared error.
+        Sigmas of the shared error.
     remaining : (n, e, s) array
-        Variance of what the knots leave of each signal.
+        Variance of each signal's interpolation error between knots.
     white : (n, r, r) array
         W.
     """
@@ -97,7 +97,7 @@ class Sides(NamedTuple):
 
     @classmethod
     def of(cls, rows: SparseRows, layout: Layout, knots: Knots, nodes: int) -> Sides:
-        """What rows see of the states at knots.
+        """Make the sides of rows for states at knots.
 
         Parameters
         ----------
@@ -105,7 +105,7 @@ class Sides(NamedTuple):
         layout : Layout
         knots : Knots
         nodes : int
-            Number of the first node for errors that they share.
+            Index of the first node for shared errors.
         """
         gps_time, clocks = rows.epochs
         mixing = rows.mixing
@@ -126,17 +126,17 @@ class Sides(NamedTuple):
         return sides.whitened(layout, own)
 
     def placed(self, place: np.ndarray) -> Sides:
-        """The same with nodes in the order of elimination.
+        """Return the sides with nodes in the order of elimination.
 
         Parameters
         ----------
         place : (k,) int array
-            Of each node.
+            Position of each node.
         """
-        return self._replace(unknown=np.append(place, -1)[self.unknown])  # -1 stays
+        return self._replace(unknown=np.append(place, -1)[self.unknown])  # -1 is kept
 
     def whitened(self, layout: Layout, separate: np.ndarray) -> Sides:
-        """The same with another noise that each observation has alone.
+        """Return the sides with another independent noise of each observation.
 
         Parameters
         ----------
@@ -146,7 +146,7 @@ class Sides(NamedTuple):
         Raises
         ------
         ValueError
-            Where it is not positive definite.
+            If it is not positive definite.
         """
         own = np.ascontiguousarray(separate, dtype=float)
         white = whiteners(layout, self.mixing, self.remaining, own)
@@ -158,16 +158,16 @@ class Sides(NamedTuple):
 def check_same(
     sizes: np.ndarray, pattern: Pattern, sides: Sequence[Sides], known: Sequence[Sides]
 ) -> None:
-    """Refuse rows that see other states than those whose knots they should use.
+    """Refuse rows that depend on other states than those whose knots they should use.
 
     Parameters
     ----------
     sizes : (k,) int array
-        Number of states of each node that the rows see.
+        Number of states of each node that the rows depend on.
     pattern : Pattern
-        Of the others.
+        Pattern of the other rows.
     sides, known : sequences of Sides
-        Of the rows, and of the others.
+        Sides of these rows, and of the others.
     """
     same = np.array_equal(sizes, np.diff(pattern.first)[pattern.place]) and len(sides) == len(known)
     for here, there in zip(sides, known, strict=False):
@@ -185,7 +185,7 @@ def check_same(
 def whiteners(
     layout: Layout, mixing: np.ndarray, remaining: np.ndarray, own: np.ndarray
 ) -> np.ndarray:
-    """W of noise and of what the knots leave; not a number where that is not positive definite.
+    """W of noise and interpolation error; NaN if their sum is not positive definite.
 
     Parameters
     ----------
@@ -252,12 +252,12 @@ def observe(
     y: np.ndarray,
     transposed: bool,
 ) -> None:
-    """Y <- y + W H x, or x <- x + H^T W^T y, in place.
+    """Replace y by y + W H x, or x by x + H^T W^T y.
 
     Parameters
     ----------
     layout, pattern, cells, sides
-        As of add_information.
+        See add_information.
     x : (n, c) array
         Of the states.
     y : (n, r, c) array
@@ -289,7 +289,7 @@ def row_covariances(
     Parameters
     ----------
     layout, pattern, cells, sides
-        As of add_information.
+        See add_information.
     inverse : (v,) array
         Values of the selected inverse.
     """
@@ -321,13 +321,13 @@ def row_covariances(
 
 
 class Expanded(NamedTuple):
-    """An observation's rows of W H: its distinct nodes and their columns, of which ``number`` hold.
+    """Expanded rows of W H of one observation: its distinct nodes and their columns.
 
     Parameters
     ----------
     number : (1,) int array
     nodes, begin : (c,), (c + 1,) int array
-        In the order of elimination, and where the columns of each begin.
+        Nodes in the order of elimination, and start of the columns of each.
     columns : (r, w) array
     processes : (s + 1,) int array
         First process of each signal.
@@ -342,7 +342,7 @@ class Expanded(NamedTuple):
 
 @loop
 def _room(layout, sides):
-    """Room for an expanded observation."""
+    """Allocate an expanded observation."""
     _, e, r, _ = sides.mixing.shape
     capacity = 2 * e * layout.states.size + 1
     width = 2 * e * layout.states[layout.signal].sum() + r
@@ -378,7 +378,7 @@ def _expand(layout, first, cells, sides, i, out):
         at = _enter(number, nodes, begin, columns, first, unknown[i])
         for m in range(columns.shape[0]):
             columns[m, at + m] += sigma[i, m]
-    for m in range(columns.shape[0] - 1, -1, -1):  # W is lower triangular: its last row first
+    for m in range(columns.shape[0] - 1, -1, -1):  # W is lower triangular: last row first
         row = columns[m, : begin[number[0]]]
         row *= white[i, m, m]
         for other in range(m):
@@ -387,7 +387,7 @@ def _expand(layout, first, cells, sides, i, out):
 
 @loop
 def _enter(number, nodes, begin, columns, first, node):
-    """Where the columns of a node begin; a new one's are zero."""
+    """Start of the columns of a node; columns of a new one are set to zero."""
     for at in range(number[0]):
         if nodes[at] == node:
             return begin[at]

@@ -1,7 +1,7 @@
-"""Whitening: V of scalar observations factored once, for thousands of columns a second.
+"""Whitening: V of scalar observations factored once, for thousands of columns per second.
 
-V = V0 + U U^T with V0 of Markov signals and separate noise and U the errors that observations have
-in common. The recursion is that of ``collocate``, without keeping states and their covariances.
+V = V0 + U U^T with V0 of Markov signals and separate noise and U the shared errors. The recursion
+is that of ``collocate``, but states and their covariances are not kept.
 """
 
 from __future__ import annotations
@@ -18,26 +18,26 @@ from mlscorr.collocation._states import Layout, carry
 from mlscorr.collocation.model import NOT_POSITIVE, Signal, signal_clocks
 from mlscorr.compiled_loops import loop
 
-CHUNK = 64  # columns filtered at once: their states stay in the first cache
+CHUNK = 64  # columns filtered at once: their states stay in the first-level cache
 
 
 @dataclass(frozen=True)
 class Whitener:
-    """The factor of V of n scalar observations in the order of time, made by ``factor``.
+    """Factor of V of n scalar observations in order of time, made by ``factor``.
 
     Parameters
     ----------
     recursion : Recursion
-        Of V0, without the axis of observations: gains (n, d), whiteners (n,).
+        Recursion of V0, without the axis of observations: gains (n, d), whiteners (n,).
     common : (n, c) array
-        U: errors of unit variance that observations have in common.
+        U: shared errors of unit variance.
     """
 
     recursion: Recursion
     common: np.ndarray
 
     def with_common(self, common: np.ndarray) -> Whitener:
-        """The same V0 with other errors in common: nothing is factored again but these.
+        """Return the same V0 with other shared errors; only these are factored again.
 
         Parameters
         ----------
@@ -46,7 +46,7 @@ class Whitener:
         return replace(self, common=common)
 
     def whiten(self, columns: np.ndarray) -> Whitened:
-        """Columns c as Whitened: their products are c^T V^-1 c.
+        """Whiten columns c; products of the result are c^T V^-1 c.
 
         Parameters
         ----------
@@ -60,14 +60,14 @@ class Whitener:
 
     @cached_property
     def log_determinant(self) -> float:
-        """Of V."""
+        """Log determinant of V."""
         total = -2 * np.log(self.recursion.whiteners).sum()
         if self.common.shape[1]:
             total += 2 * np.log(np.diag(self._common[1])).sum()
         return float(total)
 
     def log_likelihood(self, columns: np.ndarray | Whitened) -> np.ndarray:
-        """Of columns with covariance V, without the constant of 2 pi: (k,).
+        """Log-likelihood (k,) of columns with covariance V, without the constant of 2 pi.
 
         Parameters
         ----------
@@ -80,7 +80,7 @@ class Whitener:
         return -0.5 * (white.squares + self.log_determinant)
 
     def innovations(self, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Each observation less its prediction by all earlier ones, over its sigma.
+        """Prediction error of each observation from all earlier ones, over its sigma.
 
         Parameters
         ----------
@@ -100,7 +100,7 @@ class Whitener:
         return innovations, sigma * growth
 
     def solve(self, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """V^-1 c, and the diagonal of V^-1.
+        """Compute V^-1 c, and the diagonal of V^-1.
 
         Parameters
         ----------
@@ -125,15 +125,14 @@ class Whitener:
     def draw(
         self, rng: np.random.Generator, number: int, tails: np.ndarray | None = None
     ) -> np.ndarray:
-        """Random columns of covariance V.
+        """Draw random columns of covariance V.
 
         Parameters
         ----------
         rng : numpy.random.Generator
         number : int
         tails : (q,) array, optional
-            Innovations whose distribution theirs should have, scaled to unit variance; normal by
-            default.
+            Innovations whose distribution is used, scaled to unit variance; normal by default.
 
         Returns
         -------
@@ -165,7 +164,7 @@ class Whitener:
 
 @dataclass(frozen=True)
 class Whitened:
-    """Columns c, whitened: those by V0, less what the errors in common explain of them.
+    """Whitened columns c: whitened by V0, minus the part explained by shared errors.
 
     Parameters
     ----------
@@ -180,7 +179,7 @@ class Whitened:
         return Whitened(self.separate[:, columns], self.shared[:, columns])
 
     def product(self, other: Whitened) -> np.ndarray:
-        """a^T V^-1 b of two sets of columns: (k, l)."""
+        """Product a^T V^-1 b of two sets of columns: (k, l)."""
         return self.separate.T @ other.separate - self.shared.T @ other.shared
 
     @property
@@ -194,7 +193,7 @@ class Whitened:
         Parameters
         ----------
         index : (h, p) int array
-            Numbers of the columns of each block.
+            Indices of the columns of each block.
         """
         separate, shared = (v[:, index].transpose(1, 2, 0) for v in (self.separate, self.shared))
         return separate @ separate.swapaxes(1, 2) - shared @ shared.swapaxes(1, 2)
@@ -211,13 +210,13 @@ def factor(
     Parameters
     ----------
     gps_time : (n,) array
-        In order. Units: s.
+        Sorted. Units: s.
     signals : sequence of Signal
         With mixings (n, 1, k).
     variance : (n,) array
-        Of each observation's own noise.
+        Variance of each observation's independent noise.
     common : (n, c) array, optional
-        Errors of unit variance that observations have in common.
+        Shared errors of unit variance.
 
     Returns
     -------
@@ -226,7 +225,7 @@ def factor(
     Raises
     ------
     ValueError
-        Where times are out of order, or V is not positive definite.
+        If times are not sorted, or V is not positive definite.
 
     >>> from mlscorr.collocation.covariance import Covariance
     >>> time = np.array([0.0, 1.0, 2.0])
@@ -268,7 +267,7 @@ def whiten_columns(
         Without the axis of observations: mixing (n, k), gains (n, d), whiteners (n,).
     columns, out : (n, c) array
     inverse : bool
-        Give white columns the covariance V0 instead.
+        True to give white columns the covariance V0 instead.
     """
     layout, transitions, mixing, gains, whiteners = recursion
     n, c = columns.shape
@@ -291,22 +290,22 @@ def whiten_columns(
 
 @loop
 def common_innovations(shared: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Innovations where observations have unit errors in common.
+    """Innovations of observations with shared unit errors.
 
-    Recursive least squares: the errors are estimated from all earlier observations.
+    The shared errors are estimated from all earlier observations by recursive least squares.
 
     Parameters
     ----------
     shared : (n, c) array
-        By which the errors enter white observations.
+        Coefficients of the errors in white observations.
     columns : (n, k) array
-        White but for these errors.
+        White except for these errors.
 
     Returns
     -------
     innovations : (n, k) array
     growth : (n,) array
-        Of their sigma by what isn't known of the errors.
+        Growth of their sigma due to the uncertainty of the errors.
     """
     n, k = columns.shape
     c = shared.shape[1]

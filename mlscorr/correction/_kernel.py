@@ -1,4 +1,4 @@
-"""The fast kernel: what each point moves, from its own time stamp."""
+"""Fast kernel: the shift of each point from its own time stamp."""
 
 import numpy as np
 
@@ -6,12 +6,12 @@ from mlscorr.compiled_loops import loop
 
 
 def require_times(points: int, times: int) -> None:
-    """Refuse points without a time each: the kernel, which checks no index, would read on.
+    """Refuse points without a time each, because the kernel checks no index.
 
     Parameters
     ----------
     points, times : int
-        How many there are.
+        Numbers of points and of times.
 
     Raises
     ------
@@ -29,20 +29,20 @@ def locate(
 ) -> np.ndarray:
     """Index i with epochs[i] <= time <= epochs[i + 1] for each point (n,); -1 outside and in gaps.
 
-    From the epoch before by one, then by leaps of the usual step, each from where the last one
-    landed (a gap costs one more), then by bisection.
+    The search tries the next epoch, then leaps of the usual step, each from the end of the last one
+    (a gap costs one more), then bisection.
 
     Parameters
     ----------
     gps_time : (n,) array
         In the file's time system. Units: s.
     constant : float
-        Added to gps_time, it gives the trajectory's time. Units: s.
+        Added to gps_time to get the trajectory's time. Units: s.
     epochs : (k,) array
     step : float
         Usual step of the epochs. Units: s.
     is_gap : (k,) bool array
-        Whether the step after each epoch is a gap.
+        True if the step after the epoch is a gap.
     """
     index = np.empty(gps_time.size, dtype=np.int32)
     last = epochs.size - 1
@@ -91,18 +91,18 @@ def fill_increments(
     increments: np.ndarray,
     inside: np.ndarray,
 ) -> None:
-    """Fill increments (n, 3) and inside (n,) of points.
+    """Compute increments (n, 3) and inside (n,) of points in place.
 
     Parameters
     ----------
     gps_time, epochs, step, is_gap
-        As for ``locate``.
+        See ``locate``.
     xyz : (n, 3) array
-        About the correction's origin. Units: m.
+        Relative to the correction's origin. Units: m.
     table : (k, 15) array
-        Of the Correction.
+        Table of the Correction.
     increments, inside : (n, 3), (n,) array
-        To be filled; untouched where a point has no pose.
+        Output; unchanged for points without a pose.
     """
     index = locate(gps_time, 0.0, epochs, step, is_gap)
     for p in range(gps_time.size):
@@ -131,22 +131,23 @@ def move_integers(
     table: np.ndarray,
     rest: np.ndarray,
 ) -> tuple[int, int]:
-    """Move the scaled integers of points by whole increments, in place.
+    """Move the scaled integers of points by integer increments, in place.
 
     Parameters
     ----------
     xs, ys, zs : (n,) int32 array
     scale, offset : (3,) array
-        The offset is about the correction's origin. Units: m.
+        The offset is relative to the correction's origin. Units: m.
     gps_time, constant, epochs, step, is_gap, table
-        As for ``locate`` and ``fill_increments``.
+        See ``locate`` and ``fill_increments``.
     rest : (3,) array
         Added to points without a pose. Units: m.
 
     Returns
     -------
     outside, overflow : int
-        Numbers of points without a pose, and of those that don't fit 32 bits, which stay.
+        Numbers of points without a pose, and of points that would not fit 32 bits and stay
+        unchanged.
     """
     index = locate(gps_time, constant, epochs, step, is_gap)
     outside = 0

@@ -1,4 +1,4 @@
-"""The pair recorded -> corrected of trajectory and mounting, and what follows for points."""
+"""Correction of points by the pair recorded -> corrected of trajectory and mounting."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ from mlscorr.survey import (
 )
 from mlscorr.wording import counted
 
-FARTHEST = 10_000.0  # m; of a point from the trajectory: no mobile scanner reaches a third of it
+FARTHEST = 10_000.0  # m; largest distance of a point from the trajectory
 
 
 @dataclass(frozen=True, repr=False)
 class Correction(Summary):
-    """The pair recorded -> corrected of trajectory and mounting, applied to points by their time.
+    """Pair recorded -> corrected of trajectory and mounting, applied to points by their time.
 
     With T, R the recorded pose, T', R' the corrected one, and a mounting that turns by
     C = R_L^P' (R_L^P)^T, Eq. 1 backward and forward again gives
@@ -40,23 +40,23 @@ class Correction(Summary):
         x' = x + shift(t) + turn(t) (x - T(t))
         turn = R' C R^T - I,  shift = T' - T + R' (T_L^P' - C T_L^P)
 
-    Both are small and smooth, so they, not the poses, are interpolated between epochs.
+    Both are small and smooth, so they are interpolated between epochs instead of the poses.
 
     Parameters
     ----------
     recorded, corrected : Trajectory
-        Of the same n epochs.
+        Both with the same n epochs.
     recorded_mounting, corrected_mounting : Mounting, optional
-        Without both, the mounting stays as it is, and cancels.
+        Without both, the mounting does not change and cancels.
     covariance : (n, 6, 6) array, optional
         Of the corrected position (m) and of a small rotation about the map axes (rad).
     datum : (3,) array, optional
-        What of it needs no time, and moves points outside the trajectory, too. Units: m.
+        Time-independent part, which also moves points outside the trajectory. Units: m.
 
     Raises
     ------
     ValueError
-        When the two trajectories have different epochs.
+        If the two trajectories have different epochs.
     """
 
     recorded: Trajectory
@@ -79,16 +79,16 @@ class Correction(Summary):
         recorded_mounting: Mounting | None = None,
         corrected_mounting: Mounting | None = None,
     ) -> Correction:
-        """The correction that takes a POS error away, and a mounting's if both are given.
+        """Make the correction that removes a POS error, and a mounting error if both are given.
 
         Parameters
         ----------
         trajectory : Trajectory
             As recorded.
         pose : (n, 6) array
-            What must be added: position in m, a rotation about the map axes in rad.
+            Values to add: position in m, rotation about the map axes in rad.
         covariance : (n, 6, 6) array, optional
-            Of the pose; becomes the sigmas of the corrected trajectory, which has none without.
+            Of the pose; gives the sigmas of the corrected trajectory, which otherwise has none.
         recorded_mounting, corrected_mounting : Mounting, optional
         """
         position_sigma = attitude_sigma = None
@@ -107,7 +107,7 @@ class Correction(Summary):
 
     @cached_property
     def table(self) -> np.ndarray:
-        """T - origin, shift, and turn row by row of each epoch (n, 15), float64."""
+        """T - origin, shift and turn (row by row) of each epoch, (n, 15) float64."""
         old = self.recorded
         new = self.corrected
         turned = new.attitude
@@ -130,11 +130,11 @@ class Correction(Summary):
 
     @property
     def origin(self) -> np.ndarray:
-        """Local origin (3,) in m that keeps products of coordinates small."""
+        """Local origin (3,) in m, which keeps products of coordinates small."""
         return np.round(self.recorded.position[0])
 
     def increments(self, xyz: np.ndarray, gps_time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What must be added to points.
+        """Compute the increments to add to points.
 
         Parameters
         ----------
@@ -144,13 +144,13 @@ class Correction(Summary):
         Returns
         -------
         increments : (n, 3) array
-            Outside the trajectory the datum alone. Units: m.
+            Only the datum outside the trajectory. Units: m.
         inside : (n,) bool array
 
         Raises
         ------
         ValueError
-            Unless each point has a time.
+            If the numbers of points and times differ.
         """
         require_times(len(xyz), len(gps_time))
         increments = np.tile(self.datum, (len(gps_time), 1))
@@ -168,27 +168,27 @@ class Correction(Summary):
         return increments, inside
 
     def apply(self, cloud: Any) -> Any:
-        """Correct points by their times; those outside the trajectory are moved by the datum alone.
+        """Correct points by their times; those outside the trajectory move by the datum only.
 
         Parameters
         ----------
         cloud : PointCloud, open3d.t.geometry.PointCloud, (xyz, gps_time) or points of laspy
-            With times in the trajectory's system, places in the map: those of an Open3D cloud
-            count from its attribute ``origin``, if it has one.
+            With times in the trajectory's system and map coordinates. Positions of an Open3D cloud
+            refer to its attribute ``origin``, if it has one.
 
         Returns
         -------
         as given
-            A new cloud in the form that was given; the one given stays as it is. Coordinates of
-            laspy keep their scale. Warns where points lie outside the trajectory.
+            A new cloud in the same form; the input does not change. Coordinates of laspy keep their
+            scale. Warns if points are outside the trajectory.
 
         Raises
         ------
         ValueError
-            For values that are not finite, and where no point of another form than a PointCloud
-            has a time within the trajectory, or all lie far from it, as about a local origin.
+            If values are not finite; and, except for a PointCloud, if no point has a time within
+            the trajectory or all are far from it, as with a local origin.
         TypeError
-            For another form.
+            If the points have another form.
 
         >>> import numpy as np
         >>> from mlscorr.frames import attitude_from_angles
@@ -209,17 +209,17 @@ class Correction(Summary):
         return back(self._moved_if_here(points))
 
     def before_after(self, cloud: Any, origin: ArrayLike | None = None) -> dict[str, Any]:
-        """A cloud as it was and corrected, as two geometries of Open3D about one origin.
+        """Return a cloud before and after the correction, as two Open3D geometries with one origin.
 
-        Both share the memory of all but their positions. They are colored alike, in grey by
-        intensity, unless the cloud has the attribute ``colors``.
+        Both share all memory except their positions. Both are gray by intensity, unless the cloud
+        has the attribute ``colors``.
 
         Parameters
         ----------
         cloud : PointCloud, open3d.t.geometry.PointCloud or (xyz, gps_time)
-            As of ``apply``.
+            See ``apply``.
         origin : (3,) array, optional
-            As of ``PointCloud.to_open3d``. Units: m.
+            See ``PointCloud.to_open3d``. Units: m.
 
         Returns
         -------
@@ -229,7 +229,7 @@ class Correction(Summary):
         Raises
         ------
         ValueError, TypeError
-            As of ``apply``.
+            See ``apply``.
 
         >>> import numpy as np
         >>> from mlscorr.frames import attitude_from_angles
@@ -246,19 +246,19 @@ class Correction(Summary):
         return geometry_pair(points, self._moved_if_here(points), origin)
 
     def _moved(self, cloud):
-        """A PointCloud corrected, and which points lie within the trajectory."""
+        """Return the corrected PointCloud, and the mask of points within the trajectory."""
         moved, inside = self.increments(cloud.xyz, cloud.gps_time)
         return replace(cloud, xyz=np.add(cloud.xyz, moved, out=moved)), inside
 
     def _moved_if_here(self, cloud):
-        """A PointCloud corrected; refused where it is of another place or time."""
+        """Return the corrected PointCloud; refuse one from another place or time."""
         self._require_near(cloud.xyz)
         moved, inside = self._moved(cloud)
         self._require_inside(np.count_nonzero(~inside), cloud.gps_time)
         return moved
 
     def _moved_las(self, points):
-        """Points of laspy, corrected in a copy by whole steps of their scale."""
+        """Correct a copy of laspy points by whole steps of their scale."""
         copied, record = copied_las(points)
         if len(record) == 0:
             return copied
@@ -285,7 +285,7 @@ class Correction(Summary):
             )
 
     def _require_inside(self, outside, gps_time):
-        """Refuse points of which none was measured within the trajectory; warn of some."""
+        """Refuse points if none was measured within the trajectory; warn if some were not."""
         if outside == 0 or len(gps_time) == 0:
             return
         first, last = self.recorded.gps_time[[0, -1]]
@@ -311,7 +311,7 @@ class Correction(Summary):
     ) -> int:
         """Correct the scaled integers of a LAS record in place, as x' = scale * X' + offset.
 
-        Only whole increments are added, so that a correction of zero changes no bit.
+        Only integer increments are added, so that a zero correction changes no bit.
 
         Parameters
         ----------
@@ -322,18 +322,18 @@ class Correction(Summary):
         gps_time : (n,) array
             In the file's own time system. Units: s.
         time_constant : float
-            Added to gps_time, it gives the trajectory's time. Units: s.
+            Added to gps_time to get the trajectory's time. Units: s.
 
         Returns
         -------
         int
-            Number of points outside the trajectory, which the datum alone moves.
+            Number of points outside the trajectory, moved by the datum only.
 
         Raises
         ------
         ValueError
-            When a corrected coordinate does not fit the file's 32 bit integers, or not each point
-            has a time.
+            If a corrected coordinate does not fit the file's 32-bit integers, or a point has no
+            time.
         """
         require_times(len(xyz[0]), len(gps_time))
         outside, overflow = move_integers(
@@ -358,19 +358,19 @@ class Correction(Summary):
 
     @cached_property
     def is_gap(self) -> np.ndarray:
-        """Whether the step after each epoch is a gap, (n,) bool."""
+        """Flag (n,) of epochs that are followed by a gap."""
         gap = np.isin(self.recorded.gps_time, self.recorded.gaps[:, 0])
         gap[-1] = True
         return gap
 
 
 def require_fit(overflow: int, scale: np.ndarray, offset: np.ndarray) -> None:
-    """Refuse corrected points that a file's integers can't hold.
+    """Refuse corrected points that do not fit a file's integers.
 
     Parameters
     ----------
     overflow : int
-        How many there are.
+        Number of such points.
     scale, offset : (3,) array
         Of the file. Units: m.
 
@@ -390,16 +390,16 @@ def require_fit(overflow: int, scale: np.ndarray, offset: np.ndarray) -> None:
 def increments_by_scanner(
     corrections: Sequence[Correction], xyz: np.ndarray, gps_time: np.ndarray, scanner: np.ndarray
 ) -> np.ndarray:
-    """What must be added to points that scanners saw, each by its own correction. Units: m.
+    """Increments for points of several scanners, each by its own correction. Units: m.
 
     Parameters
     ----------
     corrections : sequence of Correction
-        Of each scanner.
+        One for each scanner.
     xyz : (..., 3) array
         Units: m.
     gps_time, scanner : (...) array
-        Of each point, and the number of its scanner. Units: s.
+        Of each point, and the index of its scanner. Units: s.
     """
     increments = np.empty_like(xyz)
     for number, correction in enumerate(corrections):

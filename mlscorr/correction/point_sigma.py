@@ -1,4 +1,4 @@
-"""Uncertainty of points: what the sigmas of pose, mounting and beam do to E, N and H (Eq. 5)."""
+"""Uncertainty of points: propagation of pose, mounting and beam sigmas to E, N and H (Eq. 5)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mlscorr.correction.pair import Correction
 from mlscorr.frames import map_root, skew
 from mlscorr.survey import Mounting, Scanner
 
-ELEMENTS = (  # those of the pose's covariance that enter the variances of E, N and H
+ELEMENTS = (  # elements of the pose's covariance that enter the variances of E, N and H
     (0, 0),
     (1, 1),
     (2, 2),
@@ -36,19 +36,19 @@ ELEMENTS = (  # those of the pose's covariance that enter the variances of E, N 
 class PointSigma:
     """One sigma of the corrected points' E, N and H.
 
-    It follows from the covariance of the corrected pose (of all six components where the
-    correction has it, else from its sigmas), the covariance of the mounting,
-    and the noise of range and angle. The angle's counts across the beam in any direction.
+    It follows from the covariance of the corrected pose (full 6 x 6 if the correction has it,
+    otherwise from its sigmas), the covariance of the mounting, and the noise of range and angle.
+    Angle noise acts in both directions across the beam.
 
     Parameters
     ----------
     epochs, is_gap : (n,) array
-        Of the trajectory; whether the step after each one is a gap.
+        Epochs of the trajectory; True if a gap follows.
     origin : (3,) array
         Local origin. Units: m.
     table : (n, 21) array
-        Place of POS and scanner about the origin, and the elements ``ELEMENTS`` of the pose's
-        covariance.
+        Positions of POS and scanner relative to the origin, and the elements ``ELEMENTS`` of the
+        pose's covariance.
     range_noise, angle_noise : float
         Units: m, rad.
     """
@@ -64,20 +64,20 @@ class PointSigma:
     def of(
         cls, correction: Correction, scanner: Scanner, mounting: Mounting | None = None
     ) -> PointSigma:
-        """Sigmas of the points that a correction moves.
+        """Make the sigmas of the points that a correction moves.
 
         Parameters
         ----------
         correction : Correction
-            With covariance, or sigmas of its corrected trajectory.
+            With a covariance, or with sigmas in its corrected trajectory.
         scanner : Scanner
         mounting : Mounting, optional
-            Without one the beams are taken to start at the navigation centre.
+            Without one, beams are assumed to start at the navigation center.
 
         Raises
         ------
         ValueError
-            When the corrected trajectory has no sigmas.
+            If the corrected trajectory has no sigmas.
         """
         corrected = correction.corrected
         covariance = _pose_covariance(correction)
@@ -99,12 +99,12 @@ class PointSigma:
         )
 
     def at(self, xyz: np.ndarray, gps_time: np.ndarray) -> np.ndarray:
-        """One sigma (n, 3) of corrected points (n, 3), NaN outside the trajectory. Units: m.
+        """Return one sigma (n, 3) of corrected points (n, 3), NaN outside the trajectory. Units: m.
 
         Raises
         ------
         ValueError
-            Unless each point has a time.
+            If the numbers of points and times differ.
         """
         return self.of_integers(
             np.asarray(xyz, dtype=float).T, np.ones(3), np.zeros(3), np.asarray(gps_time, float)
@@ -118,17 +118,17 @@ class PointSigma:
         gps_time: np.ndarray,
         time_constant: float = 0.0,
     ) -> np.ndarray:
-        """The same for the scaled integers of a LAS record, when they are corrected.
+        """Return the same for the scaled integers of a LAS record, after their correction.
 
         Parameters
         ----------
         xyz, scale, offset, gps_time, time_constant
-            As ``Correction.shift_integers`` has left them.
+            See ``Correction.shift_integers``; coordinates after the correction.
 
         Raises
         ------
         ValueError
-            Unless each point has a time.
+            If the numbers of points and times differ.
         """
         require_times(len(xyz[0]), len(gps_time))
         scale = np.asarray(scale, dtype=float)
@@ -143,7 +143,7 @@ class PointSigma:
 
 
 def _pose_covariance(correction):
-    """Covariance (n, 6, 6) of the corrected position and of a small rotation about map axes."""
+    """Covariance (n, 6, 6) of the corrected position and of a small rotation about the map axes."""
     if correction.covariance is not None:
         return correction.covariance
     corrected = correction.corrected
@@ -160,9 +160,9 @@ def _pose_covariance(correction):
 
 
 def _mounting_covariance(corrected, mounting, arm):
-    """What the covariance of the mounting adds, as if the pose had them: (n, 6, 6).
+    """Contribution of the mounting's covariance, expressed as one of the poses: (n, 6, 6).
 
-    A turn of the scanner about its own place is one about the POS and a shift by the lever arm.
+    A rotation about the scanner equals one about the POS plus a shift through the lever arm.
     """
     rotation = corrected.attitude.as_matrix()
     partials = np.zeros((len(corrected), 6, 6))

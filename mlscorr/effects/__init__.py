@@ -1,4 +1,4 @@
-"""Imperfections of a survey as values: each turns what is true into what is recorded.
+"""Imperfections of a survey as values: each turns the true value into the recorded one.
 
 An effect has a magnitude in a unit, a source for its usual size, and acts at one stage of the
 measurement, on that stage's value:
@@ -16,12 +16,12 @@ mounting   Mounting                               lever_arm or boresight
 control    ControlPoints                          position (map_rotation: normal too)
 =========  =====================================  ===========================================
 
-Recorded = true + effect, but for the mounting: there the magnitude is the correction that the
-recorded one lacks, true = recorded + magnitude.
+Recorded = true + effect, except for the mounting, whose magnitude is the missing correction: true =
+recorded + magnitude.
 
-One class says all of one effect: how it changes its stage, its parameters with unit, limits and
-sources, how it enters an observation, and its words in a report. ``register`` makes a class of
-one's own known.
+One class defines all of one effect: the change of its stage, its parameters with unit, limits and
+sources, its role in an observation, and its words in a report. ``register`` adds a user's own
+class.
 """
 
 from mlscorr.effects._quantity import SizeEstimate, quantity

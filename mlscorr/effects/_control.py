@@ -14,7 +14,7 @@ from mlscorr.effects.stages import EAST_NORTH_UP, MAP
 
 @dataclass(frozen=True)
 class MapRotation(Effect):
-    """Control is turned about reference.place, counter-clockwise from above; normals too.
+    """Control is rotated about reference.place, counter-clockwise from above, including normals.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class MapRotation(Effect):
 
 @dataclass(frozen=True)
 class MapScale(Effect):
-    """Control is scaled in the plane about reference.place, by 1 + magnitude; heights are not.
+    """Control is scaled in the plane about reference.place, by 1 + magnitude, without heights.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ class VerticalDatum(Effect):
 
 @dataclass(frozen=True)
 class TargetOutlier(Effect):
-    """One surveyed target, by its name, is wrong: recorded = true + magnitude.
+    """One surveyed target, given by name, is wrong: recorded = true + magnitude.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ class TargetOutlier(Effect):
     Raises
     ------
     ValueError
-        When no target has that name.
+        If no target has that name.
     """
 
     stage: ClassVar = "control"

@@ -14,7 +14,7 @@ from mlscorr.effects.stages import noise_by_pulse
 class AngleScale(Effect):
     """The encoder's scale is wrong about the zero beam: recorded = true + magnitude angle.
 
-    The angle counts from -180 to 180 deg, whichever turn it is given in.
+    The angle is reduced to -180 to 180 deg.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class AngleEccentricity(Effect):
 
 @dataclass(frozen=True)
 class AngleNoise(Effect):
-    """Angles are noisier than stated: white noise of one more sigma, for each pulse.
+    """Angles are noisier than stated: additional white noise for each pulse, one sigma.
 
     Parameters
     ----------

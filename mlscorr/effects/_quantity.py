@@ -1,4 +1,4 @@
-"""A parameter of an effect: its unit, limits and usual size, and its size as found, in words."""
+"""Parameters of effects: unit, limits and usual size, and the estimated size in words."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -12,23 +12,23 @@ from mlscorr.wording import DASH, joined, known, size
 
 @dataclass(frozen=True)
 class Quantity:
-    """A parameter of an effect: unit, how many numbers, limits, its usual size and the source.
+    """Parameter of an effect: unit, number of components, limits, usual size and its source.
 
     Parameters
     ----------
     unit : str
     largest : float
-        Absolute value; more is refused, because
+        Largest absolute value; more is refused, because
     why : str
         of this.
     typical : float, optional
-        Usual size where it occurs.
+        Usual size if the effect occurs.
     source : str
-        Of the usual size.
+        Source of the usual size.
     count : int
-        How many numbers.
+        Number of components.
     least : float, optional
-        Smallest value; without it, as far below zero as above.
+        Smallest value; minus the largest by default.
     """
 
     unit: str
@@ -45,18 +45,18 @@ class Quantity:
         return f"{self.count} numbers in {self.unit}"
 
     def checked(self, label: str, value: Any) -> float | tuple[float, ...]:
-        """The value as a float, or as a tuple of as many as count says.
+        """Return the value as a float, or as a tuple of count floats.
 
         Parameters
         ----------
         label : str
-            With which an error's sentence opens.
+            Start of an error's sentence.
         value : number or sequence of numbers
 
         Raises
         ------
         ValueError
-            For what is no number, or beyond the limits.
+            If the value is not a number, or is outside the limits.
         """
         try:
             numbers = np.asarray(value)
@@ -89,12 +89,12 @@ class Quantity:
 
 
 def quantity(unit: str, largest: float, why: str, default: float | None = None, **more: Any) -> Any:
-    """A dataclass field that is a Quantity; required unless it has a default.
+    """Make a dataclass field that is a Quantity; required unless it has a default.
 
     Parameters
     ----------
     unit, largest, why, **more
-        Of the Quantity.
+        See Quantity.
     default : float, optional
     """
     metadata = {"quantity": Quantity(unit, largest, why, **more)}
@@ -104,12 +104,12 @@ def quantity(unit: str, largest: float, why: str, default: float | None = None, 
 
 
 class SizeEstimate(NamedTuple):
-    """What a diagnosis says of one parameter of an effect; None or NaN where it can't.
+    """Estimate of one parameter of an effect by a diagnosis; None or NaN if undetermined.
 
     Parameters
     ----------
     estimate, sigma : float or None
-        In the unit.
+        In this unit.
     unit : str
     """
 
@@ -121,12 +121,12 @@ class SizeEstimate(NamedTuple):
 def vector(
     parameters: dict[str, SizeEstimate], names: tuple[str, ...], sides: tuple[tuple[str, str], ...]
 ) -> str:
-    """The parts of a vector that differ from zero, in words; all, when none does.
+    """Describe the components of a vector that differ from zero, or all if none does.
 
     Parameters
     ----------
     parameters : dict of SizeEstimate
-        By name; what is missing or not known is left out.
+        By name; missing or unknown ones are omitted.
     names : tuple of p str
     sides : tuple of p pairs of str
         Words for above and below zero.
@@ -145,12 +145,12 @@ def vector(
 
 
 def amplitude(quadratures: Iterable[SizeEstimate]) -> str:
-    """Length of the two quadratures of a wave, and its sigma, in words.
+    """Describe the amplitude of a wave from its two quadratures, with sigma.
 
     Parameters
     ----------
     quadratures : iterable of SizeEstimate
-        Of one unit.
+        With one unit.
     """
     values, sigmas, units = zip(*quadratures, strict=True)
     if not all(map(known, values)):

@@ -1,21 +1,20 @@
-"""The numbers that the effects and their words rest on, each with its reason."""
+"""Settings of the effects and their words, each with its reason."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Numbers of this room.
+    """Settings of this package.
 
     Parameters
     ----------
     grazing_cosine : float
-        Of the angle of incidence, from which on a bias by incidence grows no more. A footprint of
-        0.35 mrad is as long as ten times its width there (84 deg), and no edge is left in a pulse
-        that comes back. Units: 1.
+        Cosine of incidence at which a bias by incidence stops growing. A footprint of 0.35 mrad is
+        then ten times as long as wide (84 deg), and the returning pulse has no edge. Units: 1.
     certain_sigmas : float
-        From zero, from which on a part of a vector is worded while others are left out: 95 % of a
-        normal distribution. Units: sigma.
+        Distance from zero at which a component of a vector is mentioned and others are omitted: 95
+        % of a normal distribution. Units: sigma.
     """
 
     grazing_cosine: float = 0.1

@@ -1,7 +1,7 @@
 """Effects of the scanner's clock.
 
-Where a source is called an estimate, here and in the other modules of this room, the sentence is
-its derivation; nothing else backs it.
+If a source is called an estimate, here and in the other modules of this package, the sentence is
+its only derivation.
 """
 
 from dataclasses import dataclass
@@ -73,7 +73,7 @@ class ClockDrift(Effect):
 
 @dataclass(frozen=True)
 class TimeJitter(Effect):
-    """Each pulse's time stamp has noise of its own, shared by the pulse's returns.
+    """Each pulse's time stamp has independent noise, shared by the pulse's returns.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""All known effects, one's own too: making them by name, and applying them in their order."""
+"""All known effects, including users' own: creation by name, and application in order."""
 
 import sys
 from collections.abc import Iterable
@@ -19,7 +19,7 @@ from mlscorr.effects import mounting, ranging, vehicle
 from mlscorr.effects.effect import Effect
 from mlscorr.effects.stages import STAGES, Reference
 
-EFFECTS = (  # a stage in a line or two, in the order in which they act
+EFFECTS = (  # one or two lines per stage, in order of action
     ranging.BeamDivergence,
     *(timing.TimeOffset, timing.ClockDrift, timing.TimeJitter),
     *(ranging.RangeScale, ranging.RangeBias, ranging.RangeWalk),
@@ -37,17 +37,17 @@ _registered: dict[str, type[Effect]] = {}  # a user's own, which act after these
 
 
 def known_effects() -> tuple[type[Effect], ...]:
-    """Classes of all effects: EFFECTS, and those that were registered, in their order."""
+    """Return the classes of all effects: EFFECTS, then registered ones in order."""
     return (*EFFECTS, *_registered.values())
 
 
 def effects_by_name() -> dict[str, type[Effect]]:
-    """Classes of all effects by their names."""
+    """Return the classes of all effects by name."""
     return {kind.name: kind for kind in known_effects()}
 
 
 def effect_class(name: str) -> type[Effect]:
-    """The class of an effect by its name.
+    """Return the class of an effect by its name.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def effect_class(name: str) -> type[Effect]:
     Raises
     ------
     ValueError
-        For an unknown name, with the nearest known one.
+        If the name is unknown; the message has the most similar one.
     """
     by_name = effects_by_name()
     if name not in by_name:
@@ -69,19 +69,19 @@ def effect_class(name: str) -> type[Effect]:
 
 
 def make_effect(name: str, **parameters: Any) -> Effect:
-    """The effect of a name with its parameters, in the units that its class states.
+    """Make an effect by name with its parameters, in the units of its class.
 
     Parameters
     ----------
     name : str
     **parameters
-        As the class names them.
+        Parameters named as in the class.
 
     Raises
     ------
     ValueError
-        In one sentence for an unknown name (with the nearest known one), unknown or missing
-        parameters, and values beyond the largest credible one.
+        For an unknown name (with the most similar one), unknown or missing parameters, and values
+        beyond the largest credible one.
 
     Examples
     --------
@@ -104,23 +104,23 @@ def make_effect(name: str, **parameters: Any) -> Effect:
 
 
 def _describe(kind):
-    """Parameters of an effect with their units: "magnitude (m), time (s)"."""
+    """List parameters of an effect with their units: "magnitude (m), time (s)"."""
     kinds = kind.quantities()
     return ", ".join(f"{f.name} ({kinds.get(f.name, 'a name')})" for f in fields(kind))
 
 
 def in_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:
-    """Effects in the order in which they act, however they were listed.
+    """Sort effects into the order in which they act.
 
     Parameters
     ----------
     effects : iterable of Effect
-        Known ones.
+        Known effects.
 
     Raises
     ------
     ValueError
-        When a random one is there twice: both would draw from one stream.
+        If a random effect occurs twice, because both would draw from one stream.
     """
     order = {kind.name: number for number, kind in enumerate(known_effects())}
     stages = list(STAGES)
@@ -142,7 +142,7 @@ def apply_effects(
     reference: Reference,
     streams: dict[str, np.random.Generator],
 ) -> Any:
-    """A stage's value after all effects of that stage, in their fixed order.
+    """Apply all effects of a stage to its value, in their fixed order.
 
     Parameters
     ----------
@@ -150,16 +150,16 @@ def apply_effects(
     stage : str
         One of STAGES.
     value
-        What the stage works on; see the table of stages in mlscorr.effects.
+        Value of the stage; see the table of stages in mlscorr.effects.
     reference : Reference
     streams : dict
-        Generator of each effect's name, as effect_streams gives them; they go on from block to
-        block, so that blocks of any size give the same.
+        Generator by effect name, from effect_streams; they continue from block to block, so that
+        results do not depend on block size.
 
     Raises
     ------
     ValueError
-        For an unknown stage.
+        If the stage is unknown.
     """
     _known_stage(stage)
     for effect in in_order(effects):
@@ -174,9 +174,10 @@ def _known_stage(stage):
 
 
 def effect_streams(rng: np.random.Generator) -> dict[str, np.random.Generator]:
-    """A random stream for every known effect by its name, whether it is used or not.
+    """Make a random stream for every known effect by name, whether it is used or not.
 
-    Those of registered effects stem from the last of the others, whose draws they leave alone.
+    Streams of registered effects derive from the last of the others, whose draws they do not
+    change.
 
     Parameters
     ----------
@@ -188,27 +189,27 @@ def effect_streams(rng: np.random.Generator) -> dict[str, np.random.Generator]:
 
 
 def register(kind: type[Effect]) -> type[Effect]:
-    """Make an effect of one's own known by its name, to simulator, diagnosis and report.
+    """Register a user's effect by its name, for simulator, diagnosis and report.
 
     Parameters
     ----------
     kind : class of an Effect
-        A frozen dataclass that says all that Effect asks for. Another of its name takes the place
-        of one that was registered before.
+        Frozen dataclass with everything that Effect requires. It replaces a registered class of the
+        same name.
 
     Returns
     -------
     class of an Effect
-        The same, so that this serves as a decorator.
+        The same class, for use as a decorator.
 
     Raises
     ------
     ValueError
-        For what it doesn't say of itself, or a name that an effect of this library has.
+        If a definition is missing, or an effect of this library has the name.
 
     Notes
     -----
-    A drive that lifts the body by the square of its speed, for all that run in this process::
+    A vehicle body that rises with the square of the speed, for everything in this process::
 
         @register
         @dataclass(frozen=True)
@@ -259,24 +260,24 @@ def register(kind: type[Effect]) -> type[Effect]:
 
 
 def register_file(path: Path | str) -> tuple[type[Effect], ...]:
-    """Run a file that registers effects; they are known from then on.
+    """Run a file that registers effects, which are then known.
 
     Parameters
     ----------
     path : path
-        Of Python code, which runs as it is: take none that you wouldn't start yourself.
+        Python code, which is executed: use only files that you trust.
 
     Returns
     -------
     tuple of Effect classes
-        Those that it registered.
+        Registered classes.
 
     Raises
     ------
     ValueError
-        For a file that can't be run, or registers nothing.
+        If the file cannot be run, or registers nothing.
     FileNotFoundError
-        Where there is none.
+        If there is no such file.
     """
     path = Path(path)
     before = set(known_effects())
@@ -293,7 +294,7 @@ def register_file(path: Path | str) -> tuple[type[Effect], ...]:
 
 
 def run_file(path: Path) -> ModuleType:
-    """Run a Python file of the user's; the module that it makes.
+    """Run a Python file of the user and return its module.
 
     Parameters
     ----------
@@ -302,12 +303,12 @@ def run_file(path: Path) -> ModuleType:
     Raises
     ------
     ValueError
-        Names the file, and what it raised.
+        With the file and its error.
     """
     spec = spec_from_file_location(f"user.{path.stem}", path)
     if spec is None or spec.loader is None:
         raise ValueError(f"{path} is no Python file: its name must end in .py.")
-    module = sys.modules[spec.name] = module_from_spec(spec)  # where dataclasses look for it
+    module = sys.modules[spec.name] = module_from_spec(spec)  # dataclasses search for it there
     try:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:  # a user's code may raise anything

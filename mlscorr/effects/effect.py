@@ -1,6 +1,6 @@
-"""What an effect is: a frozen value that changes one stage of a survey, and says so in words.
+"""Base of effects: a frozen value that changes one stage of a survey and describes itself.
 
-A user's own effect is applied so that whatever its code does ends in a sentence.
+A user's own effect is applied so that any failure of its code ends in a clear message.
 """
 
 import re
@@ -21,44 +21,44 @@ from mlscorr.wording import known, size
 
 @dataclass(frozen=True)
 class Effect:
-    """An imperfection that turns what is true into what is recorded, at its stage alone.
+    """Imperfection that turns the true value of its stage into the recorded one.
 
-    A subclass is a frozen dataclass too, and says everything about itself in what follows.
-    ``_error`` is what it adds to the field of its stage's value, recorded = true + error; where it
-    does more than add, it has ``_change``. A magnitude of zero changes nothing.
+    A subclass is also a frozen dataclass, and defines the following. ``_error`` returns the term
+    added to the field of its stage's value, recorded = true + error; a change that is not additive
+    is in ``_change``. A magnitude of zero changes nothing.
 
     Parameters
     ----------
     magnitude : float or tuple of float
-        By ``quantity``: its unit, limits, usual size and the source of that. Parameters ``time``
-        and ``width`` (s, from Reference.start) make it an event, ``phase`` (rad) a wave, of which
-        both quadratures are estimated, and ``target`` an error of the target of that name.
+        Defined by ``quantity``: unit, limits, usual size and its source. Parameters ``time`` and
+        ``width`` (s, from Reference.start) make it an event, ``phase`` (rad) a wave, of which both
+        quadratures are estimated, and ``target`` an error of the target of that name.
     name : str
-        In files, of the class, as all that follow; unless it says another, range_bias of RangeBias.
+        Name in files; by default range_bias for RangeBias. A class variable, like all that follow.
     stage : str
-        Of STAGES.
+        One of STAGES.
     title : str
-        For tables.
+        Title for tables.
     meaning : str
-        What it is, in a sentence.
+        Meaning in one sentence.
     sentence : str
-        Of a verdict: {size} stands for the number, {side} for its direction, {where} for the place
-        or the time.
+        Sentence of a verdict, with {size} for the number, {side} for its direction, {where} for
+        place or time.
     remedy : str
-        What a surveyor can do about it.
+        Recommended action of the surveyor.
     random : bool
-        Whether it draws from a random stream.
+        True if it draws from a random stream.
     sides : tuple of str, or of pairs of str
-        Words for above and below zero; of a vector, a pair for each part.
+        Words for above and below zero; for a vector, a pair for each component.
     parts : tuple of str
-        Names of the parts of the magnitude, where a diagnosis estimates more than one.
+        Names of the components of the magnitude, if a diagnosis estimates more than one.
     worded_unit : str
-        Of the size in the sentence, where the magnitude's own would be misread.
+        Unit of the size in the sentence, if the magnitude's own would be misleading.
 
     Raises
     ------
     ValueError
-        For parameters that no survey can have.
+        If a parameter is impossible.
     """
 
     magnitude: float | tuple[float, ...]
@@ -86,25 +86,25 @@ class Effect:
                 label = f"{name} of {self.name}"
             object.__setattr__(self, name, kind.checked(label, getattr(self, name)))
 
-    # ---- how it changes the survey
+    # ---- change of the survey
 
     def apply(
         self, value: Any, reference: Reference, rng: np.random.Generator | None = None
     ) -> Any:
-        """The value of this stage as recorded: an object of the same type.
+        """Return the recorded value of this stage, of the same type.
 
         Parameters
         ----------
         value
-            As it is without the effect; see the table of stages in mlscorr.effects.
+            Value without the effect; see the table of stages in mlscorr.effects.
         reference : Reference
         rng : numpy.random.Generator, optional
-            Of a random effect.
+            For a random effect.
 
         Raises
         ------
         ValueError
-            Where the code of a user's own effect raises, or makes what can't be used.
+            If the code of a user's own effect fails, or returns an unusable value.
         """
         is_own = not type(self).__module__.startswith(f"{__package__}.")
         if is_own:
@@ -116,80 +116,80 @@ class Effect:
         return value
 
     def _change(self, value, reference, rng):
-        """As apply, of a magnitude that is not zero."""
+        """Apply a magnitude that is not zero; see apply."""
         name = STAGES[self.stage]
         column = getattr(value, name)
         error = self._error(value, reference, rng)
         return replace(value, **{name: column + np.broadcast_to(error, column.shape)})
 
     def _error(self, value, reference, rng):
-        """What is added to the field of the stage's value that STAGES names."""
+        """Return the term added to the field of the stage's value named in STAGES."""
         raise NotImplementedError(f"{type(self).__name__} has neither _error nor _change.")
 
     def document(self) -> dict[str, Any]:
-        """Name and parameters, as scenario.toml has them."""
+        """Return name and parameters as in scenario.toml."""
         return {"name": self.name, **asdict(self)}
 
-    # ---- how it enters an observation
+    # ---- role in an observation
 
     @classmethod
     def quantities(cls) -> dict[str, Quantity]:
-        """The Quantity of each parameter that is a number, by the parameter's name."""
+        """Return the Quantity of each numeric parameter, by its name."""
         return {f.name: f.metadata["quantity"] for f in fields(cls) if "quantity" in f.metadata}
 
     @classmethod
     def circumstances(cls) -> tuple[str, ...]:
-        """Names of the parameters that must be known besides the magnitude: when, where."""
+        """Names of the parameters that must be known besides the magnitude: time, position."""
         required = (f.name for f in fields(cls) if f.default is MISSING)
         return tuple(name for name in required if name != "magnitude")
 
     @classmethod
     def moment(cls) -> tuple[str, ...]:
-        """Names of the parameters that say when an event acts; none of what acts always."""
+        """Names of the parameters for the time of an event; empty if it always acts."""
         return tuple(name for name in ("time", "width") if name in cls.circumstances())
 
     @classmethod
     def is_on_target(cls) -> bool:
-        """Whether it acts on one target alone, by the parameter ``target``."""
+        """True if it acts on a single target, given by the parameter ``target``."""
         return "target" in cls.circumstances()
 
     @classmethod
     def is_wave(cls) -> bool:
-        """Whether it has a phase, and so two quadratures: magnitude cos(phase) and sin(phase)."""
+        """True if it has a phase, and thus two quadratures: magnitude cos(phase) and sin(phase)."""
         return "phase" in cls.quantities()
 
     @classmethod
     def is_scatter(cls) -> bool:
-        """Whether it widens or thins out the points, so that no correction takes it off."""
+        """True if it scatters or thins out the points, so that no correction removes it."""
         return cls.random or cls.stage == "beam"
 
     @classmethod
     def is_of_pose(cls) -> bool:
-        """Whether it is noise of the POS, which all that is seen at a moment shares."""
+        """True if it is noise of the POS, shared by everything observed at one time."""
         return cls.random and cls.stage == "pos"
 
     @classmethod
     def needs_mounting(cls) -> bool:
-        """Whether nobody can tell what it does without the mounting, which gives the beams."""
+        """True if its effect depends on the mounting, which gives the beams."""
         return cls.stage in ("range", "angle", "mounting")
 
-    # ---- how a report says it
+    # ---- words in a report
 
     @classmethod
     def parameter_names(cls) -> tuple[str, ...]:
-        """Names of all parameters that a diagnosis may give for it."""
+        """Return the names of all parameters that a diagnosis may estimate for it."""
         return (*cls.parts, *cls.moment())
 
     @classmethod
     def describe(cls, parameters: dict[str, SizeEstimate], where: str = "") -> str:
-        """The sentence with its numbers; what it is, where there are none.
+        """Return the sentence with its numbers, or the meaning if there are none.
 
         Parameters
         ----------
         parameters : dict of SizeEstimate
             By name.
         where : str
-            Where or when it acts, in words.
+            Place or time of its action, in words.
         """
         words = cls.size_in_words(parameters) if parameters else None
         if words:
@@ -198,7 +198,7 @@ class Effect:
 
     @classmethod
     def size_in_words(cls, parameters: dict[str, SizeEstimate]) -> dict[str, str] | None:
-        """What {size} and {side} of the sentence stand for; None where nobody knows.
+        """Words for {size} and {side} of the sentence; None if unknown.
 
         Parameters
         ----------
@@ -217,7 +217,7 @@ class Effect:
 
 
 def _checked_change(effect: Any, change: Callable, value: Any, *given: Any) -> Any:
-    """What a user's effect makes of the value of its stage, whose columns it can't write into."""
+    """Change of the stage's value by a user's effect, which receives read-only columns."""
     columns = {}
     if is_dataclass(value):
         columns = {f.name: getattr(value, f.name) for f in fields(value)}
@@ -250,7 +250,7 @@ def _checked_change(effect: Any, change: Callable, value: Any, *given: Any) -> A
 
 
 def _check(name, old, new):
-    """Refuse a column that can't take the place of the old one."""
+    """Refuse a column that cannot replace the old one."""
     if new is old:
         return
     old, new = map(_numbers, (old, new))
@@ -261,7 +261,7 @@ def _check(name, old, new):
 
 
 def _numbers(column):
-    """A column as an array, attitudes as quaternions."""
+    """Return a column as an array, attitudes as quaternions."""
     if isinstance(column, Rotation):
         return column.as_quat()
     return np.asarray(column)

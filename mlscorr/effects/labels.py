@@ -1,4 +1,4 @@
-"""The labels of a diagnosis in plain words: effects, pairs, nothing, something unknown."""
+"""Labels of a diagnosis in plain words: effects, pairs, none, unknown."""
 
 from collections.abc import Iterable
 
@@ -12,7 +12,7 @@ OTHERS = {
 
 
 def title(label: str) -> str:
-    """A label in words: of an effect, of a pair joined by +, of none or unknown.
+    """Title of a label: an effect, a pair joined by +, none or unknown.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ def title(label: str) -> str:
 
 
 def titles(names: Iterable[str]) -> str:
-    """Effects in words, in a row.
+    """Join titles of effects in words.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def titles(names: Iterable[str]) -> str:
 
 
 def lowered(text: str) -> str:
-    """A title or sentence as it goes on within a sentence.
+    """Convert a title or sentence for use within a sentence.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def lowered(text: str) -> str:
 
 
 def meaning(label: str) -> str:
-    """What a label is, in a sentence for each of its parts.
+    """Meaning of a label, with a sentence for each of its parts.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def meaning(label: str) -> str:
 
 
 def family(label: str) -> str:
-    """Where a label belongs: none, unknown, noise or effect.
+    """Class of a label: none, unknown, noise or effect.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def family(label: str) -> str:
 
 
 def parameter_title(name: str) -> str:
-    """The name of a parameter in words: the effect's, and which part of it.
+    """Name of a parameter in words: that of the effect, and of its component.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def parameter_title(name: str) -> str:
 
 
 def _words(name):
-    """Title and meaning of an effect, none or unknown; of others the name itself."""
+    """Title and meaning of an effect, none or unknown; otherwise the name itself."""
     kind = effects_by_name().get(name)
     if kind:
         return kind.title, kind.meaning

@@ -1,4 +1,4 @@
-"""Effects of a mounting of the scanner that is recorded otherwise than it is."""
+"""Effects of a scanner mounting that differs from the recorded one."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -14,7 +14,7 @@ from mlscorr.survey import Mounting
 
 @dataclass(frozen=True)
 class Boresight(Effect):
-    """The recorded boresight lacks a small rotation: R_true = Exp(magnitude) R_recorded.
+    """The recorded boresight needs a small rotation: R_true = Exp(magnitude) R_recorded.
 
     About the body axes right, forward, up (Mao et al. 2015, Eq. 2).
 
@@ -51,7 +51,7 @@ class Boresight(Effect):
 
 @dataclass(frozen=True)
 class LeverArm(Effect):
-    """The recorded lever arm lacks magnitude: true = recorded + magnitude, in the body frame.
+    """The recorded lever arm needs magnitude: true = recorded + magnitude, in the body frame.
 
     Parameters
     ----------

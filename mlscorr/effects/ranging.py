@@ -98,15 +98,15 @@ class RangeBias(Effect):
 class RangeWalk(Effect):
     """Range depends on the received intensity.
 
-    recorded = true + magnitude log10(intensity / reference_intensity); an intensity below one
-    count is taken as one.
+    recorded = true + magnitude log10(intensity / reference_intensity); an intensity below one count
+    is set to one.
 
     Parameters
     ----------
     magnitude : float
         Units: m per decade.
     reference_intensity : float
-        At which nothing is added. Units: counts of 16 bits.
+        Intensity at which nothing is added. Units: counts of 16 bits.
     """
 
     stage: ClassVar = "range"
@@ -129,7 +129,7 @@ class RangeWalk(Effect):
         "counts of 16 bits",
         65535.0,
         "that is the full scale",
-        default=6553.5,  # a tenth of the full scale: asphalt and plaster of a street
+        default=6553.5,  # 1/10 of the full scale: asphalt and plaster in a street
         least=1.0,
     )
 
@@ -142,9 +142,9 @@ class RangeWalk(Effect):
 class IncidenceBias(Effect):
     """Range depends on the angle of incidence a: recorded = true + magnitude (1 / cos a - 1).
 
-    A threshold on the straight edge of a pulse is reached later by a time in proportion to the
-    threshold over the amplitude, and by Lambert's law the amplitude goes with cos a. So the
-    magnitude is the bias at 60 deg; beyond 84 deg it stays as it is.
+    A threshold on the linear edge of a pulse is reached with a delay proportional to the threshold
+    over the amplitude, and by Lambert's law the amplitude is proportional to cos a. The magnitude
+    is thus the bias at 60 deg; beyond 84 deg it is constant.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ class IncidenceBias(Effect):
 
 @dataclass(frozen=True)
 class RangeNoise(Effect):
-    """Ranges are noisier than stated: white noise of one more sigma, for each return.
+    """Ranges are noisier than stated: additional white noise for each return, one sigma.
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ class RangeNoise(Effect):
 
 @dataclass(frozen=True)
 class Dropout(Effect):
-    """A share of the returns is lost, each by its own chance.
+    """A share of the returns is lost, each independently.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What effects act on: the stages of a measurement, and the values that are not nouns yet."""
+"""Stages of a measurement, and the data types that effects change."""
 
 from dataclasses import dataclass
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from mlscorr.survey import Columns
 
-STAGES = {  # in the order of a survey, and the field of the stage's value that an error adds to
+STAGES = {  # in the order of a survey, with the field to which an error is added
     "beam": None,
     "clock": "gps_time",
     "range": "range",
@@ -16,7 +16,7 @@ STAGES = {  # in the order of a survey, and the field of the stage's value that 
     "mounting": None,
     "control": "position",
 }
-BODY = ("right", "forward", "up")  # parts of a vector
+BODY = ("right", "forward", "up")  # components of a vector
 MAP = ("easting", "northing", "height")
 EAST_NORTH_UP = (
     ("to the east", "to the west"),
@@ -27,14 +27,14 @@ EAST_NORTH_UP = (
 
 @dataclass(frozen=True)
 class Reference:
-    """What effects refer to.
+    """Reference time and position of effects.
 
     Parameters
     ----------
     start, end : float
         First and last gps_time of the survey. Units: s.
     place : (3,) array
-        About which the map is turned and scaled. Units: m.
+        Center of rotation and scaling of the map. Units: m.
     """
 
     start: float
@@ -44,12 +44,12 @@ class Reference:
 
 @dataclass(frozen=True, repr=False)
 class Returns(Columns):
-    """Returns of a scanner in scan order, as the effects see and change them.
+    """Returns of a scanner in scan order, as seen and changed by effects.
 
     Parameters
     ----------
     gps_time : (n,) array
-        By the scanner's clock. Units: s.
+        Time of the scanner's clock. Units: s.
     angle, range : (n,) array
         From the zero beam in the scan plane. Units: rad, m.
     intensity : (n,) array
@@ -57,7 +57,7 @@ class Returns(Columns):
     incidence : (n,) array
         Cosine of the angle between beam and surface normal.
     kept : (n,) bool array
-        False for returns that got lost.
+        False for lost returns.
     """
 
     gps_time: np.ndarray
@@ -84,12 +84,12 @@ def noise_by_pulse(returns: Returns, rng: np.random.Generator) -> np.ndarray:
 
 
 def pulse_number(returns: Returns) -> np.ndarray:
-    """Number (n,) of the pulse that each return came from, counted as they first appear.
+    """Index (n,) of the pulse of each return, in order of first appearance.
 
     Parameters
     ----------
     returns : Returns
-        n of them. Those of a pulse have one time and one angle; they need not stand side by side.
+        n returns. Those of a pulse have the same time and angle, and need not be adjacent.
     """
     shot = returns.gps_time + 1j * returns.angle
     _, first, number = np.unique(shot, return_index=True, return_inverse=True)

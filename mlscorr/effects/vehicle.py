@@ -1,4 +1,4 @@
-"""Effects on what the POS records."""
+"""Effects on the data recorded by the POS."""
 
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -19,7 +19,7 @@ IN_TIME = "no survey is as long"
 class HeadingDrift(Effect):
     """Heading error grows in each pass from zero at its first epoch to magnitude at its last.
 
-    A pass is a part of the trajectory without gaps. Recorded heading = true + error, clockwise.
+    A pass is a gap-free part of the trajectory. Recorded heading = true + error, clockwise.
 
     Parameters
     ----------
@@ -50,13 +50,13 @@ class HeadingDrift(Effect):
         start, end = value.passes[value.segment(value.gps_time)].T
         share = (value.gps_time - start) / np.where(end > start, end - start, 1.0)
         turn = np.zeros((len(value), 3))
-        turn[:, 2] = -np.radians(self.magnitude) * share  # heading is clockwise, Z is up
+        turn[:, 2] = -np.radians(self.magnitude) * share  # heading is clockwise, Z points up
         return replace(value, attitude=Rotation.from_rotvec(turn) * value.attitude)
 
 
 @dataclass(frozen=True)
 class PositionStep(Effect):
-    """GNSS jumps: recorded = true + magnitude from a time on to the end of that pass.
+    """GNSS jumps: recorded = true + magnitude from a time to the end of that pass.
 
     The time counts from reference.start.
 
@@ -70,7 +70,7 @@ class PositionStep(Effect):
     Raises
     ------
     ValueError
-        When it lies in no pass.
+        If it is not in any pass.
     """
 
     stage: ClassVar = "pos"
@@ -100,7 +100,7 @@ class PositionStep(Effect):
 
 @dataclass(frozen=True)
 class PositionBump(Effect):
-    """A bias comes and goes, as by multipath or a short outage, like a Gaussian in time.
+    """A bias comes and goes like a Gaussian in time, as from multipath or a short outage.
 
     recorded = true + magnitude exp(-(t - time)^2 / (2 width^2)); the time counts from
     reference.start, the width is one sigma.
@@ -117,7 +117,7 @@ class PositionBump(Effect):
     Raises
     ------
     ValueError
-        When the time is in no pass.
+        If the time is not in any pass.
     """
 
     stage: ClassVar = "pos"
@@ -153,11 +153,11 @@ class PositionBump(Effect):
 
 @dataclass(frozen=True)
 class PositionNoise(Effect):
-    """The position is noisier than its sigmas say: one more sigma, the same in E, N and H.
+    """Position is noisier than stated: additional noise of one sigma, equal in E, N and H.
 
-    The noise is that of GNSS fixes, one a second as the paper's; between two of them the weight of
-    the first falls as a cosine while the other's grows as a sine, so that the variance is the same
-    at all times. Correlation falls to 1/pi after one second and to nothing after two.
+    The noise is that of GNSS fixes, one per second as in the paper. Between two fixes, the weight
+    of the first decreases as a cosine and that of the second increases as a sine, so that the
+    variance is constant. The correlation is 1/pi after one second and zero after two.
 
     Parameters
     ----------
@@ -183,18 +183,18 @@ class PositionNoise(Effect):
         least=0.0,
     )
 
-    # what a diagnosis says of it besides: of all sigmas, or of windows in which they are larger
+    # further parameters of a diagnosis: for all sigmas, or for intervals with larger ones
     FACTOR: ClassVar = "factor on sigma"
     WINDOW: ClassVar = ("start", "length", "largest sigma over the stated")
 
     @classmethod
     def parameter_names(cls) -> tuple[str, ...]:
-        """See Effect; those of windows may be numbered."""
+        """Return the parameter names; see Effect. Those of intervals may be numbered."""
         return (*cls.parts, cls.FACTOR, *cls.WINDOW)
 
     @classmethod
     def size_in_words(cls, parameters: dict[str, SizeEstimate]) -> dict[str, str]:
-        """By how much a POS is worse than it says: at all times, or in windows.
+        """Excess of a POS's errors over its sigmas: at all times, or in intervals.
 
         >>> window = {"start": 413205.0, "length": 20.0, "largest sigma over the stated": 12.0}
         >>> window = {name: SizeEstimate(value, None, "") for name, value in window.items()}
@@ -214,7 +214,7 @@ class PositionNoise(Effect):
 
     @classmethod
     def _windows_in_words(cls, parameters):
-        """Two windows with their times, and how many others there are."""
+        """Describe two intervals with their times, and the number of others."""
         starts, lengths, factors = (
             [number.estimate for name, number in parameters.items() if name.startswith(key)]
             for key in cls.WINDOW
@@ -234,7 +234,7 @@ class PositionNoise(Effect):
         return f"up to {max(factors):.0f} times as large {joined(words)}"
 
     def _error(self, value, reference, rng):
-        fixes = value.gps_time - value.gps_time[0]  # one a second
+        fixes = value.gps_time - value.gps_time[0]  # one per second
         before = np.floor(fixes).astype(int)
         angle = 0.5 * np.pi * (fixes - before)[:, None]
         noise = self.magnitude * rng.standard_normal((before[-1] + 2, 3))
@@ -242,7 +242,7 @@ class PositionNoise(Effect):
 
 
 def _moment(effect, trajectory, reference):
-    """The gps_time (s) of an event; one at which nothing was recorded is refused."""
+    """The gps_time (s) of an event; refused if nothing was recorded then."""
     moment = reference.start + effect.time
     if trajectory.segment(moment) < 0:
         end = trajectory.gps_time[-1] - reference.start

@@ -3,14 +3,14 @@
 The POS error is a polynomial trend of the position (Eq. 11) plus random signals:
 
 - drift: 3 of the position, with the part of sigma(t) that grows where GNSS is missing;
-- jitter: 3 of the position, with the part of sigma(t) that stays while GNSS holds the POS;
-- bias: 3 of the position, slow, on the same part but of nearly free size: what is not stated;
+- jitter: 3 of the position, with the part of sigma(t) that remains while the POS has GNSS;
+- bias: 3 of the position, slow, on the same part but of nearly free size, for unstated errors;
 - attitude: 3 small rotations about the map axes.
 
-Where the POS states no sigma(t), or a constant one, there is only drift, of nearly free size.
-Without the split the centimetres of good GNSS would set the correlation time of the metres of an
-outage. Scales, correlation times and covariance family are estimated from the control points, and
-what they leave open of them is a part of the stated sigmas.
+If the POS states no sigma(t), or a constant one, there is only drift, of nearly free size. Without
+the split the centimeters of good GNSS would set the correlation time of the meters of an outage.
+Scales, correlation times and covariance family are estimated from the control points, and their
+remaining uncertainty is included in the stated sigmas.
 """
 
 from mlscorr.estimate._tie_value import tie_value

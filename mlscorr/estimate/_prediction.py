@@ -1,4 +1,4 @@
-"""From an estimate to the POS error at every epoch, and to the corrected trajectory (Eq. 14-15)."""
+"""Prediction of the POS error at every epoch, and of the corrected trajectory (Eq. 14-15)."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -18,14 +18,14 @@ from mlscorr.survey import Trajectory
 class GridPredictions:
     """POS errors (k, 6) and their variances (k, 6) at some epochs, by parameters.
 
-    Whoever holds a Collocation for another reason adds it: each costs a solution of all rows.
+    Existing Collocations should be added: each costs a solution of all rows.
 
     Parameters
     ----------
     adjustment : Adjustment
     poses : dict
     mode : SignalParameters, optional
-        Whose Collocation is kept once it is added, until it is taken.
+        Parameters of the Collocation that is kept once it is added, until it is taken.
     kept : dict
     """
 
@@ -36,7 +36,7 @@ class GridPredictions:
 
     @cached_property
     def rows(self) -> np.ndarray:
-        """Numbers of regular epochs, those about gaps, steps and restarts, those beside control.
+        """Indices of epochs: regular ones, those around gaps, steps and restarts, and near control.
 
         Regular in time: sessions may differ in rate.
         """
@@ -68,7 +68,7 @@ class GridPredictions:
             self.kept[parameters] = solved
 
     def take(self, parameters: SignalParameters) -> Collocation:
-        """The Collocation under parameters; nobody keeps it any longer.
+        """Return the Collocation under parameters, which is not kept any longer.
 
         Parameters
         ----------
@@ -77,7 +77,7 @@ class GridPredictions:
         return self.kept.pop(parameters, None) or self.adjustment.solve(parameters)
 
     def under(self, parameters: SignalParameters) -> tuple[np.ndarray, np.ndarray]:
-        """The POS errors and variances under parameters.
+        """Return the POS errors and variances under parameters.
 
         Parameters
         ----------
@@ -97,18 +97,17 @@ def predict_pose_error(
     """POS error (n, 6) at every epoch, trend plus signals (Eq. 15), with covariance (n, 6, 6).
 
     Position in m, rotation about the map axes in rad. The most probable parameters predict every
-    epoch. What the average over all parameters makes of that, in units of its sigmas, changes
-    slowly and is worked out at fewer epochs: sigmas may jump where GNSS comes back, these numbers
-    hardly do.
+    epoch. The change by averaging over all parameters, in units of its sigmas, varies slowly and is
+    computed at fewer epochs: sigmas may jump when GNSS returns, but these numbers hardly do.
 
     Parameters
     ----------
     adjustment : Adjustment
     posterior : Posterior
     predictions : GridPredictions, optional
-        By these equations, where some are known.
+        Known ones by these equations.
     solved : Collocation, optional
-        Of these equations under the most probable parameters, where somebody holds it.
+        Of these equations under the most probable parameters, if it exists already.
     """
     trajectory = adjustment.trajectory
     mode = posterior.modes[0][0]
@@ -123,7 +122,7 @@ def predict_pose_error(
         predicted, variance = predictions.under(parameters)
         mean = mean + weight * predicted
         square = square + weight * (variance + predicted**2)
-    # what the POS claims to know perfectly stays so
+    # an error of zero variance stays zero
     is_open = sigma[rows] > 0.0
     zeros = np.zeros_like(mean)
     spread = np.sqrt(np.maximum(square - mean**2, 0.0))
@@ -138,11 +137,11 @@ def predict_pose_error(
 def bridge_steps(
     trajectory: Trajectory, steps: Steps, pose: np.ndarray, covariance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Pose error and covariance with those inside steps replaced by a bridge between their ends.
+    """Return pose error and covariance with values inside steps replaced by a bridge across them.
 
-    Filters and resampling spread a fall-back over epochs at which the error is neither that before
-    nor that after it. There the corrected vehicle drives on: a cubic through the corrected
-    positions and velocities at both ends (Hermite). What its motion leaves open is added to the
+    Filters and resampling spread a re-acquisition over epochs at which the error is neither that
+    before nor that after it. There the corrected path is a cubic through the corrected positions
+    and velocities at both ends (Hermite). The uncertainty of this motion is added to the
     covariance.
 
     Parameters
@@ -177,7 +176,7 @@ def bridge_steps(
 
 
 def _interpolated(gps_time, rows, values):
-    """Values (k, 6) at some epochs, linear in time at all of them."""
+    """Interpolate values (k, 6) at some epochs to all epochs, linearly in time."""
     return np.column_stack([np.interp(gps_time, gps_time[rows], column) for column in values.T])
 
 
@@ -199,12 +198,12 @@ def predict_under(
 def pose_rows(
     adjustment: Adjustment, parameters: SignalParameters, rows: slice | np.ndarray = slice(None)
 ) -> tuple:
-    """What a Collocation is asked for the pose at some epochs: times, design, mixings, clocks.
+    """Input of a Collocation for the pose at some epochs: times, design, mixings, clocks.
 
     Parameters
     ----------
     adjustment, parameters, rows
-        As of predict_under.
+        See ``predict_under``.
     """
     gps_time = adjustment.trajectory.gps_time[rows]
     signals = adjustment.errors.pose_signals(parameters, rows)

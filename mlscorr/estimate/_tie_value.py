@@ -1,4 +1,4 @@
-"""What ties bring to an estimate beside control points."""
+"""Contribution of ties to an estimate, compared with control points."""
 
 from bisect import bisect_left
 from dataclasses import dataclass
@@ -16,13 +16,14 @@ from mlscorr.survey import TIE_KINDS
 
 @dataclass(frozen=True)
 class TieValue:
-    """What control points and ties each bring.
+    """Contributions of control points and of ties.
 
     Parameters
     ----------
     share : dict
-        Of what both tell of the POS error, by kind: control, and TIE_KINDS. An observation tells
-        what its redundancy number lacks to one, the part of an error that the result takes up.
+        Fraction of all information about the POS error, by kind: control, and TIE_KINDS. An
+        observation contributes one minus its redundancy number, the part of an error that enters
+        the result.
     sufficient : int or None
         Number of control points, evenly chosen, with which the drive's median sigma would have been
         no worse than a tenth of all of them; None without control.
@@ -32,9 +33,9 @@ class TieValue:
     sufficient: int | None
 
 
-@threadpool_limits.wrap(limits=1, user_api="blas")  # more threads, other last digits
+@threadpool_limits.wrap(limits=1, user_api="blas")  # more threads would change the last digits
 def tie_value(estimate: Estimate) -> TieValue:
-    """What control points and ties each bring to an estimate.
+    """Contributions of control points and of ties to an estimate.
 
     Parameters
     ----------
@@ -58,7 +59,7 @@ def tie_value(estimate: Estimate) -> TieValue:
 
 
 def _sufficient(adjustment, parameters, solved):
-    """The least number of evenly chosen control points that reach the sigma of all, about."""
+    """Smallest number of evenly chosen control points that approximately reach the sigma of all."""
     names = list(adjustment.target_rows)
     if len(names) < 2:
         return len(names) or None

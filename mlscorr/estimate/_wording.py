@@ -1,4 +1,4 @@
-"""The sentences on what is doubtful about an estimate: of its inputs, control points and ties."""
+"""Sentences on doubts about an estimate: its inputs, control points and ties."""
 
 from collections.abc import Iterable
 

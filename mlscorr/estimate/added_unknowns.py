@@ -1,14 +1,14 @@
-"""Further unknowns that explain what trend and signals leave (Baarda's alternative hypothesis).
+"""Further unknowns that explain residuals of trend and signals (Baarda's alternative hypothesis).
 
 They are more columns M of A; with P = V^-1 - V^-1 A (A'V^-1 A)^-1 A'V^-1, which the solver applies
 to any misclosures, they are (M'PM)^-1 M'Pl (Mao et al. 2015, Eq. 13-18):
 
-- ranges and encoder of scanners beside their mountings. An offset of all ranges pushes both sides
-  of the street outward, where a lever arm moves them one way; a wrong scale of the encoder turns
-  what lies far from the zero beam. (An offset of the encoder turns all about the scanner's axis, as
-  a boresight does, and is part of that.)
-- mountings beside a correction: drift depends on time, a boresight's part on the direction of
-  travel, so ties tell whether passes disagree as a wrong mounting makes them.
+- ranges and encoder of scanners in addition to their mountings. An offset of all ranges pushes both
+sides of the street outward, whereas a lever arm moves them in one direction; a wrong scale of the
+encoder rotates objects far from the zero beam. (An offset of the encoder rotates everything about
+the scanner's axis, like a boresight, and is part of that.) - mountings in addition to a correction:
+drift depends on time, a boresight's part on the direction of travel, so ties can show that passes
+disagree because of a wrong mounting.
 """
 
 from __future__ import annotations
@@ -46,16 +46,16 @@ from mlscorr.survey import Matched, Mounting, Statement
 
 @dataclass(frozen=True)
 class AddedUnknowns:
-    """What k further unknowns are, and whether that is chance.
+    """Estimate of k further unknowns, and a test of its significance.
 
     Parameters
     ----------
     correction : (k,) array
     covariance : (k, k) array
     response : (p, k) array
-        Of the trend: by how much a unit of each would change it, where it is left out.
+        Change of the trend by a unit of each unknown that is omitted.
     trend_variance : (p,) array
-        Of the trend beside them.
+        Of the trend estimated with them.
     statistic, critical : float
         Chi-squared of k degrees of freedom, and its critical value.
     """
@@ -84,7 +84,7 @@ class AddedUnknowns:
         columns : (m, k) array
             Partial derivatives of the misclosures by the unknowns.
         prior_sigma : (k,) array
-            One sigma of what is known of them without the survey.
+            One sigma of prior knowledge of them.
         """
         solved = adjustment.solve(parameters)
         white = solved.solver.whiten(np.column_stack([solved.design, columns]))
@@ -104,12 +104,12 @@ class AddedUnknowns:
         return np.sqrt(np.diag(self.covariance))
 
     def is_wrong(self, least: np.ndarray) -> np.ndarray:
-        """Which unknowns (k,) are significant, and large enough to matter.
+        """Mask (k,) of unknowns that are significant and large enough to matter.
 
         Parameters
         ----------
         least : (k,) array
-            Below it none matters.
+            Smallest size that matters.
         """
         size = np.abs(self.correction)
         is_large = size > np.maximum(SETTINGS.setup_sigmas * self.sigma, least)
@@ -118,7 +118,7 @@ class AddedUnknowns:
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
 def with_scanner_errors(calibration: Calibration, matched: Matched) -> Calibration:
-    """The calibration with what ranges and encoder lack, and free of it where that is significant.
+    """Return the calibration with errors of ranges and encoder, and corrected for significant ones.
 
     Parameters
     ----------
@@ -140,7 +140,8 @@ def with_scanner_errors(calibration: Calibration, matched: Matched) -> Calibrati
         errors = ScannerErrors(correction, sigma, sigma < least, is_wrong)
         return replace(calibration, scanner=errors)
     columns = columns[:, is_wrong]
-    # An error that data sheets rule out is no draw from what they state: it is not held to that
+    # An error beyond the data sheet's limits is no draw from its sigmas, so these do not constrain
+    # it
     free = np.full(is_wrong.sum(), np.inf)
     lacks = AddedUnknowns.of(adjustment, parameters, columns, free)
     shifted = AddedUnknowns.of(with_shift(adjustment), parameters, columns, free).trend_variance
@@ -183,7 +184,7 @@ def _columns(calibration, targets):
 
 
 def _without(recorded, estimate, lacks):
-    """The estimate of mountings that took a part of what ranges and encoders lack."""
+    """The estimate of mountings that absorbed a part of the errors of ranges and encoders."""
     taken = lacks.response[: len(estimate.correction)]
     correction = combined_correction(estimate.correction, -taken @ lacks.correction)
     covariance = estimate.covariance + taken @ lacks.covariance @ taken.T
@@ -196,8 +197,8 @@ def find_mounting_error(
 ) -> AddedUnknowns | None:
     """Test the recorded mountings by the ties of a correction; None without any.
 
-    Lever arm (m) and boresight (rad) about right, forward, up are the unknowns, of all scanners
-    alike: what one lacks beside another is in the estimate.
+    Lever arm (m) and boresight (rad) about right, forward, up are the unknowns, common to all
+    scanners: differences between scanners are part of the estimate.
 
     Parameters
     ----------
@@ -227,12 +228,12 @@ def find_mounting_error(
 
 
 def mounting_warnings(check: AddedUnknowns | None, scanners: int = 1) -> tuple[Statement, ...]:
-    """A Statement where a wrong mounting is significant, and large enough to matter.
+    """Return a Statement if a wrong mounting is significant, and large enough to matter.
 
     Parameters
     ----------
     check : AddedUnknowns, optional
-        Of find_mounting_error.
+        Result of ``find_mounting_error``.
     scanners : int
         Number of scanners.
     """
@@ -253,8 +254,7 @@ def mounting_warnings(check: AddedUnknowns | None, scanners: int = 1) -> tuple[S
 
 
 def scanner_warnings(estimate: Estimate, names: Sequence[str]) -> Iterator[Statement]:
-    """Statements on scanners that see the street elsewhere than the first, as ties tell it; on the
-    only one where it sees a thing elsewhere from ahead than from behind.
+    """Yield Statements on scanners that disagree with the first, or with themselves, by ties.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """The adjustment of a drive: its factors, the errors of its POS, and a polynomial trend.
 
-All factors have the same trend and signals; a correction and a calibration differ in the unknowns
-beside them, the mountings.
+All factors have the same trend and signals; a calibration has additional unknowns, the mountings,
+which a correction has not.
 """
 
 from __future__ import annotations
@@ -40,24 +40,24 @@ NO_TREND = -1  # the order of a polynomial without any coefficient
 
 @dataclass(frozen=True, repr=False)
 class Adjustment(Summary):
-    """Factors of one drive, and what they are to be explained by: l = A x + B s + n.
+    """Factors of one drive and their model: l = A x + B s + n.
 
-    The columns of A are the unknowns beside the POS error, such as mountings, then the trend.
+    The columns of A are the unknowns other than the POS error, such as mountings, then the trend.
 
     Parameters
     ----------
     errors : PosErrors
-        Whose signals are s.
+        Source of the signals s.
     factors : tuple of Factor
-        Targets first, of each further kind one at most; only priors may be several.
+        Targets first, then at most one of each further kind, except for priors.
     order : int
         Of the polynomial trend of the position (Eq. 11); NO_TREND for none.
     prior : function of an Adjustment
-        What is believed of the parameters before the misclosures: a Prior.
+        Function that returns a Prior of the parameters.
     trend_span : (float, float), optional
         First and last time of the trend's polynomial; those of the targets by default. Units: s.
     tolerance : float
-        Of knots, as of collocate_rows, where there are ties.
+        Of knots, if there are ties; see ``collocate_rows``.
     """
 
     errors: PosErrors
@@ -79,7 +79,7 @@ class Adjustment(Summary):
 
     @property
     def ties(self) -> Factor | None:
-        """Factor of what two passes both saw, None without any."""
+        """Factor of ties between passes, None without any."""
         return self.of_kind(TIE)
 
     def of_kind(self, kind: str) -> Factor | None:
@@ -93,7 +93,7 @@ class Adjustment(Summary):
         return next((factor for factor in self.factors if factor.kind == kind), None)
 
     def with_factor(self, factor: Factor) -> Adjustment:
-        """The same with a factor, in the place of the one of its kind where there is one.
+        """The same with a factor, which replaces the one of its kind if there is one.
 
         Parameters
         ----------
@@ -116,7 +116,7 @@ class Adjustment(Summary):
         return replace(self, factors=tuple(f for f in self.factors if f.kind != kind))
 
     def with_some(self, kind: str, rows: np.ndarray) -> Adjustment:
-        """The same with some observations of a kind, or without the kind where it has none left.
+        """The same with some observations of a kind, or without the kind if none are left.
 
         Parameters
         ----------
@@ -133,7 +133,7 @@ class Adjustment(Summary):
         Parameters
         ----------
         starts : (k,) array
-            One for each stretch of the history. Units: s.
+            One for each segment of the history. Units: s.
         """
         factors = tuple(factor.with_starts(starts) for factor in self.factors)
         return replace(self, errors=self.errors.with_starts(starts), factors=factors)
@@ -141,14 +141,14 @@ class Adjustment(Summary):
     def with_unknowns(
         self, columns: Mapping[str, np.ndarray], mean: np.ndarray, sigma: np.ndarray
     ) -> Adjustment:
-        """The same with unknowns beside the POS error, behind those that there are.
+        """The same with further unknowns other than the POS error, after the existing ones.
 
         Parameters
         ----------
         columns : dict
             Partial derivatives (n, r, u) of some factors' misclosures, by the factor's kind.
         mean, sigma : (u,) array
-            What is believed of them; nothing where a sigma is infinite.
+            Prior mean and sigma; an infinite sigma means no prior.
         """
         factors = []
         for factor in self.factors:
@@ -159,7 +159,7 @@ class Adjustment(Summary):
                 known = factor.columns.shape[2]
             gap = np.zeros(
                 (*rows, self.unknowns - known)
-            )  # of unknowns that the factor does not see
+            )  # of unknowns that do not affect the factor
             padded = np.concatenate([gap, more], axis=2)
             factors.append(factor.with_columns(padded))
         wider = replace(self, factors=tuple(factors))
@@ -173,7 +173,7 @@ class Adjustment(Summary):
 
     @property
     def unknowns(self) -> int:
-        """Number of the unknowns beside the POS error."""
+        """Number of the unknowns other than the POS error."""
         widths = [f.columns.shape[2] for f in self.factors if f.columns is not None]
         return max(widths, default=0)
 
@@ -229,8 +229,8 @@ class Adjustment(Summary):
     def interval(self) -> float:
         """Mean interval of the control epochs without the trajectory's gaps between them. Units: s.
 
-        Where they are none or as good as one, or where ties tell more of the time than how far
-        apart targets stand, the believed correlation time as the paper's rule has it.
+        If there are none or effectively one, or if ties determine the time better than the spacing
+        of targets, this is the prior correlation time in terms of the paper's rule.
         """
         control = np.sort(self.observed)
         recorded_time = self.trajectory.recorded_time
@@ -241,11 +241,11 @@ class Adjustment(Summary):
 
     @property
     def observing(self) -> tuple[Factor, ...]:
-        """The factors that see a pose: their rows, one after the other, are those of a solution."""
+        """The factors that depend on a pose, in the order of their rows in a solution."""
         return tuple(factor for factor in self.factors if factor.kind != PRIOR)
 
     def rows_of(self, kind: str) -> np.ndarray:
-        """Rows of a solution that are those of a kind.
+        """Rows of a kind in a solution.
 
         Parameters
         ----------
@@ -259,14 +259,14 @@ class Adjustment(Summary):
 
     @cached_property
     def target_rows(self) -> dict[str, np.ndarray]:
-        """Rows of a solution of each target, all its passes together."""
+        """Rows of each target in a solution, all its passes together."""
         rows: dict[str, list[int]] = {}
         for row, name in enumerate(np.repeat(self.names, 3).tolist()):
             rows.setdefault(str(name), []).append(row)
         return {name: np.array(own) for name, own in rows.items()}
 
     def stacked(self, columns: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Columns (m, k) of the rows of a solution, zero in those of other kinds.
+        """Columns (m, k) of the rows of a solution, zero for other kinds.
 
         Parameters
         ----------
@@ -281,7 +281,7 @@ class Adjustment(Summary):
         return np.concatenate([part.reshape(-1, width) for part in parts])
 
     def with_added(self, added: np.ndarray) -> Adjustment:
-        """The same with something added to the misclosures.
+        """The same with an addition to the misclosures.
 
         Parameters
         ----------
@@ -302,28 +302,28 @@ class Adjustment(Summary):
         Parameters
         ----------
         parameters : SignalParameters or None
-            Without any it is least squares.
+            None means least squares.
         like : Collocation, optional
-            Of the same factors under parameters near by; its knots are used again, if it has any.
+            Of the same factors under similar parameters; its knots are reused, if it has any.
         """
         known = None
         if like is not None:
             known = like.solver
         tolerance = 0.0
-        if self.ties is not None:  # few knots do beside hundreds of them
+        if self.ties is not None:  # few knots suffice with hundreds of them
             tolerance = self.tolerance
         rows = self.rows(parameters)
         return collocate_rows(rows, known, tolerance, self.believed(parameters))
 
     def weigh(self, parameters: SignalParameters, like: Collocation | None = None) -> Collocation:
-        """As solve, for the likelihood alone: few rows with ties by their covariance matrix.
+        """Collocation for the likelihood alone: few rows with ties are solved by covariances.
 
         Parameters
         ----------
         parameters : SignalParameters
         like : Collocation, optional
-            Of the same factors by this, under parameters near by: with its knots a difference is
-            smooth, and costs half as much.
+            Earlier result for the same factors under similar parameters: with its knots a
+            difference is smooth, and costs half as much.
         """
         if self._is_dense:
             return collocate_rows_dense(self.rows(parameters), self.believed(parameters))
@@ -332,14 +332,14 @@ class Adjustment(Summary):
     def likelihoods(
         self, near: Sequence[SignalParameters], parameters: SignalParameters, solved: Collocation
     ) -> np.ndarray:
-        """Log-likelihoods (k,) of k parameters near some, as differences need them.
+        """Log-likelihoods (k,) of k similar parameter sets, accurate enough for differences.
 
         Parameters
         ----------
         near : sequence of SignalParameters
         parameters : SignalParameters
         solved : Collocation
-            By weigh, under these.
+            By ``weigh``, under these parameters.
         """
         if not self._is_dense:
             return np.array([self.weigh(each, solved).log_likelihood for each in near])
@@ -350,17 +350,17 @@ class Adjustment(Summary):
 
     @property
     def _is_dense(self):
-        """True where the covariance matrix is the fastest way to a likelihood."""
+        """True if the covariance matrix is the fastest route to a likelihood."""
         size = sum(factor.misclosure.size for factor in self.observing)
         return self.ties is not None and size <= SETTINGS.dense_rows
 
     def rows(self, parameters: SignalParameters | None) -> list[SparseRows]:
-        """Rows of the factors that see a pose, for the solver.
+        """Rows of the factors that depend on a pose, for the solver.
 
         Parameters
         ----------
         parameters : SignalParameters or None
-            Without any there are no signals.
+            None means no signals.
         """
         rows = []
         for factor, design in zip(self.observing, self._designs, strict=True):
@@ -375,7 +375,7 @@ class Adjustment(Summary):
 
     @cached_property
     def _designs(self):
-        """A (n, r, p) of each factor that sees a pose."""
+        """A (n, r, p) of each factor that depends on a pose."""
         designs = []
         for factor in self.observing:
             n, e, r, _ = factor.partials.shape
@@ -388,12 +388,12 @@ class Adjustment(Summary):
         return designs
 
     def believed(self, parameters: SignalParameters | None) -> np.ndarray:
-        """Prior of unknowns and trend, (k, p + 1), as of a Collocation.
+        """Prior of unknowns and trend, (k, p + 1), in the form of a Collocation.
 
         Parameters
         ----------
         parameters : SignalParameters or None
-            Without any nothing is believed of the trend.
+            None means no prior of the trend.
         """
         width = self.unknowns + 3 * (self.order + 1)
         parts = [np.zeros((0, width + 1))]
@@ -407,7 +407,7 @@ class Adjustment(Summary):
         return np.concatenate(parts)
 
     def pose_design(self, gps_time: np.ndarray) -> np.ndarray:
-        """A (q, 6, p) of position and rotation at any epochs; unknowns beside it move no pose.
+        """A (q, 6, p) of the pose at any epochs; only the trend moves a pose.
 
         Parameters
         ----------
@@ -458,7 +458,7 @@ def mounting_adjustment(
     corrected: np.ndarray,
     weak: np.ndarray,
 ) -> Adjustment:
-    """Adjustment of k mountings  (Eq. 16-18), beside the same POS error without a trend.
+    """Adjustment of k mountings  (Eq. 16-18), with the same POS error but without a trend.
 
     Parameters
     ----------
@@ -466,11 +466,11 @@ def mounting_adjustment(
     matched : Matched
         As georeferenced with the mountings.
     mountings : sequence of Mounting
-        Corrected by ``corrected`` already; what is estimated adds to them.
+        Already corrected by ``corrected``; the estimate is added to them.
     corrected : (6 k,) array
         Units: m and rad.
     weak : (6 k,) array
-        One sigma of what is known of the mountings without the survey. Units: m and rad.
+        One sigma of prior knowledge of the mountings. Units: m and rad.
     """
     errors = adjustment.errors
     factor = target_factor(errors, matched)

@@ -1,4 +1,4 @@
-"""Calibrated mountings: what recorded ones lack (Eq. 2), and what a geometry can't tell of it."""
+"""Calibrated mountings: corrections of recorded ones (Eq. 2), and components left undetermined."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ SCANNER_COMPONENTS = ("range offset", "encoder scale")
 
 @dataclass(frozen=True)
 class MountingEstimate:
-    """What the recorded mountings of k scanners lack, by one method.
+    """Corrections of the recorded mountings of k scanners, by one method.
 
     Parameters
     ----------
@@ -76,13 +76,13 @@ class MountingEstimate:
         covariance: np.ndarray,
         sigma0: float,
     ) -> MountingEstimate:
-        """The estimate by corrections of recorded mountings; the calibrated ones know their sigmas.
+        """Return the estimate for corrections of recorded mountings, with sigmas.
 
         Parameters
         ----------
         recorded : sequence of Mounting
         correction, covariance, sigma0
-            As of the estimate.
+            See the attributes of the estimate.
         """
         mountings = tuple(
             replace(mounting, covariance=covariance[6 * i : 6 * i + 6, 6 * i : 6 * i + 6])
@@ -104,10 +104,10 @@ class MountingEstimate:
         return MountingEstimate(mountings, self.correction[rows], covariance, self.sigma0)
 
     def beside_first(self, number: int) -> tuple[np.ndarray, np.ndarray]:
-        """What a mounting lacks beside the first, and one sigma of it: (6,) each, m and rad.
+        """Correction of a mounting relative to the first, and its sigma: (6,) each, m and rad.
 
-        Both scanners of a vehicle put what they see together in one place where this is known,
-        whatever both mountings have in common.
+        If this is known, both scanners of a vehicle agree on objects seen at one time, whatever
+        error both mountings have in common.
 
         Parameters
         ----------
@@ -124,7 +124,7 @@ class MountingEstimate:
 
 
 def corrected_mounting(mounting: Mounting, correction: np.ndarray) -> Mounting:
-    """The mounting that lacked a correction  (Eq. 2).
+    """Return the mounting after a correction  (Eq. 2).
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def corrected_mounting(mounting: Mounting, correction: np.ndarray) -> Mounting:
 def corrected_mountings(
     mountings: Sequence[Mounting], correction: np.ndarray
 ) -> tuple[Mounting, ...]:
-    """The mountings that lacked a correction  (Eq. 2).
+    """Return the mountings after a correction  (Eq. 2).
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def corrected_mountings(
 
 
 def combined_correction(correction: np.ndarray, more: np.ndarray) -> np.ndarray:
-    """The correction (6 k,) of one after another: Exp(more) Exp(correction) of each mounting.
+    """Correction (6 k,) of one after another: Exp(more) Exp(correction) of each mounting.
 
     Parameters
     ----------
@@ -166,15 +166,15 @@ def combined_correction(correction: np.ndarray, more: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class ScannerErrors:
-    """What the own ranges and encoders of k scanners lack.
+    """Errors of the ranges and encoders of k scanners.
 
     Parameters
     ----------
     correction, sigma : (2 k,) array
-        To be added to each range (m), and to each scan angle by its size (ratio). Held to what is
-        known without any measurement where it is not significant.
+        To be added to each range (m), and to each scan angle by its size (ratio). Constrained by
+        prior knowledge if it is not significant.
     determined, significant : (2 k,) bool array
-        Whether this geometry can tell it at all; whether the mounting is free of it.
+        Masks of values determined by this geometry, and of those removed from the mounting.
     """
 
     correction: np.ndarray
@@ -183,7 +183,7 @@ class ScannerErrors:
     significant: np.ndarray
 
     def of(self, number: int) -> ScannerErrors:
-        """Those of a scanner.
+        """The errors of one scanner.
 
         Parameters
         ----------
@@ -195,7 +195,7 @@ class ScannerErrors:
 
     @property
     def statements(self) -> tuple[Statement, ...]:
-        """A warning where something is significant, of one scanner."""
+        """A warning if an error of one scanner is significant."""
         if not self.significant.any():
             return ()
         values = {
@@ -218,25 +218,25 @@ class Calibration(Summary):
     lsc, ls : MountingEstimate
         By collocation and by least squares; the latter by the control points alone.
     determined : (6 k,) bool array
-        Which components this geometry can tell, whatever constant difference there is between the
-        coordinates of control and trajectory.
+        Mask of components determined by this geometry, whatever constant difference there is
+        between the coordinates of control and trajectory.
     screening : Screening
         Of the control points, and the posterior of the parameters of the POS error.
     used : (n,) bool array
-        Which observations took part.
+        Mask of observations in use.
     guards : Guards
     adjustment : Adjustment
-        Of the observations that took part.
+        Of the observations in use.
     drift : Correction
-        Of the POS error beside the mountings, which all scanners share  (Eq. 14-15). It is zero on
+        Of the POS error apart from the mountings, common to all scanners (Eq. 14-15). It is zero on
         average, so the farther from a control point, the less of it is corrected.
     notes : tuple of Statement
-        Of warnings, those on the inputs.
+        Warnings about the inputs.
     ties, ties_with_drift : TieResiduals, optional
-        What two passes both saw, and what the mountings leave of it, by themselves and with the POS
-        error.
+        Ties between passes with their residuals after correction of the mountings, alone and with
+        the POS error.
     scanner : ScannerErrors, optional
-        What ranges and encoder lack.
+        Errors of ranges and encoder.
     """
 
     trajectory: Trajectory
@@ -256,24 +256,24 @@ class Calibration(Summary):
 
     @property
     def sigma_note(self) -> str:
-        """On what sigmas of the one mounting rest that this geometry can't tell; else empty."""
+        """Note on the basis of sigmas of the one mounting's undetermined components; else empty."""
         return sigma_note(self.determined)
 
     @property
     def posterior(self) -> Posterior:
-        """Of the parameters of the POS error."""
+        """Posterior of the parameters of the POS error."""
         return self.screening.posterior
 
     @property
     def outliers(self) -> tuple[TargetTest, ...]:
-        """Targets that the others contradict."""
+        """Targets that contradict the others."""
         return self.screening.outliers
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences on what is doubtful, and what this geometry can't tell of the one scanner.
+        """Sentences on doubts, and on undetermined components of the one scanner.
 
-        Of several scanners each has its own: those of ``of``.
+        Each of several scanners has its own, returned by ``of``.
         """
         if len(self.recorded) == 1:
             return self.shared_warnings + self.own_warnings
@@ -281,7 +281,7 @@ class Calibration(Summary):
 
     @property
     def own_warnings(self) -> tuple[str, ...]:
-        """Those of the sentences that concern the one scanner."""
+        """Sentences that concern the one scanner."""
         statements = [
             *_undetermined(self.lsc, self.determined),
             *clock_warnings(self.lsc, self.trajectory),
@@ -292,7 +292,7 @@ class Calibration(Summary):
 
     @property
     def shared_warnings(self) -> tuple[str, ...]:
-        """Those of the sentences that concern all scanners."""
+        """Sentences that concern all scanners."""
         targets = len(self.adjustment.target_rows)
         statements = list(self.notes)
         if targets == 0:
@@ -310,7 +310,7 @@ class Calibration(Summary):
         return self.posterior.points
 
     def correction(self, method: str = "lsc") -> Correction:
-        """The Correction that brings points from a scanner's recorded to its calibrated mounting.
+        """Return the Correction that takes points from a recorded to its calibrated mounting.
 
         Parameters
         ----------
@@ -326,11 +326,11 @@ class Calibration(Summary):
 
     @property
     def correction_with_drift(self) -> Correction:
-        """That of the first scanner."""
+        """The Correction of the first scanner's mounting and of the POS error."""
         return self.corrections_with_drift[0]
 
     def with_residuals(self, ties: Ties, used: np.ndarray) -> Calibration:
-        """The same with what it leaves of ties.
+        """The same with the residuals of ties.
 
         Parameters
         ----------
@@ -344,10 +344,11 @@ class Calibration(Summary):
         return replace(self, ties=bare, ties_with_drift=drifted)
 
     def fit_sigma(self, number: int) -> float | None:
-        """How far apart the first scanner and another put what both saw on one pass. Units: m.
+        """Distance between the first and another scanner's images of objects of one pass. Units: m.
 
-        One sigma by what is open of both mountings: double walls of that size are to be expected.
-        None where nothing ties them. A boresight that no such wall shows takes no part.
+        One sigma from the uncertainty of both mountings: double walls of that size are to be
+        expected. None without ties between them. A boresight that no such wall shows is not
+        included.
 
         Parameters
         ----------
@@ -366,14 +367,14 @@ class Calibration(Summary):
         return None
 
     def of(self, number: int, scanner: np.ndarray) -> Calibration:
-        """The calibration of a scanner, with the POS error by all of them.
+        """Return the calibration of a scanner, with the POS error from all of them.
 
         Parameters
         ----------
         number : int
             From 0.
         scanner : (n,) int array
-            That of each observation.
+            Scanner of each observation.
         """
         return replace(
             self,
@@ -389,7 +390,7 @@ class Calibration(Summary):
 
 
 def sigma_note(determined: np.ndarray) -> str:
-    """On what sigmas of a mounting rest, of its components (6,) that are determined or not."""
+    """Note on the basis of sigmas of a mounting, given its determined components (6,)."""
     parts = ", ".join(compress(MOUNTING_COMPONENTS, ~determined))
     note = f"not determined: {parts}; its sigma holds only as far as the POS's own do"
     if parts:
@@ -400,7 +401,7 @@ def sigma_note(determined: np.ndarray) -> str:
 def mounted_corrections(
     drift: Correction, recorded: Sequence[Mounting], mountings: Sequence[Mounting]
 ) -> tuple[Correction, ...]:
-    """The correction of each scanner: its mounting, and the POS error that all share.
+    """Return the correction of each scanner: its mounting, and the common POS error.
 
     Parameters
     ----------
@@ -416,7 +417,7 @@ def mounted_corrections(
 
 
 def clock_warnings(estimate: MountingEstimate, trajectory: Trajectory) -> Iterator[Statement]:
-    """A Statement on the clock offset that a lever arm's lack forward may be as well.
+    """Yield a Statement on a clock offset that is equivalent to an error of the lever arm forward.
 
     Parameters
     ----------
@@ -428,14 +429,14 @@ def clock_warnings(estimate: MountingEstimate, trajectory: Trajectory) -> Iterat
     if abs(lack) > SETTINGS.setup_sigmas * estimate.sigma[1]:
         way = np.linalg.norm(np.diff(trajectory.position, axis=0), axis=1)
         speeds = way / np.diff(trajectory.gps_time)
-        speed = np.average(speeds, weights=way)  # where it drives, no halts
+        speed = np.average(speeds, weights=way)  # while driving, not at halts
         spread = np.sqrt(np.average((speeds - speed) ** 2, weights=way))
         values = {"lack": float(lack), "speed": float(speed), "spread": float(spread)}
         yield Statement("clock", "warning", values)
 
 
 def _undetermined(estimate, determined):
-    """A Statement on what this geometry can't tell, with the sigma that the POS's belief gives."""
+    """Statement on undetermined components, with the sigma implied by that of the POS."""
     if not determined.all():
         values = {
             "components": tuple(compress(MOUNTING_COMPONENTS, ~determined)),

@@ -1,14 +1,13 @@
-"""Everything measured is a factor of one equation, l = A x + B s + n  (Mao et al. 2015, Eq. 7-12).
+"""Observations as factors of one equation, l = A x + B s + n  (Mao et al. 2015, Eq. 7-12).
 
 A factor is n observations of one kind, with r rows each:
 
-- target: surveyed - observed place, of one pose;
+- target: surveyed - observed position, at one pose;
 - re-acquisition: a step of the recorded path, which no vehicle drives, between two poses;
-- tie: what two passes both saw, along its normal, of two poses;
-- prior: what is believed of an unknown beside the POS error, of no pose at all.
-
-Whatever its kind, B follows from the partial derivatives by the poses, and A from these and from
-the columns of unknowns such as mountings.
+- tie: an object observed in two passes, along its normal, at two poses;
+- prior: knowledge of an unknown other than the POS error, without any pose. For every kind, B
+follows from the partial derivatives by the poses, and A from these and from the columns of unknowns
+such as mountings.
 """
 
 from __future__ import annotations
@@ -30,28 +29,28 @@ SIGNS = np.array([1.0, -1.0])  # of the corrections at the first and the second 
 
 @dataclass(frozen=True, repr=False)
 class Factor(Summary):
-    """Observations of one kind: n of them, of r rows each, that see e poses.
+    """Observations of one kind: n of them, of r rows each, that depend on e poses.
 
     Parameters
     ----------
     kind : str
         One of KINDS.
     name : (n,) array of str
-        Observations of one name are tested and left out together.
+        Observations of one name are tested and excluded together.
     gps_time : (n, e) array
         Of the poses. Units: s.
     misclosure : (n, r) array
-        What the correction should explain. Units: m.
+        Misclosures that the correction should explain. Units: m.
     noise : Noise
         Eq. 19.
     partials : (n, e, r, 6) array
         B by position and rotation of each pose (Eq. 7-9).
     stated : StatedSigma, optional
-        Of the POS at the n e poses; None where there is no pose.
+        Of the POS at the n e poses; None without a pose.
     columns : (n, r, u) array, optional
-        Partial derivatives by the first u unknowns beside the POS error (Eq. 16-18).
+        Partial derivatives by the first u unknowns other than the POS error (Eq. 16-18).
     weight : (n,) array, optional
-        By which the noise's variance is divided: what robust estimation makes of each.
+        Robust weights by which the noise's variance is divided.
     """
 
     kind: str
@@ -74,7 +73,7 @@ class Factor(Summary):
 
     @property
     def weighed_noise(self) -> Noise:
-        """The noise by the weights."""
+        """The noise divided by the weights."""
         if self.weight is None:
             return self.noise
         return replace(self.noise, own=self.noise.own / self.weight[:, None, None])
@@ -122,7 +121,7 @@ class Factor(Summary):
         return replace(self, stated=replace(self.stated, starts=starts))
 
     def with_columns(self, columns: np.ndarray) -> Factor:
-        """The same with more unknowns, behind those that it has.
+        """The same with more unknowns, after the existing ones.
 
         Parameters
         ----------
@@ -146,7 +145,7 @@ def target_factor(errors: PosErrors, matched: Matched) -> Factor:
     """Matched targets, three rows each: surveyed - observed (Eq. 7-9).
 
     The noise is that of extraction, of the survey, which all passes of a target share, and of the
-    step of the path inside which it was seen (Eq. 19).
+    step of the path that contains it (Eq. 19).
 
     Parameters
     ----------
@@ -176,9 +175,9 @@ def _target_noise(matched, steps):
 
 
 def reacquisition_factor(errors: PosErrors, steps: Steps) -> Factor:
-    """Steps of the recorded path: by as much as the position moves, its error does.
+    """Steps of the recorded path, at which the error moves by as much as the position.
 
-    Those farther than SEARCH_RADIUS are no error of a POS.
+    Steps longer than SEARCH_RADIUS are not errors of a POS.
 
     Parameters
     ----------
@@ -205,15 +204,15 @@ def tie_factor(
 ) -> Factor:
     """Ties, a row each: n . (c(t1) - c(t2)) at the places of both views is the misclosure.
 
-    A mounting is the same at both views: its columns are the differences of both.
+    A mounting is common to both views: its columns are the differences between them.
 
     Parameters
     ----------
     errors : PosErrors
     ties : Ties
     mountings : dict, optional
-        Those with which the ties were georeferenced and whose errors are unknown, by the number of
-        their scanner.
+        Mountings used to georeference the ties, with unknown errors, by the number of their
+        scanner.
     """
     trajectory = errors.trajectory
     times = ties.gps_time.ravel()
@@ -235,7 +234,7 @@ def tie_factor(
 
 
 def prior_factor(mean: np.ndarray, sigma: np.ndarray) -> Factor:
-    """Prior of unknowns beside the POS error: of each its value and one sigma.
+    """Prior of unknowns other than the POS error: the value and one sigma of each.
 
     Parameters
     ----------
@@ -294,7 +293,7 @@ def mounting_columns(
 
 
 def along_ties(direction: np.ndarray, partials: np.ndarray) -> np.ndarray:
-    """Partial derivatives (n, 2, j) of ties by what moves both views, the second with minus.
+    """Partial derivatives (n, 2, j) of ties by what moves both views, the second negative.
 
     Parameters
     ----------
@@ -307,7 +306,7 @@ def along_ties(direction: np.ndarray, partials: np.ndarray) -> np.ndarray:
 
 
 def _shared_epochs(gps_time, history):
-    """Mean time (q,) of the views of each short stretch of a segment. Units: s.
+    """Mean time (q,) of the views in each short interval of a segment. Units: s.
 
     Each epoch is an unknown of the noise of GNSS: with those of all views a survey of two scanners
     takes 17 times as long to solve.

@@ -1,4 +1,4 @@
-"""What the control points of a survey can't tell, and warnings about it."""
+"""Limits of the information in a survey's control points, and warnings about them."""
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
@@ -20,11 +20,11 @@ COMPONENTS = ("easting", "northing", "height", "roll", "pitch", "heading")
 
 @dataclass(frozen=True)
 class GlobalTest:
-    """The noise that is left at the targets against the chi-squared limit of what they state.
+    """Test of the estimated noise at the targets against the chi-squared limit of the stated noise.
 
-    The scales of the signals are learned from the same misclosures and take up what they can, so
-    the sum of all weighted squares tells little; their noise has none, and no part of fall-backs.
-    Less noise than stated does no harm.
+    The scales of the signals are estimated from the same misclosures and absorb much of them, so
+    the sum of all weighted squares is not informative; the noise contains no signals, and no part
+    of re-acquisitions. Less noise than stated does no harm.
 
     Parameters
     ----------
@@ -41,25 +41,25 @@ class GlobalTest:
 
     @property
     def passed(self) -> bool:
-        """Whether the statistic is within its limit."""
+        """True if the statistic is within its limit."""
         return self.statistic <= self.upper
 
 
 @dataclass(frozen=True)
 class Guards:
-    """Where the correction stands on control points, and where it doesn't.
+    """Support of the correction by control points, and its absence.
 
     Parameters
     ----------
     gap : (float, float)
-        Start and end of the longest stretch without control inside a pass that has some, the ends
+        Start and end of the longest interval without control inside a pass that has some, the ends
         of passes included. Units: s.
     passes_without_control : tuple of (float, float)
         Start and end of each. Units: s.
     variance_ratio : (6,) array
         Posterior over prior variance of E, N, H, roll, pitch, heading: median at control epochs.
     global_test : GlobalTest or None
-        None with ties: a second of them shares more than it states.
+        None with ties: those within a second share more error than is stated.
     """
 
     gap: tuple[float, float]
@@ -69,12 +69,12 @@ class Guards:
 
     @property
     def determined(self) -> np.ndarray:
-        """Which of the six components this geometry tells, (6,) bool."""
+        """Mask (6,) of components that this geometry determines."""
         return self.variance_ratio < SETTINGS.determined_ratio
 
     @property
     def longest_gap(self) -> tuple[float, float]:
-        """Start and end of the longest time without control, be it a whole pass. Units: s."""
+        """Start and end of the longest time without control, possibly a whole pass. Units: s."""
         return max([self.gap, *self.passes_without_control], key=np.ptp)
 
 
@@ -105,11 +105,11 @@ def guards_of(passes: np.ndarray, observed: np.ndarray, guards: Guards) -> Guard
     Parameters
     ----------
     passes : (k, 2) array
-        Start and end of what was scanned in each. Units: s.
+        Start and end of scanning in each. Units: s.
     observed : (n,) array
         Times of control points. Units: s.
     guards : Guards
-        Whose variance ratio and test hold there.
+        Source of the variance ratio and test.
     """
     times = np.sort(observed)
     gaps: list[tuple[float, float]] = []
@@ -149,7 +149,7 @@ def _global_test(adjustment, parameters):
     """GlobalTest by w' N w of w = P l, whose covariance is P; None without redundancy."""
     if len(adjustment.target_rows) == 0:
         return None
-    moments = np.zeros(3)  # what it is, its expectation and its variance
+    moments = np.zeros(3)  # value, expectation and variance
     for block in Objective.of(adjustment).blocks:
         solved = block.solve(parameters)
         rows = np.arange(3 * len(block.names))
@@ -192,12 +192,12 @@ def sparse_warnings(adjustment: Adjustment, order: int) -> Iterator[Statement]:
 
 
 def few_targets(targets: int) -> Iterator[Statement]:
-    """A Statement where a wrong control point could not be found.
+    """Yield a Statement if a wrong control point could not be found.
 
     Parameters
     ----------
     targets : int
-        Control points that take part.
+        Number of control points in use.
     """
     if 0 < targets < SETTINGS.smallest_targets:
         values = {"targets": targets, "least": SETTINGS.smallest_targets}
@@ -222,7 +222,7 @@ def guard_warnings(
     if parameters.family != INTEGRATED:
         time = max(time, parameters.drift_time)
     ties = adjustment.ties
-    if ties is None:  # they hold what control doesn't, and Support says where nothing does
+    if ties is None:  # they support gaps in control, and Support reports unsupported ones
         yield from _extrapolated(adjustment, time)
         yield from _faded(adjustment, time, *guards.gap)
     for first, last in guards.passes_without_control:
@@ -232,7 +232,7 @@ def guard_warnings(
 
 
 def global_test_warnings(guards: Guards) -> Iterator[Statement]:
-    """A Statement where the global test fails.
+    """Yield a Statement if the global test fails.
 
     Parameters
     ----------
@@ -264,7 +264,7 @@ def _extrapolated(adjustment, time):
 
 
 def _faded(adjustment, time, start, end):
-    """A Statement about the longest gap between control points where signals fade in it."""
+    """Statement on the longest gap between control points, if signals fade in it."""
     first, last = adjustment.span
     scanned = _scanned_times(adjustment)
     length = end - start

@@ -1,4 +1,4 @@
-"""What can't be estimated from, and what is done where the POS doesn't state its sigmas."""
+"""Checks of the inputs of an estimate, and defaults for missing sigmas of the POS."""
 
 from dataclasses import replace
 
@@ -12,7 +12,7 @@ from mlscorr.survey import Matched, Pos, Statement, Trajectory
 def checked_inputs(
     trajectory: Trajectory, matched: Matched, pos: Pos, order: int
 ) -> tuple[Trajectory, tuple[Statement, ...]]:
-    """The trajectory with all its sigmas, and what is to be known of those that were filled in.
+    """Return the trajectory with all its sigmas, and Statements on those that were filled in.
 
     Parameters
     ----------
@@ -25,8 +25,8 @@ def checked_inputs(
     Raises
     ------
     ValueError
-        Without any observation, for an order that is none, and for sigmas that can't be: negative
-        ones, or none at all of a control point and its observation together.
+        Without any observation, for an invalid order, and for invalid sigmas: negative ones, or
+        zero for both a control point and its observation.
     """
     if len(matched) == 0:
         raise ValueError(
@@ -43,7 +43,7 @@ def checked_inputs(
 
 
 def check_order(order: int) -> None:
-    """Refuse an order of the trend that is no whole number from 0 on.
+    """Reject an order of the trend that is not a whole number from 0 on.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def check_order(order: int) -> None:
 
 
 def _check_noise(matched):
-    """Refuse noise that is negative, not a number, or nothing."""
+    """Reject noise that is negative, not a number, or zero."""
     sigma = matched.surveyed.sigma
     wrong = ~(sigma >= 0).all(axis=1) | ~(matched.variance >= SETTINGS.resolution**2).all(axis=1)
     if wrong.any():
@@ -74,10 +74,10 @@ def _check_noise(matched):
 
 
 def filled_sigmas(trajectory: Trajectory) -> tuple[Trajectory, tuple[Statement, ...]]:
-    """The trajectory with all its sigmas, and what is to be known of those that were filled in.
+    """Return the trajectory with all its sigmas, and Statements on those that were filled in.
 
-    Sigmas of zero, and those that jump at single epochs, are taken from the epochs beside; zero at
-    all epochs is no statement.
+    Sigmas of zero, and those that jump at single epochs, are taken from the adjacent epochs; zero
+    at all epochs counts as missing.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def filled_sigmas(trajectory: Trajectory) -> tuple[Trajectory, tuple[Statement, 
 
 
 def _is_lone_jump(sigma):
-    """Which epochs (n,) state sigmas (n, 3) far from those of both sides."""
+    """Mask (n,) of epochs with sigmas (n, 3) far from those on both sides."""
     usual = median_filter(sigma, size=(SETTINGS.median_epochs, 1), mode="nearest")
     ratio = np.divide(sigma, usual, out=np.ones_like(sigma), where=usual > 0)
     return ((ratio > SETTINGS.lone_jump) | (ratio < 1 / SETTINGS.lone_jump)).any(axis=1)

@@ -1,10 +1,10 @@
-"""Refused control points: wrong, or right beside a POS that drifts and does not state it.
+"""Rejected control points: wrong, or correct but near an unstated drift of the POS.
 
-A wrong point is wrong by one vector in all its passes, a wrong setup of the instrument moves its
-neighbors likewise, and control points are seldom wrong in great numbers. Drift comes and goes
-between two points, differs from pass to pass, and moves all that was observed within a second. The
-evidence of both readings and their prior odds decide, for refused points that belong together at
-a time; where drift is the likelier by far, its sigma is increased there and all is estimated anew.
+A wrong point has one error vector in all its passes, a wrong setup of the instrument moves
+neighboring points likewise, and control points are seldom wrong in great numbers. Drift comes and
+goes between two points, differs from pass to pass, and moves everything observed within a second.
+The evidence of both hypotheses and their prior odds decide, for each group of related rejected
+points; if drift is far more likely, the sigma is inflated there and the estimation is repeated.
 """
 
 from collections.abc import Mapping
@@ -26,17 +26,17 @@ from mlscorr.survey import Statement, Trajectory
 
 @dataclass(frozen=True)
 class UnstatedDrift:
-    """An interval in which the POS drifts by more than it states.
+    """An interval in which the POS drifts by more than its sigmas state.
 
     Parameters
     ----------
     first, last : float
-        Times of the observed control points that constrain it, or the end of the pass where there
-        are none. Units: s.
+        Times of the observed control points that constrain it, or the end of the pass if there are
+        none. Units: s.
     size : float
         One sigma per axis at its largest. Units: m.
     is_open : bool
-        True where no control point constrains its end.
+        True if no control point constrains its end.
     names : tuple of str
         Control points observed in it.
     """
@@ -48,7 +48,7 @@ class UnstatedDrift:
     names: tuple[str, ...]
 
     def course(self, gps_time: np.ndarray) -> np.ndarray:
-        """Share (n,) of its size at each time, as of an integrated random walk between its ends.
+        """Fraction (n,) of its size at each time, like an integrated random walk between its ends.
 
         Parameters
         ----------
@@ -69,12 +69,12 @@ class UnstatedDrift:
 
 
 def with_drifts(trajectory: Trajectory, drifts: tuple[UnstatedDrift, ...]) -> Trajectory:
-    """Return the trajectory with the sigma of its position increased where it drifts unstated.
+    """Return the trajectory with an inflated sigma of its position in unstated drifts.
 
     Parameters
     ----------
     trajectory : Trajectory
-        One without sigmas is given those of a POS that has GNSS.
+        One without sigmas gets those of a POS with GNSS.
     drifts : tuple of UnstatedDrift
     """
     if not drifts:
@@ -90,14 +90,14 @@ def with_drifts(trajectory: Trajectory, drifts: tuple[UnstatedDrift, ...]) -> Tr
 
 @dataclass(frozen=True)
 class Judgement:
-    """Probability that each refused point is right beside drift, and the drifts to take account of.
+    """Probability that each rejected point is correct, and the drifts to allow for.
 
     Parameters
     ----------
     probability : dict of str to float
-        By the name of each refused target.
+        By the name of each rejected target.
     drifts : tuple of UnstatedDrift
-        Where that is the likelier by far.
+        Drifts that are far more likely.
     """
 
     probability: Mapping[str, float]
@@ -105,10 +105,10 @@ class Judgement:
 
 
 def judge(adjustment: Adjustment, screening: Screening, known: int = 0) -> Judgement:
-    """Weigh for all refused targets whether they are wrong or the POS drifts beside them.
+    """Compare gross errors of all rejected targets with drift of the POS near them.
 
-    With n groups of refused targets that belong together, n + 1 readings are weighed: that the POS
-    drifts beside none of them, beside the one where that is the likeliest, beside two, and so on.
+    With n groups of related rejected targets, n + 1 hypotheses are compared: drift near none of
+    them, near the most likely one, near the two most likely ones, and so on.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def judge(adjustment: Adjustment, screening: Screening, known: int = 0) -> Judge
     screening : Screening
         Of these targets.
     known : int
-        Number of unstated drifts that the sigmas account for by now.
+        Number of unstated drifts already included in the sigmas.
     """
     refused = {test.name: test for test in screening.outliers}
     if not refused:
@@ -150,15 +150,15 @@ def judge(adjustment: Adjustment, screening: Screening, known: int = 0) -> Judge
 
 
 class _Group(NamedTuple):
-    """Refused targets that follow each other in time, in one pass or several.
+    """Rejected targets that follow each other in time, in one pass or several.
 
     Parameters
     ----------
     names : tuple of str
     wrong, drift : float
-        Log evidence that they are wrong, and that the POS drifts beside them.
+        Log evidence that they are wrong, and that the POS drifts near them.
     drifts : tuple of UnstatedDrift
-        That explain them.
+        Drifts that explain them.
     """
 
     names: tuple[str, ...]
@@ -194,19 +194,19 @@ def _others(groups, group):
 
 
 def _log_posterior(adjustment, drifting, others, known):
-    """Log posterior of the reading that the POS drifts beside some groups, and others are wrong."""
+    """Log posterior of drift of the POS near some groups, with gross errors of all others."""
     wrong = sum(len(group.names) for group in others)
     bursts = known + sum(len(group.drifts) for group in drifting)
     evidence = sum(group.drift for group in drifting) + sum(group.wrong for group in others)
     prior = log_share(wrong, len(adjustment.target_rows), SETTINGS.gross_share)
     often = np.log(0.5) + log_share(bursts, len(adjustment.names), 0.5)
-    if bursts == 0:  # as may well be that the POS never drifts unstated
+    if bursts == 0:  # the POS may well never have unstated drift
         often = np.logaddexp(often, np.log(0.5))
     return evidence + prior + often
 
 
 def _groups(adjustment, refused):
-    """Names of refused targets that belong together, with an UnstatedDrift of each run of them."""
+    """Names of related rejected targets, with an UnstatedDrift of each run of them."""
     order = np.argsort(adjustment.observed, kind="stable")
     time = adjustment.observed[order]
     names = adjustment.names[order]
@@ -232,7 +232,7 @@ def _groups(adjustment, refused):
 def _burst(trajectory, time, names, start, end):
     """The UnstatedDrift of a run of observations, of unit size."""
     begin, finish = trajectory.passes[trajectory.segment(time[start])]
-    beside = POS_SETTINGS.sigma_interval  # what was observed within it drifts together
+    beside = POS_SETTINGS.sigma_interval  # observations within it share their drift
     first = time[time < time[start] - beside].max(initial=begin)
     last = time[time > time[end - 1] + beside].min(initial=finish)
     is_open = bool(last == finish)
@@ -260,9 +260,9 @@ def _wrong_evidence(seen, observed, names):
 
 
 def _courses_of(burst, time):
-    """Courses of a drift: a walk that its ends constrain, a constant one, and any other one.
+    """Courses of a drift: a walk constrained at its ends, a constant one, and any other one.
 
-    What was observed within a second drifts together.
+    Observations within a second share their drift.
     """
     inside = (time > burst.first) & (time < burst.last)
     walk = burst.course(time)
@@ -275,7 +275,7 @@ def _courses_of(burst, time):
 
 
 def _sized(burst, adjustment, refused):
-    """The drift with the size that its refused targets deviate by."""
+    """The drift, scaled to the deviations of its rejected targets."""
     time = adjustment.observed
     inside = (time > burst.first) & (time < burst.last)
     deviations = [
@@ -288,11 +288,11 @@ def _sized(burst, adjustment, refused):
 def doubtful_drift(
     adjustment: Adjustment, screening: Screening, probability: Mapping[str, float]
 ) -> np.ndarray:
-    """One sigma (n, 3) at every epoch of the drift that refused targets may show. Units: m.
+    """One sigma (n, 3) of possible drift at every epoch, as rejected targets show. Units: m.
 
-    With the probability p that a target is right, the POS is off there by what it deviates by, d:
-    p d d^T beside the covariance of the estimate without it. Between targets it is linear in
-    time, and zero at those in use.
+    With the probability p that a target is correct, the POS error there is its deviation d: p d d^T
+    is added to the covariance of the estimate without it. Between targets it is linear in time, and
+    zero at those in use.
 
     Parameters
     ----------
@@ -301,7 +301,7 @@ def doubtful_drift(
     screening : Screening
         Of these targets.
     probability : dict of str to float
-        By the name of each refused target.
+        By the name of each rejected target.
     """
     deviation = np.zeros((len(adjustment.names), 3))
     for test in screening.outliers:
@@ -316,12 +316,12 @@ def doubtful_drift(
 def doubts(
     adjustment: Adjustment, screening: Screening, probability: Mapping[str, float]
 ) -> tuple[Statement, ...]:
-    """A warning where refused targets are rather right than wrong.
+    """Warning about rejected targets that are more probably correct than wrong.
 
     Parameters
     ----------
     adjustment, screening, probability
-        As of doubtful_drift.
+        See ``doubtful_drift``.
     """
     doubtful = [test for test in screening.outliers if probability[test.name] > 0.5]
     if not doubtful:

@@ -1,13 +1,13 @@
-"""From misclosures to the calibrated mountings (Mao et al. 2015, section 2.4.3, Eq. 16-18).
+"""Estimation of calibrated mountings from misclosures (Mao et al. 2015, section 2.4.3, Eq. 16-18).
 
-The mountings of all scanners are the trend, six columns each, and the POS error that they share is
-the signal: 3 of the position and 3 small rotations about the map axes. Plain least squares, which
-takes the POS to be free of error, stands beside it.
+The mountings of all scanners are the trend, six columns each, and their common POS error is the
+signal: 3 of the position and 3 small rotations about the map axes. Plain least squares, which
+assumes an error-free POS, is computed too.
 
-A tie compares two views of one thing. What is wrong with the mounting turns and moves both with the
-body, so that views in opposite directions, or far and near, tell it; its rows of A are the
-differences of the partial derivatives at both. Two scanners that saw it a second apart share nearly
-all of the POS error: what is left between them is the one mounting beside the other.
+A tie compares two views of one object. An error of the mounting rotates and moves both with the
+body, so that views in opposite directions, or at different distances, reveal it; its rows of A are
+the differences of the partial derivatives at both. Two scanners that observed it within a second
+share nearly all of the POS error: the remaining difference is that between their mountings.
 """
 
 from collections.abc import Sequence
@@ -38,29 +38,28 @@ from mlscorr.pos import PosErrors
 from mlscorr.survey import SAME_EPOCH, Matched, Mounting, Pos, Statement, Ties, Trajectory
 
 
-# The matrices are small: on a busy machine threads would wait longer than they work
+# The matrices are small: on a busy machine synchronizing threads takes longer than the work
 @threadpool_limits.wrap(limits=1, user_api="blas")
 def estimate_mounting(
     trajectory: Trajectory, mountings: Sequence[Mounting], matched: Matched, pos: Pos | None = None
 ) -> Calibration:
-    """Estimate what recorded mountings lack from matched targets  (Mao et al. 2015, Eq. 16-18).
+    """Estimate errors of recorded mountings from matched targets  (Mao et al. 2015, Eq. 16-18).
 
     Parameters
     ----------
     trajectory : Trajectory
         As recorded.
     mountings : sequence of Mounting
-        Of each scanner as recorded: the observations were georeferenced with them.
+        Of each scanner as recorded, used to georeference the observations.
     matched : Matched
-        Observed control points; the survey error of one is the same whichever scanner saw it.
+        Observed control points; the survey error of one is the same for all scanners.
     pos : Pos, optional
-        Beliefs, used where the trajectory has no sigmas.
+        Assumptions, used if the trajectory has no sigmas.
 
     Raises
     ------
     ValueError
-        Where each scanner saw fewer than 3 targets or all of them at one time, and for sigmas that
-        can't be.
+        If no scanner saw 3 targets at different times, and for invalid sigmas.
     """
     pos = pos or Pos()
     faults = [control_fault(matched, number) for number in range(len(mountings))]
@@ -78,21 +77,21 @@ def estimate_mounting(
 def believed_mounting(
     trajectory: Trajectory, mountings: Sequence[Mounting], matched: Matched, pos: Pos | None = None
 ) -> Calibration:
-    """What is known of mountings before ties, where control points can't tell them alone.
+    """Prior calibration before ties, for control points that do not determine the mountings alone.
 
     Parameters
     ----------
     trajectory, mountings : Trajectory, sequence of Mounting
         As recorded.
     matched : Matched
-        Observed control points: any number, none of which can be tested.
+        Any number of observed control points, which cannot be tested.
     pos : Pos, optional
-        Beliefs, used where the trajectory has no sigmas.
+        Assumptions, used if the trajectory has no sigmas.
 
     Returns
     -------
     Calibration
-        Under the parameters that are believed. Ties can be added to it.
+        Under the prior parameters. Ties can be added to it.
     """
     pos = pos or Pos()
     filled, notes = filled_sigmas(trajectory)
@@ -105,9 +104,9 @@ def believed_mounting(
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
 def calibration_with_ties(calibration: Calibration, matched: Matched, ties: Ties) -> Calibration:
-    """The calibration by control points and by what two passes both saw.
+    """Return the calibration by control points and by ties between passes.
 
-    Least squares stays that of the control points.
+    Least squares remains that of the control points.
 
     Parameters
     ----------
@@ -116,7 +115,7 @@ def calibration_with_ties(calibration: Calibration, matched: Matched, ties: Ties
     matched : Matched
         These, as georeferenced with the recorded mountings.
     ties : Ties
-        The places likewise; the directions are those of the things themselves.
+        Their positions likewise; the directions are those of the objects themselves.
     """
     weighed, correction = _converged(calibration, matched, ties)
     tied = weighed.adjustment.with_factor(weighed.ties.scaled(1.0))  # without robust weights
@@ -140,7 +139,7 @@ def calibration_with_ties(calibration: Calibration, matched: Matched, ties: Ties
 def previewed_mounting(
     calibration: Calibration, matched: Matched, ties: Ties
 ) -> tuple[Correction, ...]:
-    """The corrections by each mounting and the POS error with ties that were paired so far.
+    """Return corrections by each mounting and the POS error, with the ties paired so far.
 
     Under the parameters of the control points alone, and without sigmas.
 
@@ -149,7 +148,7 @@ def previewed_mounting(
     calibration : Calibration
         By control points alone.
     matched, ties : Matched, Ties
-        As of calibration_with_ties.
+        See ``calibration_with_ties``.
     """
     tied, correction = _converged(calibration, matched, ties)
     recorded = calibration.recorded
@@ -160,7 +159,7 @@ def previewed_mounting(
 
 
 def control_fault(matched: Matched, number: int) -> str:
-    """Why control points alone can't tell a scanner's mounting; nothing where they can.
+    """Reason that control points alone don't determine a scanner's mounting; empty if they do.
 
     Parameters
     ----------
@@ -195,7 +194,7 @@ def calibration_by(
     used: np.ndarray,
     notes: tuple[Statement, ...],
 ) -> Calibration:
-    """The Calibration by equations, and the parameters that were chosen for them.
+    """Return the Calibration by equations, and the parameters that were chosen for them.
 
     Parameters
     ----------
@@ -230,7 +229,7 @@ def calibration_by(
 def _least_squares(adjustment, matched, recorded):
     """Equations about the mountings of plain least squares, their correction, and the estimate.
 
-    Iterated, as a rotation is not linear; the targets are georeferenced anew each time.
+    Iterated, because a rotation is not linear; the targets are georeferenced anew each time.
     """
     correction = np.zeros(6 * len(recorded))
     step = 0.0
@@ -241,14 +240,14 @@ def _least_squares(adjustment, matched, recorded):
         step = combined_correction(correction, solved.trend) - correction
         if np.abs(step).max() < SETTINGS.resolution:
             break
-    # What the weak hold of the mounting adds to the redundancy is what it adds to the estimate
+    # A weak constraint adds the same amount to the redundancy as to the estimate
     held = solved.trend_covariance / _weak(recorded) ** 2
     observed = 3 * len(matched)
     sigma0 = 1.0
     redundancy = observed - len(correction) + np.trace(held)
-    if round(redundancy) > 0:  # less than one observation too many tells nothing of the noise
+    if round(redundancy) > 0:  # a redundancy below one contains no information on the noise
         sigma0 = solved.sigma0 * np.sqrt(observed / redundancy)
-    # Larger noise makes the targets worse, not that hold: s^2 (C^-1 + (s^2 - 1) W)^-1
+    # Larger noise makes the targets worse, but not the constraint: s^2 (C^-1 + (s^2 - 1) W)^-1
     shared = np.eye(len(correction)) + (sigma0**2 - 1.0) * held
     covariance = np.linalg.solve(shared, sigma0**2 * solved.trend_covariance)
     return about, correction, MountingEstimate(mountings, correction, covariance, float(sigma0))
@@ -257,7 +256,7 @@ def _least_squares(adjustment, matched, recorded):
 def linearized(
     adjustment: Adjustment, matched: Matched, recorded: Sequence[Mounting], correction: np.ndarray
 ) -> tuple[tuple[Mounting, ...], Adjustment]:
-    """Mountings with a correction, and the equations about them, targets georeferenced anew.
+    """Return mountings with a correction, and the equations about them, targets georeferenced anew.
 
     Parameters
     ----------
@@ -278,7 +277,7 @@ def linearized(
 
 
 def _converged(calibration, matched, ties) -> tuple[WeighedTies, np.ndarray]:
-    """Equations with robust weights about the mountings that they give, and these' correction."""
+    """Equations with robust weights about the resulting mountings, and their correction."""
     recorded = calibration.recorded
     targets = matched[calibration.used]
     step = 0.0
@@ -298,13 +297,13 @@ def _converged(calibration, matched, ties) -> tuple[WeighedTies, np.ndarray]:
 def georeferenced_ties(
     errors: PosErrors, recorded: Sequence[Mounting], mountings: Sequence[Mounting], ties: Ties
 ) -> Factor:
-    """The factor of ties that mountings georeferenced, about other ones.
+    """Return the factor of ties that mountings georeferenced, linearized about other mountings.
 
     Parameters
     ----------
     errors : PosErrors
     recorded, mountings : sequence of Mounting
-        Of each scanner: the recorded one, and that about which the equations are.
+        Of each scanner: the recorded one, and that of the linearization.
     ties : Ties
     """
     trajectory = errors.trajectory
@@ -317,14 +316,14 @@ def georeferenced_ties(
 
 
 def _weak(mountings):
-    """One sigma (6 k,) of what is known of mountings without the survey. Units: m, rad."""
+    """One sigma (6 k,) of prior knowledge of mountings. Units: m, rad."""
     return np.concatenate([prior_sigma(mounting) for mounting in mountings])
 
 
 def prior_sigma(mounting: Mounting) -> np.ndarray:
-    """One sigma (6,) of what is known of a mounting without the survey. Units: m, rad.
+    """One sigma (6,) of prior knowledge of a mounting. Units: m, rad.
 
-    That of its measured part, and what is known without any measurement of the other.
+    The stated sigma of its measured part, and a general prior for the other.
 
     Parameters
     ----------
@@ -337,7 +336,7 @@ def prior_sigma(mounting: Mounting) -> np.ndarray:
 
 
 def _collocation(adjustment, posterior, recorded, start):
-    """The estimate by collocation, averaged over the parameters, and what is determined (6 k,)."""
+    """Estimate by collocation, averaged over the parameters, and mask of determined parts."""
     shifting = with_shift(adjustment)
     mean = 0.0
     square = 0.0
@@ -359,13 +358,13 @@ def _collocation(adjustment, posterior, recorded, start):
 def with_shift(adjustment: Adjustment) -> Adjustment:
     """The same with a constant difference between the coordinates of control and trajectory."""
     n = len(adjustment.names)
-    if n == 0:  # nothing sees it
+    if n == 0:  # nothing depends on it
         return adjustment
     constant = {TARGET: np.tile(np.eye(3), (n, 1, 1))}
     return adjustment.with_unknowns(constant, np.zeros(3), np.full(3, np.inf))
 
 
 def is_determined(variance: np.ndarray) -> np.ndarray:
-    """Which components (6 k,) of mountings a geometry tells, by their variance with any shift."""
+    """Mask (6 k,) of mounting components that a geometry determines, with any shift."""
     limit = np.tile(np.repeat(SETTINGS.determined_sigma, 3), len(variance) // 6)
     return np.sqrt(variance) < limit

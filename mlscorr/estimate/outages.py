@@ -1,8 +1,9 @@
-"""When drift began to grow, and which steps of the path are fall-backs.
+"""Onset of drift, and classification of steps of the path as re-acquisitions.
 
-A filtered POS errs little until GNSS goes, and falls back when it returns. The fall-backs stand in
-the recorded path; the starts don't, so each segment's is sought between its control epochs by
-likelihood. A step that contradicts the control points is no fall-back, only a restart.
+The error of a filtered POS is small until GNSS is lost, and small again after its re-acquisition.
+The recorded path shows re-acquisitions but not the starts of drift, so each segment's start is
+sought between its control epochs by likelihood. A step that contradicts the control points is no
+re-acquisition, only a restart.
 """
 
 import numpy as np
@@ -18,7 +19,7 @@ from mlscorr.pos import SignalParameters
 
 
 def with_drift_history(adjustment: Adjustment) -> Adjustment:
-    """The equations with fall-backs, and with the most likely start of growth in each segment.
+    """Return the equations with re-acquisitions, and the most likely start of each drift.
 
     Parameters
     ----------
@@ -37,12 +38,12 @@ def with_drift_history(adjustment: Adjustment) -> Adjustment:
 
 
 def with_likely_starts(adjustment: Adjustment) -> tuple[Adjustment, SignalParameters]:
-    """The equations with the most likely starts, and the parameters that go with them.
+    """Return the equations with the most likely starts, and the corresponding parameters.
 
     Parameters
     ----------
     adjustment : Adjustment
-        Of control points, and of some ties, whose epochs tell starts apart between the points.
+        Of control points, and of some ties, whose epochs separate starts between the points.
     """
     history = adjustment.errors.history
     edges = history.edges
@@ -62,14 +63,14 @@ def with_likely_starts(adjustment: Adjustment) -> tuple[Adjustment, SignalParame
         before = starts
         for number, segment in enumerate(segments):
             if not (segment[-1] or np.any((times > segment[0]) & (times < segment[1]))):
-                continue  # nothing there tells starts apart
+                continue  # no observation there separates starts
             part = _about(adjustment, *segment[:2])
             candidates = np.append(starts[number], _candidates(times, *segment))
             scores = []
             for candidate in candidates:
                 tried = np.where(np.arange(len(starts)) == number, candidate, starts)
                 scores.append(Objective.of(part.with_starts(tried))(INTEGRATED, mode))
-            # What is stated stands unless control makes another start as likely as all together
+            # The stated start is kept unless control makes another one as likely as all together
             scores += np.log(len(scores)) * (candidates == stated[number])
             likeliest = candidates[np.argmax(scores)]
             starts = np.where(np.arange(len(starts)) == number, likeliest, starts)
@@ -81,7 +82,7 @@ def with_likely_starts(adjustment: Adjustment) -> tuple[Adjustment, SignalParame
 
 
 def _about(adjustment, first, last):
-    """The equations; of large surveys those of targets and ties about a segment: they feel it."""
+    """The equations; of large surveys, those of targets and ties that a segment affects."""
     ties = adjustment.ties
     if ties is not None and len(ties) > SETTINGS.tie_sample:
         inside = ((ties.gps_time >= first) & (ties.gps_time <= last)).any(axis=1)
@@ -95,9 +96,9 @@ def _about(adjustment, first, last):
 
 
 def _candidates(times, first, last, begins_pass, ends_by_step):
-    """Starts that control epochs can tell apart: the segment's own, halfway between them, never.
+    """Starts that control epochs can separate: the segment's own, halfway between them, never.
 
-    And one before the pass, which may have begun without GNSS.
+    Another one is before the pass, which may have begun without GNSS.
     """
     inside = np.sort(times[(times > first) & (times < last)])
     inside = inside[:: max(1, len(inside) // SETTINGS.start_epochs)]
@@ -108,7 +109,7 @@ def _candidates(times, first, last, begins_pass, ends_by_step):
 
 
 def _contradicted(adjustment, parameters):
-    """Number of the step that all else contradicts most, or None."""
+    """Number of the step that contradicts the other observations most, or None."""
     steps = adjustment.rows_of(REACQUISITION).reshape(-1, 3)
     if len(steps) == 0:
         return None

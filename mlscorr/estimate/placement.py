@@ -1,8 +1,8 @@
-"""Where one more control point helps most.
+"""Best positions of additional control points.
 
-A target tells of the POS when it is observed, whatever its misclosure will be: the covariances of a
-collocation hold no misclosure. So each candidate is taken as it would be seen, and what that leaves
-of the variance along the drive is worked out before anybody surveys it.
+A target informs about the POS at the time of its observation, whatever its misclosure will be: the
+covariances of a collocation do not depend on misclosures. So each candidate is treated as observed,
+and the remaining variance along the drive is computed before the target is surveyed.
 """
 
 from __future__ import annotations
@@ -25,32 +25,32 @@ from mlscorr.pos import SignalParameters, pose_signals
 from mlscorr.survey import Matched, Pos, Trajectory
 from mlscorr.wording import percent
 
-PLACES = 3  # that are named: what one more visit to the site can survey
+PLACES = 3  # number of named places: enough for one more visit to the site
 CANDIDATES = 20  # epochs that are tried, of even shares of the variance; twice as many gain < 1 %
-EPOCHS = 200  # at which the drive's variance is worked out; twice as many give the same places
-LIMIT = 2.0  # times the sigma beside control points: what counts as good along the drive
+EPOCHS = 200  # at which the drive's variance is computed; twice as many give the same places
+LIMIT = 2.0  # times the sigma near control points: limit of a good sigma along the drive
 
 
 @dataclass(frozen=True)
 class NextControl:
-    """A place where one more control point helps, those before it in place.
+    """Proposed position of one more control point, given those before it.
 
     Parameters
     ----------
     gps_time : float
-        When the drive passes it. Units: s.
+        Time at which the drive passes it. Units: s.
     easting, northing : float
-        Where the vehicle is then; the target belongs beside it. Units: m.
+        Position of the vehicle then; the target belongs next to it. Units: m.
     sigma_before, sigma_after : float
         Of the corrected position there, 3D. Units: m.
     drive_before, drive_after : float
         Root mean square of that sigma along the drive. Units: m.
     share_before, share_after : float
-        Of the drive, where the sigma is below the limit.
+        Fraction of the drive with a sigma below the limit.
     limit : float
-        Twice the sigma beside control points. Units: m.
+        Twice the sigma near control points. Units: m.
     passes : int
-        That come by and would see it.
+        Number of passes that would observe it.
     why : str
     """
 
@@ -74,7 +74,7 @@ class NextControl:
 
 @dataclass(frozen=True)
 class PlannedAccuracy:
-    """What a correction will reach along a drive, before it is driven.
+    """Predicted accuracy of a correction along a planned drive.
 
     Parameters
     ----------
@@ -91,12 +91,12 @@ class PlannedAccuracy:
 
 
 def place_control(estimate: Estimate) -> tuple[NextControl, ...]:
-    """The places where one more control point each would help an estimate most, the best first.
+    """Places at which one more control point each would improve an estimate most, best first.
 
     Parameters
     ----------
     estimate : Estimate
-        Without control nobody knows how far away a target would be seen, and none is named.
+        Without control the distance to targets is unknown, and the result is empty.
     """
     if len(estimate.adjustment.names) == 0:
         return ()
@@ -105,7 +105,7 @@ def place_control(estimate: Estimate) -> tuple[NextControl, ...]:
 
 
 def predict_accuracy(trajectory: Trajectory, matched: Matched, pos: Pos) -> PlannedAccuracy:
-    """Sigma of a correction along a planned drive, by the believed POS and the planned control.
+    """Predict sigmas of a correction along a planned drive from the assumed POS and control.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def predict_accuracy(trajectory: Trajectory, matched: Matched, pos: Pos) -> Plan
     Raises
     ------
     ValueError
-        As ``estimate_correction`` does.
+        See ``estimate_correction``.
     """
     filled, _ = checked_inputs(trajectory, matched, pos, SETTINGS.order)
     adjustment = position_adjustment(filled, matched, pos, SETTINGS.order, position_prior)
@@ -131,7 +131,7 @@ def predict_accuracy(trajectory: Trajectory, matched: Matched, pos: Pos) -> Plan
     return PlannedAccuracy(filled.gps_time[rows], sigma, _places(adjustment, families, along))
 
 
-@threadpool_limits.wrap(limits=1, user_api="blas")  # more threads, other last digits
+@threadpool_limits.wrap(limits=1, user_api="blas")  # more threads would change the last digits
 def _places(adjustment, families, sigma):
     """NextControl, at most PLACES, by the 3D sigma (n,) at all epochs of the trajectory."""
     families = [family for family in families if family[1] > SETTINGS.smallest_share]
@@ -156,7 +156,7 @@ def _places(adjustment, families, sigma):
         span = float(observed.min()), float(observed.max())
         if span == adjustment.span:
             chosen = outlook.with_target(best)
-        else:  # the trend of a correction with that target reaches as far
+        else:  # the trend of a correction with that target extends as far
             adjustment = replace(adjustment, trend_span=span)
             chosen = Outlook.of(adjustment, families, rows, sights)
             for target in taken:
@@ -179,7 +179,7 @@ def _places(adjustment, families, sigma):
 
 
 def _reason(observed, names, time, drive, share, limit, passes):
-    """Why a target belongs at a time, in words, beside those that are observed by their names."""
+    """Reason for a target at a time, in words, given the observed targets' names."""
     order = np.argsort(observed, kind="stable")
     times = observed[order]
     names = names[order]
@@ -206,14 +206,14 @@ def _reason(observed, names, time, drive, share, limit, passes):
 
 
 def _even_rows(trajectory):
-    """Epochs, evenly over what was scanned."""
+    """Epochs, evenly spaced over the scanned times."""
     scanned = trajectory.scanned_rows
     number = min(len(scanned), EPOCHS)
     return scanned[np.unique(np.linspace(0, len(scanned) - 1, number).round().astype(int))]
 
 
 def _candidate_rows(trajectory, regular, sigma):
-    """Epochs at even shares of the variance along the drive: where it is large they are dense."""
+    """Epochs at equal fractions of the variance along the drive, dense where it is large."""
     total = np.cumsum(sigma[regular] ** 2)
     shares = (np.arange(CANDIDATES) + 0.5) / CANDIDATES * total[-1]
     scanned = trajectory.scanned_rows
@@ -230,7 +230,7 @@ def _variance(adjustment, families, rows):
 
 
 def _passing(trajectory, adjustment, row):
-    """Epochs at which a target beside one of them is passed, no farther than control was seen."""
+    """Epochs at which a target near one of them is passed, no farther than observed control."""
     arms = adjustment.targets.partials[:, 0, :, 3:]
     sight = np.sqrt((arms**2).sum(axis=(1, 2)) / 2).max()  # |G|, by Phi(G)
     away = np.linalg.norm(trajectory.position - trajectory.position[row], axis=1)
@@ -244,14 +244,14 @@ def _passing(trajectory, adjustment, row):
 
 @dataclass(frozen=True)
 class Outlook:
-    """The corrected position at some epochs, and targets that might be observed.
+    """The corrected position at some epochs, and candidate targets.
 
     Parameters
     ----------
     weights : (f,) array
         Of families of covariances; their sum is 1.
     covariances : (f, q, q) array
-        Of what is left of the position at k epochs, 3 rows each, and of what targets show. Units:
+        Of the residual position errors at k epochs, 3 rows each, and of target observations. Units:
         m^2.
     epochs : int
         k.
@@ -275,7 +275,7 @@ class Outlook:
         rows: np.ndarray,
         sights: list[list[int]],
     ) -> Outlook:
-        """Before any of them is observed.
+        """Outlook before any candidate is observed.
 
         Parameters
         ----------
@@ -284,8 +284,8 @@ class Outlook:
         rows : (k,) int array
             Of the trajectory's epochs.
         sights : list of lists of int
-            Epochs at which each target would be seen: as far and as well as the median control
-            point, on its side.
+            Epochs at which each target would be observed: at the distance, side and accuracy of the
+            median control point.
         """
         thinned = with_fewer_rows(adjustment)
         at_target = np.concatenate(sights)
@@ -324,7 +324,7 @@ class Outlook:
         return replace(self, covariances=self.covariances - columns @ known)
 
     def best(self, counted: np.ndarray) -> int:
-        """Number of the target that lowers the variance most, by the first family.
+        """Number of the target that reduces the variance most, by the first family.
 
         Parameters
         ----------
@@ -345,7 +345,7 @@ class Outlook:
 
 
 def with_fewer_rows(adjustment: Adjustment) -> Adjustment:
-    """The equations with some of the ties and targets, each as precise as those it stands for.
+    """The equations with some of the ties and targets, each weighted for those that it represents.
 
     Parameters
     ----------
@@ -368,7 +368,7 @@ def with_fewer_rows(adjustment: Adjustment) -> Adjustment:
 
 
 def _shown(adjustment, parameters, rows, partials):
-    """SparseRows of what is corrected of points with partials (n, 3, 6) at epochs."""
+    """SparseRows of the corrected positions of points with partials (n, 3, 6) at epochs."""
     times = adjustment.trajectory.gps_time[rows]
     n = len(rows)
     noise = Noise(np.zeros((n, 3, 3)))
@@ -378,7 +378,7 @@ def _shown(adjustment, parameters, rows, partials):
 
 
 def _target_partials(adjustment, rows):
-    """Partials (n, 3, 6) of targets that are seen as the median control point, at epochs."""
+    """Partials (n, 3, 6) of targets observed like the median control point, at epochs."""
     targets = adjustment.targets
     turned = targets.stated.rotation.as_matrix()
     arms = turned.swapaxes(1, 2) @ targets.partials[:, 0, :, 3:] @ turned
@@ -391,7 +391,7 @@ def _target_partials(adjustment, rows):
 def _target_noise(noise, sights):
     """Covariance of a target's observations at some sights, by medians of the control points'.
 
-    Of their variances alone: medians of whole matrices, element by element, can be no covariance.
+    Of their variances alone: element-wise medians of whole matrices may not be covariances.
     """
     own = np.diag(np.median(np.diagonal(noise.own, axis1=1, axis2=2), axis=0))
     usual = np.median(noise.shared[noise.group], axis=0)[None]

@@ -1,6 +1,7 @@
-"""From misclosures to the corrected trajectory (Mao et al. 2015, section 2.4.2).
+"""Estimation of the corrected trajectory from misclosures (Mao et al. 2015, section 2.4.2).
 
-Control points alone come first, then ties; other orders of the trend stand beside the one in use.
+Control points alone are used first, then ties; other orders of the trend are compared with the one
+in use.
 """
 
 from collections.abc import Collection, Sequence
@@ -79,23 +80,24 @@ class Estimate(Summary):
     correction : Correction
         An average over all parameters.
     adjustment : Adjustment
-        Of the used targets, and of the ties that hold.
+        Of the used targets, and of the accepted ties.
     screening : Screening
     used : (n,) bool array
-        Which observations took part.
+        Mask of observations in use.
     left_out : (n, 3) array
-        Misclosures that remain at each used one when its target takes no part; NaN at a single
-        target, which has no others. Units: m.
+        Leave-one-out misclosures of the used ones, without their target; NaN at a single target.
+        Units: m.
     log_likelihood, sigma0 : float
     guards : Guards
     support : Support
-        Where control points and ties hold the correction, and where it is extrapolated.
+        Parts of the drive in which control points and ties support the correction, and extrapolated
+        ones.
     notes : tuple of Statement
-        On what was put in.
+        On the inputs.
     ties : TieResiduals, optional
-        What is left of the ties that were given.
+        Residuals of the given ties.
     untied : str
-        Why there are none, where somebody looked for them.
+        Reason that none were found, if they were sought.
     """
 
     correction: Correction
@@ -113,12 +115,12 @@ class Estimate(Summary):
 
     @property
     def order(self) -> int:
-        """Order of the trend; without control points a shift, within what the POS states."""
+        """Order of the trend; without control points a shift, limited by the POS sigmas."""
         return self.adjustment.order
 
     @property
     def parameters(self) -> SignalParameters:
-        """The most probable ones."""
+        """The most probable parameters."""
         return self.families[0][0]
 
     @property
@@ -128,12 +130,12 @@ class Estimate(Summary):
 
     @property
     def outliers(self) -> tuple[TargetTest, ...]:
-        """Targets that the others contradict."""
+        """Targets that contradict the others."""
         return self.screening.outliers
 
     @property
     def tests(self) -> tuple[TargetTest, ...]:
-        """What the others say of each used target."""
+        """Test of each used target against the others."""
         return self.screening.tests
 
     @property
@@ -143,12 +145,12 @@ class Estimate(Summary):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences that a user should read."""
+        """Warnings for the user."""
         return sentences_of(self.statements)
 
     @property
     def statements(self) -> tuple[Statement, ...]:
-        """What is doubtful."""
+        """Statements on doubts."""
         statements = [
             *self.notes,
             *guard_warnings(self.guards, self.adjustment, self.parameters),
@@ -160,14 +162,14 @@ class Estimate(Summary):
 
     @cached_property
     def alternatives(self) -> tuple[Alternative, ...]:
-        """Other orders of the trend beside the one in use; none without control."""
+        """Other orders of the trend besides the one in use; none without control."""
         if len(self.adjustment.names) == 0:
             return ()
         with threadpool_limits(limits=1, user_api="blas"):
             return compare_orders(self.adjustment, self.families)
 
 
-# The matrices are small: on a busy machine threads would wait longer than they work
+# The matrices are small: on a busy machine synchronizing threads takes longer than the work
 @threadpool_limits.wrap(limits=1, user_api="blas")
 def estimate_correction(
     trajectory: Trajectory,
@@ -185,16 +187,16 @@ def estimate_correction(
     matched : Matched
         Observed control points.
     pos : Pos, optional
-        Beliefs, used where the trajectory has no sigmas.
+        Assumptions, used if the trajectory has no sigmas.
     order : int
-        Of the polynomial trend; lowered where there are too few control points.
+        Of the polynomial trend; lowered if there are too few control points.
     kept_in : collection of str
-        Names of control points that are used whatever the others say of them.
+        Names of control points that are never rejected.
 
     Raises
     ------
     ValueError
-        Without any observation, and for sigmas that can't be.
+        Without any observation, and for invalid sigmas.
     """
     pos = pos or Pos()
     filled, notes = checked_inputs(trajectory, matched, pos, order)
@@ -210,8 +212,8 @@ def estimate_correction(
 
 
 def _judged(trajectory, matched, pos, order, kept_in):
-    """Adjustment of all targets, their Screening, how probably each refused one is right, and the
-    unstated drifts that others show.
+    """Adjustment of all targets, their Screening, probabilities of rejected ones, and the
+    drifts.
     """
     drifts = ()
     while True:
@@ -230,20 +232,20 @@ def _judged(trajectory, matched, pos, order, kept_in):
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
 def believed_correction(trajectory: Trajectory, pos: Pos | None = None) -> Estimate:
-    """What is known of the POS error before any control point, by fall-backs and sigmas alone.
+    """Prior estimate of the POS error without control, from re-acquisitions and sigmas alone.
 
     Parameters
     ----------
     trajectory : Trajectory
         As recorded.
     pos : Pos, optional
-        Beliefs, used where the trajectory has no sigmas.
+        Assumptions, used if the trajectory has no sigmas.
 
     Returns
     -------
     Estimate
-        To which ties can be added: then passes come together, and where they are is what the POS
-        says.
+        Ties can be added to it: then passes agree with each other, at the position given by the
+        POS.
     """
     pos = pos or Pos()
     filled, notes = filled_sigmas(trajectory)
@@ -260,7 +262,7 @@ def with_ties(
     mountings: Sequence[Mounting] = (),
     kept_in: Collection[str] = (),
 ) -> Estimate:
-    """The estimate by control points and by what two passes, or two scanners, both saw.
+    """Return the estimate by control points and by ties between two passes, or two scanners.
 
     Parameters
     ----------
@@ -268,11 +270,11 @@ def with_ties(
         By control points alone.
     ties : Ties
     mountings : sequence of Mounting
-        Of all scanners where ties between two of them are among these: what each lacks beside the
-        first is estimated with the drift, so that it doesn't pass for drift. Of the one scanner
-        where it saw things again at one visit: likewise what that lacks.
+        Of all scanners, if some ties are between two of them: errors relative to the first are
+        estimated with the drift, so that they don't appear as drift. Of a single scanner with
+        repeated views of one visit: its errors likewise.
     kept_in : collection of str
-        As of estimate_correction.
+        See ``estimate_correction``.
     """
     tied = _tied_adjustment(estimate.adjustment, ties, mountings)
     predictions, screening, is_used = screen_with_ties(tied, estimate.screening, kept_in)
@@ -287,16 +289,16 @@ def with_ties(
 def previewed_correction(
     estimate: Estimate, ties: Ties, mountings: Sequence[Mounting] = (), with_sigmas: bool = False
 ) -> Correction:
-    """The correction with ties that were paired so far, under parameters that they didn't choose.
+    """Return the correction with the ties paired so far, under parameters from control alone.
 
     Parameters
     ----------
     estimate : Estimate
         By control points alone.
     ties, mountings : Ties, sequence of Mounting
-        As of with_ties.
+        See ``with_ties``.
     with_sigmas : bool
-        Of the corrected trajectory: they need the inverse of the normal equations.
+        True for sigmas of the trajectory, which need the inverse of the normal equations.
     """
     tied = _tied_adjustment(estimate.adjustment, ties, mountings)
     tied = replace(tied, tolerance=SETTINGS.coarse_tolerance)
@@ -314,13 +316,13 @@ def _tied_adjustment(adjustment, ties, mountings):
     """The adjustment with ties, and with all mountings but the first, or the only one."""
     free = dict(enumerate(mountings))
     if len(free) > 1:
-        del free[0]  # which the others are compared with
+        del free[0]  # the reference of all others
     factor = tie_factor(adjustment.errors, ties, free)
     if not free:
         return adjustment.with_factor(factor)
     columns = factor.columns
     sigma = np.array([prior_sigma(mounting) for mounting in mountings])
-    if 0 in free:  # what two visits of one scanner disagree by is drift
+    if 0 in free:  # differences between two visits of one scanner are drift
         columns = columns * ties.is_of_visit[:, None, None]
     else:
         sigma = np.hypot(sigma[1:], sigma[0])
@@ -332,7 +334,7 @@ def _tied_adjustment(adjustment, ties, mountings):
 def _estimate(trajectory, names, predictions, screening, notes, doubt=None):
     """The Estimate by adjustment, as predictions have them, and the parameters chosen for them.
 
-    A doubt (n, 3; m) adds to the position's covariance, as doubtful_drift has it.
+    A doubt (n, 3; m) adds to the position's covariance; see ``doubtful_drift``.
     """
     kept = predictions.adjustment
     posterior = screening.posterior
@@ -363,7 +365,7 @@ def _estimate(trajectory, names, predictions, screening, notes, doubt=None):
 def compare_orders(
     adjustment: Adjustment, families: Sequence[tuple[SignalParameters, float]]
 ) -> tuple[Alternative, ...]:
-    """Alternatives of all families, for no trend and all orders up to one above that in use.
+    """Alternatives of all families, without a trend and for all orders up to the next one.
 
     Parameters
     ----------
@@ -372,7 +374,7 @@ def compare_orders(
         Most probable parameters of each family at the order in use.
     """
     order = adjustment.order
-    # Blocks have trends of their own, which can't be compared; ties tell none
+    # Blocks have trends of their own, which can't be compared; ties determine none
     is_alone = len(adjustment.names) > SETTINGS.block or adjustment.ties is not None
     orders = [order] if is_alone else range(NO_TREND, order + 2)
     start = [chosen for chosen, _ in families]
@@ -398,12 +400,12 @@ def compare_orders(
 
 
 def affordable_order(order: int, adjustment: Adjustment) -> int:
-    """The order that leaves one control epoch more than the trend needs.
+    """Order that leaves one control epoch more than the trend needs.
 
     Parameters
     ----------
     order : int
-        As asked for.
+        Requested order.
     adjustment : Adjustment
     """
     sizes = len(adjustment.target_rows), len(control_epochs(adjustment.observed))
@@ -411,7 +413,7 @@ def affordable_order(order: int, adjustment: Adjustment) -> int:
 
 
 def leave_targets_out(adjustment: Adjustment, solved: Collocation) -> np.ndarray:
-    """Misclosures (n, 3) that remain when each target in turn takes no part. Units: m.
+    """Leave-one-out misclosures (n, 3) of each target in turn. Units: m.
 
     Parameters
     ----------

@@ -1,7 +1,8 @@
-"""The parameters of the signals: what is believed of them, and what observations make of that.
+"""Parameters of the signals: their prior, and their posterior from observations.
 
-The prior is log-normal about what is stated. With the restricted likelihood it makes a posterior,
-whose mode and spread (Laplace, importance sampling) stand for the parameters in all predictions.
+The prior is log-normal about the stated values. With the restricted likelihood it gives a
+posterior, whose mode and spread (Laplace, importance sampling) represent the parameters in all
+predictions.
 """
 
 from __future__ import annotations
@@ -31,25 +32,25 @@ SPREAD = {
     )
     for name in names
 }
-SPLIT = ("jitter_scale", "jitter_time", "bias_scale", "bias_time")  # where sigma(t) has two parts
+SPLIT = ("jitter_scale", "jitter_time", "bias_scale", "bias_time")  # if sigma(t) has two parts
 NAMES = tuple(field.name for field in fields(SignalParameters) if field.name != "family")
-IMPROBABLE = -1e12  # log posterior below that of any observations, yet finite for differences
+IMPROBABLE = -1e12  # log posterior below any real one, yet finite for differences
 
 
 @dataclass(frozen=True)
 class Prior:
-    """What is believed of the parameters: log-normal about start values.
+    """Log-normal prior of the parameters about start values.
 
     Parameters
     ----------
     start : (len(NAMES),) array
         Logarithms.
     free : (k,) int array
-        Numbers of those that are chosen.
+        Indices of estimated parameters.
     spread : (k,) array
         One sigma of their logarithms.
     attitude_follows : bool
-        Whether the attitude's correlation time is that of the drift.
+        True if the attitude's correlation time is that of the drift.
     """
 
     start: np.ndarray
@@ -61,8 +62,8 @@ class Prior:
 def position_prior(adjustment: Adjustment) -> Prior:
     """Prior of a correction.
 
-    The time of drift and bias is by the paper's rule, or what is believed where the trajectory has
-    no sigmas; the attitude's time is that of the drift.
+    The time of drift and bias follows the paper's rule, or the assumptions if the trajectory has no
+    sigmas; the attitude's time is that of the drift.
 
     Parameters
     ----------
@@ -75,9 +76,9 @@ def position_prior(adjustment: Adjustment) -> Prior:
 
 
 def drifting_prior(adjustment: Adjustment) -> Prior:
-    """Prior of a correction where the POS drifts between control points without stating it.
+    """Prior of a correction if the POS drifts between control points without stating it.
 
-    What control points differ by is drift then, whatever its size, and no noise of GNSS.
+    Differences between control points are then drift of any size, and not noise of GNSS.
 
     Parameters
     ----------
@@ -91,8 +92,8 @@ def drifting_prior(adjustment: Adjustment) -> Prior:
 def mounting_prior(adjustment: Adjustment) -> Prior:
     """Prior of a calibration.
 
-    A site's targets stand so close that their interval says nothing of the POS, so the time is the
-    believed correlation time; the attitude's is that of gyro biases.
+    A site's targets are so close that their interval is not informative about the POS, so the time
+    is the assumed correlation time; the attitude's is that of gyro biases.
 
     Parameters
     ----------
@@ -110,10 +111,10 @@ def _prior(adjustment, time, attitude_follows):
         "walk_scale": SETTINGS.walk_scale,
         "trend_sigma": SETTINGS.trend_sigma,
     }
-    if adjustment.errors.history.is_stated:  # else jitter may stand for drift, too
+    if adjustment.errors.history.is_stated:  # otherwise jitter may represent drift, too
         start["jitter_time"] = min(adjustment.interval, SETTINGS.jitter_time)
     is_held = len(adjustment.names) > 0
-    if not is_held:  # nothing tells of what all passes share, of which the POS states this
+    if not is_held:  # the error common to all passes is undetermined, but stated so
         start["trend_sigma"] = float(np.sqrt(np.mean(adjustment.errors.epochs.gnss**2)))
     is_split = bool(np.any(adjustment.errors.epochs.gnss))
     fixed: list[str] = []
@@ -136,14 +137,14 @@ def _prior(adjustment, time, attitude_follows):
 
 @dataclass(frozen=True)
 class Posterior:
-    """What control points say of parameters.
+    """Posterior distribution of parameters, given the control points.
 
     Parameters
     ----------
     modes : tuple of (SignalParameters, float)
-        Most probable ones of each family and the family's probability, the most probable first.
+        Most probable ones of each family and the family's probability, most probable first.
     points : tuple of (SignalParameters, float)
-        Parameters and weights that stand for the whole distribution.
+        Parameters and weights that represent the whole distribution.
     """
 
     modes: tuple[tuple[SignalParameters, float], ...]
@@ -151,7 +152,7 @@ class Posterior:
 
     @property
     def mixture(self) -> list[tuple[SignalParameters, float]]:
-        """The points that are worth the work, with weights that sum up to one."""
+        """The points of significant weight, with weights that sum up to one."""
         weighty = [point for point in self.points if point[1] > SETTINGS.least_parameter_weight]
         total = sum(weight for _, weight in weighty)
         return [(parameters, weight / total) for parameters, weight in weighty]
@@ -161,7 +162,7 @@ class Posterior:
 class Objective:
     """Restricted likelihood times prior, as a function of the free parameters' logarithms.
 
-    Large surveys are cut into blocks of targets whose likelihoods are multiplied: the work then
+    Large surveys are split into blocks of targets whose likelihoods are multiplied: the work then
     grows with their number, not with its cube.
 
     Parameters
@@ -189,7 +190,7 @@ class Objective:
         return self.prior.spread
 
     def parameters(self, family: str, logarithms: np.ndarray) -> SignalParameters:
-        """The parameters of a family by their free logarithms.
+        """Return the parameters of a family for its free logarithms.
 
         Parameters
         ----------
@@ -203,7 +204,7 @@ class Objective:
         return SignalParameters(family, *np.exp(full).tolist())
 
     def logarithms(self, parameters: SignalParameters) -> np.ndarray:
-        """The free logarithms (k,) of parameters.
+        """Return the free logarithms (k,) of parameters.
 
         Parameters
         ----------
@@ -214,7 +215,7 @@ class Objective:
     def __call__(self, family: str, logarithms: np.ndarray) -> float:
         """The log posterior of a family at free logarithms (k,), but for a constant.
 
-        A search may try scales of which rounding leaves no likelihood: it turns back there.
+        A search may try scales at which rounding leaves no likelihood, and turns back there.
 
         Parameters
         ----------
@@ -323,24 +324,24 @@ def choose_parameters(
     start: Sequence[SignalParameters] = (),
     points: int = SETTINGS.posterior_points,
 ) -> Posterior:
-    """Posterior of the parameters: restricted likelihood, weakly held to what is stated.
+    """Posterior of the parameters: restricted likelihood with a weak prior about the stated values.
 
     A family's probability is its share of the posterior at the maximum. Points drawn from the
-    log-normal about a mode (Laplace) in antithetic pairs, always the same, are weighted by the
-    true posterior over it. As few rows as A has columns choose none: what is stated stands.
+    log-normal about a mode (Laplace) in antithetic pairs, always the same, are weighted by the true
+    posterior over it. With no more rows than columns of A, the stated values are kept.
 
     Parameters
     ----------
     adjustment : Adjustment
     start : sequence of SignalParameters
-        As in most_probable.
+        See ``most_probable``.
     points : int
-        Number of parameters over which a prediction will be averaged.
+        Number of points over which a prediction is averaged.
     """
     objective = Objective.of(adjustment)
     ties = 0
     if adjustment.ties is not None:
-        ties = len(adjustment.ties)  # a row each, targets have three
+        ties = len(adjustment.ties)  # one row each, whereas targets have three
     others = [f for f in adjustment.observing if f.kind != REACQUISITION]
     if sum(f.misclosure.size for f in others) <= adjustment.believed(None).shape[1] - 1:
         families = (*FAMILIES, INTEGRATED)
@@ -352,7 +353,7 @@ def choose_parameters(
     chosen = zip([row[0] for row in probable], (share / share.sum()).tolist(), strict=True)
     by_share = tuple(chosen)
     if max(len(adjustment.names), ties / 3) > SETTINGS.block:
-        return Posterior(by_share, by_share)  # so many know them well
+        return Posterior(by_share, by_share)  # so many determine them well
     drawn = []
     for (parameters, probability), (_, value) in zip(by_share, probable, strict=True):
         if probability > SETTINGS.smallest_share:
@@ -367,7 +368,7 @@ def choose_parameters(
 
 def _points(objective, family, mode, covariance, value, probability, pairs):
     """Parameters and weights, which sum to the family's probability."""
-    from scipy.stats import qmc  # here, as it costs 0.5 s and 36 MB, which workers can save
+    from scipy.stats import qmc  # imported late to save workers 0.5 s and 36 MB
 
     half = ndtri(qmc.Halton(len(mode), seed=0).random(pairs))
     normal = np.vstack([half, -half])
@@ -383,8 +384,8 @@ def _points(objective, family, mode, covariance, value, probability, pairs):
 def _blocks(adjustment):
     """The equations in blocks of targets, each with a trend of its own.
 
-    A target is in one block with all its passes, which judge each other; they follow each other as
-    they were first seen, so that a block is a stretch of the street.
+    A target is in one block with all its passes, which test each other; targets are sorted by their
+    first observation, so that a block is a part of the street.
     """
     number = -(-len(adjustment.names) // SETTINGS.block)
     kinds = {factor.kind for factor in adjustment.observing}

@@ -1,4 +1,4 @@
-"""Where control points hold a correction, where it is extrapolated, and where it jumps."""
+"""Supported and extrapolated parts of a correction, and its jumps."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -50,7 +50,7 @@ class WeakStretch:
 
     @property
     def seconds(self) -> float:
-        """How long it takes. Units: s."""
+        """Duration of the interval."""
         return self.end - self.start
 
     def document(self) -> dict[str, object]:
@@ -61,16 +61,16 @@ class WeakStretch:
 
 @dataclass(frozen=True)
 class Support:
-    """What holds a correction along the drive.
+    """Support of a correction along the drive.
 
     Parameters
     ----------
     weak : tuple of WeakStretch
-        In time; they don't overlap.
+        In time order, without overlap.
     outages : tuple of (float, float)
-        From where drift began to grow to where it restarts. Units: s.
+        Start of the growth of drift, and its restart. Units: s.
     steps : tuple of float
-        When the recorded position falls back. Units: s.
+        Times at which the recorded position steps back. Units: s.
     """
 
     weak: tuple[WeakStretch, ...] = ()
@@ -78,7 +78,7 @@ class Support:
     steps: tuple[float, ...] = ()
 
     def contains(self, gps_time: np.ndarray) -> np.ndarray:
-        """Which times (n,) lie in a weak stretch.
+        """Mask (n,) of times within a weak interval.
 
         Parameters
         ----------
@@ -100,14 +100,14 @@ class Support:
 def find_support(
     adjustment: Adjustment, solved: Collocation, parameters: SignalParameters, corrected: Trajectory
 ) -> Support:
-    """What holds a correction along the drive.
+    """Find the support of a correction along the drive.
 
     Parameters
     ----------
     adjustment : Adjustment
-        Of the control points that took part.
+        Of the control points in use.
     solved : Collocation
-        Of them, under the parameters.
+        Of these, under the parameters.
     parameters : SignalParameters
         The most probable ones.
     corrected : Trajectory
@@ -120,7 +120,7 @@ def find_support(
     ends_by_step = np.isin(history.edges[1:], history.steps.middle)
     drifting = adjustment.trajectory.gps_time[is_drifting]
     epochs = [np.searchsorted(drifting, times) for times in (starts, history.edges[1:])]
-    # a start without a fall-back behind it may be set off by the noise of GNSS
+    # a start without a later re-acquisition may be caused by the noise of GNSS
     shown = ends_by_step | (history.is_stated & (epochs[1] > epochs[0]))
     return Support(
         tuple(weak_stretches(codes, corrected)),
@@ -134,16 +134,15 @@ def find_support(
 
 
 def _reasons(adjustment, solved, parameters, corrected, is_drifting):
-    """Number of the reason (n,) why each epoch of the trajectory is extrapolated; HELD where not.
+    """Number of the reason (n,) that each epoch of the trajectory is extrapolated; HELD if not.
 
-    No control holds an epoch before the first or past the last control point of its pass, nor
-    past the last one of an outage, as drift goes on growing there (unless a smoother ties it
-    down): a fall-back tells how far it had come, and leaves decimetres open before it. Between
-    them, what control tells has faded where the drift's variance is above half of what it is
-    without control: there the correction is closer to the trend than to its neighbours. Drift
-    below the noise of GNSS doesn't count: there is nothing to tell. Within a second an epoch is
-    that of its control. Where ties hold the passes together, a control point holds both, and the
-    variance alone decides.
+    Control supports no epoch before the first or past the last control point of its pass, nor past
+    the last one of an outage, because drift continues to grow there (unless a smoother limits it):
+    a re-acquisition shows its final size, but leaves decimeters of uncertainty before it. Between
+    control points their information has faded if the drift's variance exceeds half of that without
+    control: there the correction is closer to the trend than to its neighbors. Drift below the
+    noise of GNSS doesn't count. An epoch within a second of control is supported. If ties connect
+    the passes, a control point supports both, and the variance alone decides.
     """
     trajectory = adjustment.trajectory
     stated = adjustment.errors.epochs
@@ -174,10 +173,10 @@ def _reasons(adjustment, solved, parameters, corrected, is_drifting):
 
 
 def _is_drift_open(adjustment, solved, parameters, corrected):
-    """Where (n,) control tells less than half of a drift's variance.
+    """Mask (n,) of epochs at which control explains less than half of a drift's variance.
 
-    Nor of the whole position error's: drift and a slow bias may stand for each other, so that
-    neither is known where their sum is.
+    The same must hold for the whole position error: drift and a slow bias may replace each other,
+    so that only their sum is known.
     """
     time = adjustment.trajectory.gps_time
     signals = adjustment.errors.pose_signals(parameters)
@@ -196,7 +195,7 @@ def _is_drift_open(adjustment, solved, parameters, corrected):
 
 
 def _is_drifting(adjustment, parameters):
-    """Where (n,) the drift that may have come since it began is larger than the noise of GNSS."""
+    """Mask (n,) of epochs at which possible drift since its start exceeds the noise of GNSS."""
     stated = adjustment.errors.epochs
     drift = adjustment.errors.pose_signals(parameters)[: drift_signals(parameters)]
     size = sum((signal.mixing[:, :3] ** 2).sum(axis=(1, 2)) for signal in drift)
@@ -204,7 +203,7 @@ def _is_drifting(adjustment, parameters):
 
 
 def weak_stretches(codes: np.ndarray, trajectory: Trajectory) -> Iterator[WeakStretch]:
-    """A WeakStretch for each run of epochs with one reason, parted at the trajectory's gaps.
+    """Yield a WeakStretch for each run of epochs with one reason, split at the trajectory's gaps.
 
     Parameters
     ----------
@@ -218,7 +217,7 @@ def weak_stretches(codes: np.ndarray, trajectory: Trajectory) -> Iterator[WeakSt
     size = np.linalg.norm(trajectory.position_sigma, axis=1)
     way = np.linalg.norm(np.diff(trajectory.position, axis=0), axis=1)
     is_empty = ~np.isin(np.arange(len(time)), trajectory.scanned_rows)
-    codes = np.where(is_empty, HELD, codes)  # where no point was measured is nothing to hold
+    codes = np.where(is_empty, HELD, codes)  # no support is needed without points
     cuts = np.flatnonzero(np.diff(codes) | np.diff(part)) + 1
     for first, end in pairwise([0, *cuts.tolist(), len(time)]):
         if codes[first] != HELD and end - first > 1:
@@ -254,7 +253,7 @@ class Jump:
 
     @property
     def time(self) -> float:
-        """Its middle. Units: s."""
+        """Center of the interval. Units: s."""
         return (self.start + self.end) / 2
 
     @property
@@ -269,7 +268,7 @@ class Jump:
 
 
 def find_jumps(correction: Correction) -> tuple[Jump, ...]:
-    """Jumps of a correction, in time: one at each step of the recorded path.
+    """Find jumps of a correction, in time order: one at each step of the recorded path.
 
     Parameters
     ----------

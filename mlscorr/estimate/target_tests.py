@@ -1,9 +1,10 @@
-"""What the other control points say of each, and which they contradict.
+"""Tests of each control point against the others, and the search for outliers.
 
-Wrong points hide each other: they pass as drift, or raise the scale until nothing is unlikely. So
-the search doesn't start from the parameters that all points together choose. It eliminates the
-most unlikely points under parameters of many scales, lets the Bayes factor between "gross error"
-and "drift" choose, estimates anew, and at last tests every point against those that are left.
+Wrong points mask each other: they pass as drift, or increase the scale until nothing is unlikely.
+So the search doesn't start from the parameters estimated from all points together. It eliminates
+the most unlikely points under parameters of many scales, chooses by the Bayes factor between "gross
+error" and "drift", repeats the estimation, and finally tests every point against the remaining
+ones.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from mlscorr.survey import Statement
 
 @dataclass(frozen=True)
 class TargetTest:
-    """What the other targets say of one, of k passes.
+    """Test of one target, of k passes, against the others.
 
     Parameters
     ----------
@@ -32,9 +33,9 @@ class TargetTest:
     statistic, critical : float
         Chi-squared, and its critical value.
     left_out, sigma : (k, 3) array
-        Its misclosures once the others have corrected them, and their sigmas. Units: m.
+        Leave-one-out misclosures, and their sigmas. Units: m.
     redundancy : (k, 3) array
-        The share of an error that its residual shows.
+        The fraction of an error that its residual shows.
     """
 
     name: str
@@ -51,7 +52,7 @@ class TargetTest:
 
     @property
     def detectable(self) -> np.ndarray:
-        """Least error (k, 3) that w finds in 4 of 5 cases. Units: m."""
+        """Smallest error (k, 3) that w detects in 4 of 5 cases. Units: m."""
         factor = -ndtri(SETTINGS.significance / 2) - ndtri(SETTINGS.undetected)
         return factor * self.sigma  # Baarda's usual 4.13
 
@@ -61,14 +62,14 @@ class TargetTest:
         return self.statistic / self.critical
 
     def document(self) -> dict[str, str | float]:
-        """What report.json says of an outlier."""
+        """The entry of an outlier in report.json."""
         return {"name": self.name, "statistic": self.statistic, "critical": self.critical}
 
 
 def all_tests(
     adjustment: Adjustment, posterior: Posterior, visit: Callable | None = None
 ) -> list[TargetTest]:
-    """TargetTest of each target by all others.
+    """Return a TargetTest of each target against all others.
 
     Parameters
     ----------
@@ -76,24 +77,24 @@ def all_tests(
     posterior : Posterior
         Of the parameters, by these equations.
     visit : function of SignalParameters and a Collocation, optional
-        Called with each solution of these equations while it is held, for what else it tells.
+        Called with each solution of these equations while it is in memory, for further results.
     """
     tests = []
     targets = len(adjustment.target_rows)
     for block in Objective.of(adjustment).blocks:
-        if len(block.names) < len(adjustment.names):  # visitors want whole solutions
+        if len(block.names) < len(adjustment.names):  # visitors need whole solutions
             visit = None
         tests += _tests(block, block.target_rows, posterior, targets, visit)
     return tests
 
 
 def single_test(adjustment: Adjustment, name: str, posterior: Posterior) -> TargetTest:
-    """TargetTest of one target by all others.
+    """Return a TargetTest of one target against all others.
 
     Parameters
     ----------
     adjustment : Adjustment
-        This target's among them.
+        Including this target.
     name : str
     posterior : Posterior
         Of the parameters, by the others.
@@ -103,9 +104,9 @@ def single_test(adjustment: Adjustment, name: str, posterior: Posterior) -> Targ
 
 
 def _tests(adjustment, names, posterior, targets, visit=None):
-    """TargetTests of some targets, by a Collocation after the other: many would fill the memory."""
+    """TargetTests of some targets, by one Collocation at a time: many would fill the memory."""
     left_out = {name: [] for name in names}
-    # targets of several passes first: sparse rows part with the factor that these need for the
+    # targets of several passes first: sparse rows release the factor that these need for the
     # inverse, which those of one pass need, and the visitor
     largest_first = sorted(names, key=lambda name: -len(adjustment.target_rows[name]))
     for chosen, weight in reversed(posterior.mixture):  # a visitor may keep the most probable
@@ -119,10 +120,10 @@ def _tests(adjustment, names, posterior, targets, visit=None):
 
 
 def _test(adjustment, name, left_out, targets):
-    """TargetTest by the left-out misclosure, averaged over the parameters.
+    """TargetTest by the leave-one-out misclosure, averaged over the parameters.
 
-    What the parameters leave open is a part of its covariance, so that neither a mode that is too
-    sure of itself decides nor one that the target itself has raised.
+    The uncertainty of the parameters is included in its covariance, so that the test depends
+    neither on an overconfident mode nor on one that the target itself has inflated.
     """
     rows = adjustment.target_rows[name]
     critical = float(chdtri(len(rows), SETTINGS.significance / targets))
@@ -141,18 +142,18 @@ def _test(adjustment, name, left_out, targets):
 def error_evidence(weights: np.ndarray, precision: np.ndarray, course: np.ndarray) -> float:
     """Log Bayes factor of errors in k observations against none.
 
-    With b = E^T V^-1 (l - A x) and M = E^T V^-1 E of what the rows see of the errors, E, errors of
+    With b = E^T V^-1 (l - A x) and M = E^T V^-1 E of the design matrix E of the errors, errors of
     sigma s have the log factor (s^2 b^T (I + s^2 M)^-1 b - log det(I + s^2 M)) / 2, along the
     eigenvectors of M; averaged over the sizes that gross errors have.
 
     Parameters
     ----------
     weights : (3 k,) array
-        V^-1 (l - A x) of the observations, as of a Collocation.
+        V^-1 (l - A x) of the observations, from a Collocation.
     precision : (3 k, 3 k) array
         Their block of V^-1 without the trend. Units: 1/m^2.
     course : (k,) or (k, q) array
-        Share of one error vector, or of each of q, in each observation.
+        Fraction of one error vector, or of each of q, in each observation.
     """
     seen = np.kron(np.reshape(course, (len(weights) // 3, -1)), np.eye(3))
     return float(_evidence(seen.T @ weights, seen.T @ precision @ seen))
@@ -187,16 +188,16 @@ def _evidence(score, precision):
 
 @dataclass(frozen=True)
 class Screening:
-    """Targets that are left and those that are not.
+    """Accepted and rejected targets.
 
     Parameters
     ----------
     posterior : Posterior
-        Of the parameters, by the targets that are left.
+        Of the parameters, by the accepted targets.
     outliers : tuple of TargetTest
-        Of targets that the others contradict.
+        Of targets that contradict the others.
     tests : tuple of TargetTest
-        Of the targets that are left.
+        Of the accepted targets.
     warnings : tuple of Statement
     """
 
@@ -207,20 +208,20 @@ class Screening:
 
     @classmethod
     def believed(cls, adjustment: Adjustment) -> Screening:
-        """Nothing screened: the parameters are those that are believed before any target."""
+        """Return a Screening without any test, under the prior parameters."""
         objective = Objective.of(adjustment)
         mode = ((objective.parameters(INTEGRATED, objective.initial), 1.0),)
         return cls(Posterior(mode, mode), (), (), ())
 
 
 def screen(adjustment: Adjustment, kept_in: Collection[str] = ()) -> Screening:
-    """Find gross errors among targets, and what the others say of them.
+    """Find gross errors among targets, and test every target against the others.
 
     Parameters
     ----------
     adjustment : Adjustment
     kept_in : collection of str
-        Names of targets that are used whatever the others say of them.
+        Names of targets that are never rejected.
     """
     out, start = _search(adjustment, kept_in)
     tried = []
@@ -253,13 +254,13 @@ def screen(adjustment: Adjustment, kept_in: Collection[str] = ()) -> Screening:
 
 
 def _worst(tests, kept_in):
-    """The test of the target that the others contradict most, of those that may go."""
+    """Test of the removable target that contradicts the others most."""
     free = [test for test in tests if test.name not in kept_in]
     return max(free, key=lambda test: test.excess, default=None)
 
 
 def may_go(adjustment: Adjustment, names: Collection[str]) -> bool:
-    """Whether so many targets may be wrong, and enough are left.
+    """Return True if this number of targets may be wrong, and enough remain.
 
     Parameters
     ----------
@@ -276,7 +277,7 @@ def may_go(adjustment: Adjustment, names: Collection[str]) -> bool:
 def _search(adjustment, kept_in):
     """Names of the most probable set of wrong targets, and each family's SignalParameters.
 
-    Large surveys are searched in blocks.
+    Large surveys are searched block by block.
     """
     best = frozenset()
     modes = ()
@@ -293,7 +294,7 @@ def _search(adjustment, kept_in):
 
 
 def _scores(adjustment, modes, kept_in):
-    """Log posterior of sets of wrong targets, each under the parameters that suit it best."""
+    """Log posterior of sets of wrong targets, each under its most probable parameters."""
     objective = Objective.of(adjustment)
     scores = {}
     for parameters in _shrunk(modes):
@@ -328,13 +329,13 @@ def _eliminate(adjustment, parameters, objective, kept_in):
 
 
 def _gains(solved, rows_of):
-    """Log posterior odds of a gross error, the same in all its rows' epochs, against none."""
+    """Log posterior odds of a gross error common to all epochs of its rows, against none."""
     odds = np.log(SETTINGS.gross_share / (1.0 - SETTINGS.gross_share))
     return {name: gain + odds for name, gain in gross_evidence(solved, rows_of).items()}
 
 
 def _rejected_groups(adjustment, rejected):
-    """A Statement on each two neighbours in time that were rejected and agree in direction."""
+    """Statement on each two neighbors in time that were rejected and agree in direction."""
     ways = {test.name: test.left_out.mean(axis=0) for test in rejected}
     for first, other in _neighbours(adjustment):
         if first in ways and other in ways and _agree(ways[first], ways[other]):
@@ -344,9 +345,9 @@ def _rejected_groups(adjustment, rejected):
 
 
 def _doubtful_pairs(adjustment, posterior):
-    """A Statement on the two neighbours in time that may be wrong together, or tell of drift.
+    """Statement on the two neighbors in time that may be wrong together, or show drift.
 
-    Both readings are weighed, each under the parameters that suit it best.
+    Both hypotheses are compared, each under its most probable parameters.
     """
     if not may_go(adjustment, {"", " "}):
         return
@@ -364,7 +365,7 @@ def _doubtful_pairs(adjustment, posterior):
             both = {
                 pair: np.concatenate([rows[name] for name in pair]) for pair in _neighbours(block)
             }
-            if not both:  # a target of very many passes is a block without a neighbour
+            if not both:  # a target of very many passes is a block without a neighbor
                 continue
             for pair, gain in _gains(solved, both).items():
                 if score + gain > pairs.get(pair, -np.inf):

@@ -1,9 +1,10 @@
-"""Ties beside control points: which of them hold, and the parameters that both choose.
+"""Ties in addition to control points: acceptance of ties, and the parameters estimated from both.
 
-Of a thousand ties some are wrong: a car has gone, a row of windows was taken for the next. Robust
-weights come before parameters, since a likelihood that believes all ties prefers noise to drift:
-graduated ones under what control chose or what is believed (Geman-McClure, whose scale shrinks:
-Black and Rangarajan 1996), then Student's t in turn with the restricted likelihood, at last a cut.
+Of a thousand ties some are wrong: a car has left, a row of windows was confused with the next.
+Robust weights precede parameters, because a likelihood that trusts all ties prefers noise to drift:
+graduated ones under the parameters from control or the prior (Geman-McClure with shrinking scale:
+Black and Rangarajan 1996), then Student's t alternating with the restricted likelihood, finally a
+cut.
 """
 
 from __future__ import annotations
@@ -31,13 +32,13 @@ MEDIAN = float(ndtri(0.75))  # of the absolute value of a standard normal variab
 
 @dataclass(frozen=True)
 class TieResiduals:
-    """What a correction leaves of n ties.
+    """Residuals of n ties after a correction.
 
     Parameters
     ----------
     ties : Ties
     used : (n,) bool array
-        Those that hold.
+        Mask of accepted ties.
     after : (n,) array
         Misclosures that remain. Units: m.
     """
@@ -66,7 +67,7 @@ class TieResiduals:
         return cls(ties, used, ties.misclosure - change)
 
     def of_scanner(self, number: int) -> TieResiduals | None:
-        """The residuals of what a scanner saw, by itself or with another; None without any.
+        """Return the residuals of ties that involve a scanner; None without any.
 
         Parameters
         ----------
@@ -81,7 +82,7 @@ class TieResiduals:
 
     @property
     def statements(self) -> tuple[Statement, ...]:
-        """A warning where no tie was used."""
+        """A warning if no tie was used."""
         if self.used.any():
             return ()
         return (Statement("no tie used", "warning", {"ties": len(self.ties)}),)
@@ -89,7 +90,7 @@ class TieResiduals:
 
 @dataclass(frozen=True)
 class Tied:
-    """An estimate's equations with the ties that hold.
+    """An estimate's equations with the accepted ties.
 
     Parameters
     ----------
@@ -97,7 +98,7 @@ class Tied:
     posterior : Posterior
         Of the parameters, by both.
     used : (n,) bool array
-        Which of the ties hold.
+        Mask of accepted ties.
     """
 
     adjustment: Adjustment
@@ -106,14 +107,14 @@ class Tied:
 
 
 def add_ties(tied: Adjustment, parameters: SignalParameters) -> Tied:
-    """The ties that hold beside the control points, and the parameters that both choose.
+    """Return the ties accepted besides the control points, and the parameters by both.
 
     Parameters
     ----------
     tied : Adjustment
         With all ties.
     parameters : SignalParameters
-        That the control points chose.
+        Parameters chosen by the control points.
     """
     weighed = robust_ties(tied, parameters)
     tied = weighed.adjustment
@@ -121,7 +122,7 @@ def add_ties(tied: Adjustment, parameters: SignalParameters) -> Tied:
     tied = tied.with_starts(with_likely_starts(sample(tied))[0].errors.starts)
     objective = Objective.of(sample(tied))
     at, _ = objective.maximum(parameters.family, objective.logarithms(parameters))
-    parameters = objective.parameters(parameters.family, at)  # the weights of the ties stay
+    parameters = objective.parameters(parameters.family, at)  # the weights of the ties are kept
     weighed = solved_ties(tied, parameters).graded((student,))
     tied = weighed.adjustment
     ratio = np.abs(weighed.ratio)
@@ -134,18 +135,18 @@ def add_ties(tied: Adjustment, parameters: SignalParameters) -> Tied:
 def screen_with_ties(
     adjustment: Adjustment, screening: Screening, kept_in: Collection[str] = ()
 ) -> tuple[GridPredictions, Screening, np.ndarray]:
-    """Equations with ties and what they predict, what both say of control, which ties hold (n,).
+    """Return predictions by equations with ties, tests of control, and the mask of used ties.
 
-    A control point that few others could test is tested again, now that ties hold the drive.
+    A control point that few others could test is tested again with the support of ties.
 
     Parameters
     ----------
     adjustment : Adjustment
-        Of the control points that the others don't contradict, with all ties.
+        Of the accepted control points, with all ties.
     screening : Screening
         Of these points.
     kept_in : collection of str
-        Names of control points that are used whatever the others say of them.
+        Names of control points that are never rejected.
     """
     parameters = screening.posterior.modes[0][0]
     kept = adjustment
@@ -188,11 +189,11 @@ def _contradiction(test, is_used):
 
 
 def sample(tied: Adjustment) -> Adjustment:
-    """The equations with as many of the ties as are needed to choose parameters.
+    """Return the equations with as many of the ties as are needed to choose parameters.
 
-    Three for each two of the believed intervals that any view falls into: then each has a view
-    along every axis. Fewer tell nothing of times as short, which stay as they are believed; more
-    cost the cube of their number, and tell what neighbours share rather than how the drift goes.
+    Three for each two of the prior correlation intervals with any view: then each has a view along
+    every axis. Fewer are not informative about times as short, which keep their prior values; more
+    cost the cube of their number, and show errors common to neighbors rather than the drift.
 
     Parameters
     ----------
@@ -219,7 +220,7 @@ class WeighedTies:
     solved : Collocation
         By both.
     first : (n,) array
-        Weights with which it was solved first, to which others are relative.
+        Weights of the first solution, to which others are relative.
     """
 
     adjustment: Adjustment
@@ -247,7 +248,7 @@ class WeighedTies:
         return np.sqrt(variance) / self.weight * weights  # N V^-1 (l - A x), over its sigma
 
     def graded(self, functions: Iterable[Callable]) -> WeighedTies:
-        """With weights by each function of the residuals in turn.
+        """Return the ties with weights by each function of the residuals in turn.
 
         Parameters
         ----------
@@ -267,17 +268,17 @@ class WeighedTies:
 
 
 def robust_ties(tied: Adjustment, parameters: SignalParameters) -> WeighedTies:
-    """Graduated weights of ties, under those parameters by which more hold.
+    """Graduated weights of ties, under the parameters that accept more of them.
 
     Few control points may choose drift that is too slow or too small; then ties that agree with
-    each other contradict it. So they are also weighed by what is believed without control.
+    each other contradict it. So they are also weighted under the prior without control.
 
     Parameters
     ----------
     tied : Adjustment
         With ties.
     parameters : SignalParameters
-        That the control points chose.
+        Parameters chosen by the control points.
     """
     weighed = graduated(tied, parameters)
     held = _held(weighed)
@@ -291,13 +292,13 @@ def robust_ties(tied: Adjustment, parameters: SignalParameters) -> WeighedTies:
 
 
 def _held(weighed):
-    """Number of ties that hold."""
+    """Number of accepted ties."""
     least = _geman_mcclure(SETTINGS.tie_cut)(SETTINGS.tie_cut)
     return np.count_nonzero(weighed.weight > least)
 
 
 def graduated(tied: Adjustment, parameters: SignalParameters) -> WeighedTies:
-    """Weights of ties whose scale has shrunk from all to the honest ones.
+    """Weights of ties after the scale has shrunk from that of all ties to that of good ones.
 
     Parameters
     ----------
@@ -313,7 +314,7 @@ def graduated(tied: Adjustment, parameters: SignalParameters) -> WeighedTies:
 
 
 def solved_ties(tied: Adjustment, parameters: SignalParameters) -> WeighedTies:
-    """The adjustment with ties, solved as it is.
+    """The adjustment with ties, solved without changes.
 
     Parameters
     ----------
@@ -325,7 +326,7 @@ def solved_ties(tied: Adjustment, parameters: SignalParameters) -> WeighedTies:
 
 
 def _weight_of(ties):
-    """Weights (n,) of ties, ones where they have none."""
+    """Weights (n,) of ties, ones if they have none."""
     if ties.weight is None:
         return np.ones(len(ties))
     return ties.weight

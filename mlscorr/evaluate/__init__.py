@@ -1,13 +1,13 @@
-"""What a correction is worth.
+"""Evaluation of a correction.
 
 - rows: typed rows of report.json: statistics, scores, targets
 - scores: misclosures before and after a correction, and a row for every surveyed point and pass
-- model: what the estimate says of itself, and of what two passes both saw
-- datum, beams: control and clouds that belong to something else
+- model: sections of the report on the estimate and its ties
+- datum, beams: control and clouds that do not match the survey
 - accuracy: the ASPRS standard
-- check_sigmas: the stated sigmas, tested by check points
+- check_sigmas: test of the stated sigmas by check points
 - quality: gates that make a command fail
-- wording: the sentences on all of it
+- wording: the sentences on these results
 """
 
 from mlscorr.evaluate.beams import BeamCheck, outside_warnings

@@ -1,8 +1,8 @@
-"""Positional accuracy of a corrected cloud in the terms of the ASPRS standard.
+"""Positional accuracy of a corrected cloud in terms of the ASPRS standard.
 
 Source: ASPRS Positional Accuracy Standards for Digital Geospatial Data, Edition 2 (2023), which
-counts the error of the surveyed check points into that of the product, calls for at least 30 of
-them, and for points twice as accurate as the product.
+includes the error of the surveyed check points in that of the product, and requires at least 30
+check points, twice as accurate as the product.
 """
 
 import math
@@ -22,9 +22,9 @@ AXES = ("horizontal", "vertical")
 def positional_accuracy(
     residuals: np.ndarray, survey_sigma: np.ndarray, points: int, based_on: str | None = "check"
 ) -> dict[str, Any]:
-    """Accuracy of a product from what remains at surveyed points, as report.json has it.
+    """Accuracy of a product from residuals at surveyed points, as in report.json.
 
-    RMSE_H and RMSE_V of the product join those of its fit to the points and those of the points:
+    RMSE_H and RMSE_V of the product combine the fit to the points and the accuracy of the points:
     RMSE_H^2 = RMSE_H,fit^2 + RMSE_H,survey^2, where RMSE_H,fit^2 = RMSE_E^2 + RMSE_N^2; so for V.
 
     Parameters
@@ -34,10 +34,10 @@ def positional_accuracy(
     survey_sigma : (n, 3) array
         One sigma of the surveyed points. Units: m.
     points : int
-        How many different points these are.
+        Number of different points.
     based_on : str
-        ``check``: points that took no part in the correction; ``leave_one_out``: control points,
-        each left out in turn, which the standard doesn't accept as a test.
+        ``check``: independent points; ``leave_one_out``: leave-one-out residuals of control points,
+        which the standard does not accept as a test.
 
     >>> residuals, sigma = np.full((30, 3), 0.03), np.full((30, 3), 0.004)
     >>> accuracy = positional_accuracy(residuals, sigma, 30)
@@ -72,7 +72,7 @@ def positional_accuracy(
 
 
 def _rms(values, axes):
-    """Root of the mean square length of the first axes of vectors, None without any."""
+    """Root mean square length of the first axes of vectors, None without any."""
     if len(values):
         return float(np.sqrt((values[:, :axes] ** 2).sum(axis=1).mean()))
     return None
@@ -85,19 +85,19 @@ def _joined(fit, survey):
 
 
 def _class(rmse):
-    """The smallest class of whole centimetres that an RMSE in m meets."""
+    """Smallest class of whole centimeters that an RMSE in m meets."""
     if rmse is None:
         return None
     return max(1, math.ceil(round(100 * rmse, 6)))
 
 
 def accuracy_statements(accuracy: dict[str, Any]) -> Iterator[Statement]:
-    """What the sentences on an accuracy say: what is missing to a test before the classes.
+    """Yield statements on an accuracy: missing requirements of a test, then the classes.
 
     Parameters
     ----------
     accuracy : dict
-        As positional_accuracy gives it.
+        Result of positional_accuracy.
     """
     points = accuracy["points"]
     if accuracy["based_on"] is None:

@@ -1,4 +1,4 @@
-"""Beams that no scanner on this vehicle measured: points of another survey, times that run back."""
+"""Detection of beams that no scanner on this vehicle measured: foreign points, wrong times."""
 
 from collections.abc import Callable, Iterator
 
@@ -13,7 +13,7 @@ from mlscorr.survey import CloudFile, PointCloud, Statement, Survey
 
 
 class BeamCheck:
-    """What a sample of each cloud file says of its beams, taken while the files are read.
+    """Sample of each cloud file's beams, collected while the files are read.
 
     Parameters
     ----------
@@ -26,21 +26,21 @@ class BeamCheck:
         self.times: dict[CloudFile, list[np.ndarray]] = {}
 
     def watched(self, read: Callable) -> Callable:
-        """A function that reads as another one does, and samples what it gives.
+        """Wrap a reader so that its points are sampled.
 
         Parameters
         ----------
         read : function of a CloudFile
-            Gives an iterator of PointCloud.
+            Returns an iterator of PointCloud.
         """
 
         def watch(file: CloudFile) -> Iterator[PointCloud]:
             rows, times = self.samples[file], self.times[file] = [], []
             step = 0
             for chunk in read(file):
-                step = step or max(1, len(chunk) // IO.sampled_points)  # of the last, short one too
+                step = step or max(1, len(chunk) // IO.sampled_points)  # also of the short last one
                 some = chunk[::step]
-                times.append(some.gps_time.copy())  # a view would hold the times of all points
+                times.append(some.gps_time.copy())  # a view would keep the times of all points
                 some = some[self.survey.trajectory.segment(some.gps_time) >= 0]
                 rows.append(self._sample(some, self.survey.of(file).mounting))
                 yield chunk
@@ -58,11 +58,11 @@ class BeamCheck:
         return np.column_stack([some.gps_time, beam, off])
 
     def outside(self) -> list[str]:
-        """A sentence on each file with points outside the trajectory."""
+        """Return a sentence on each file with points outside the trajectory."""
         return [statement.sentence(BEAMS) for statement in self.uncovered()]
 
     def uncovered(self) -> Iterator[Statement]:
-        """Files with points without a time, or outside the trajectory."""
+        """Yield files with points without a time, or outside the trajectory."""
         for file, parts in self.times.items():
             times = np.concatenate([[], *parts])
             is_missing = lacks_time(times - file.time_constant)
@@ -77,11 +77,11 @@ class BeamCheck:
             yield from _outside(self.survey, file, times[~is_missing])
 
     def warnings(self) -> list[str]:
-        """A sentence on each file whose beams can't have been measured so."""
+        """Return a sentence on each file with impossible beams."""
         return [statement.sentence(BEAMS) for statement in self.doubts()]
 
     def doubts(self) -> Iterator[Statement]:
-        """Files whose beams can't have been measured so, and why."""
+        """Yield files with impossible beams, and the reason."""
         for file, rows in self.samples.items():
             sample = np.concatenate(rows) if rows else np.empty((0, 4))
             if len(sample) < 10:
@@ -108,11 +108,11 @@ class BeamCheck:
                 yield Statement("other survey", "warning", values)
 
     def _other_clock(self, file, times, beam):
-        """A doubt where points lie about the vehicle leap seconds before or after their times.
+        """Doubt if points are where the vehicle was leap seconds before or after their times.
 
-        They do where three of four lie nearer to that place than half the way there, and so farther
-        from the vehicle. A scanner that looks ahead has beams of many lengths, and a vehicle that
-        hardly moves tells neither.
+        This holds if three of four points are closer to that position than half the distance to it,
+        and thus farther from the vehicle. A forward-looking scanner has beams of many lengths, and
+        a slow vehicle allows no decision.
         """
         trajectory = self.survey.trajectory
         lag = utc_lag(trajectory.gps_time, times - file.time_constant)
@@ -136,14 +136,14 @@ class BeamCheck:
 
 
 def outside_warnings(survey: Survey, file: CloudFile, times: np.ndarray) -> list[str]:
-    """A sentence where points of a file lie outside the trajectory or in its gaps.
+    """Sentence on points of a file outside the trajectory or in its gaps.
 
     Parameters
     ----------
     survey : Survey
     file : CloudFile
     times : (n,) array
-        Spread over the file, in the trajectory's system. Units: s.
+        Times spread over the file, in the trajectory's system. Units: s.
     """
     return [statement.sentence(BEAMS) for statement in _outside(survey, file, times)]
 
@@ -167,7 +167,7 @@ def _outside(survey, file, times) -> Iterator[Statement]:
 
 
 def _place(trajectory, times):
-    """Easting and northing (n, 2) at times, that of its ends beyond them. Units: m."""
+    """Easting and northing (n, 2) at times; beyond the ends, those of the ends. Units: m."""
     return np.column_stack(
         [np.interp(times, trajectory.gps_time, x) for x in trajectory.position.T[:2]]
     )

@@ -1,4 +1,4 @@
-"""Test of the stated sigmas by check points, which took no part in the correction.
+"""Test of the stated sigmas by independent check points.
 
 The test of the variance of unit weight (Ghilani 2017, Adjustment Computations, chapter 4).
 """
@@ -13,7 +13,7 @@ from mlscorr.evaluate._settings import SETTINGS
 
 @dataclass(frozen=True)
 class CheckSigmas:
-    """Residuals of check points over their stated sigmas, and the test of these.
+    """Residuals of check points over their stated sigmas, and their test.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class CheckSigmas:
 
     @classmethod
     def of(cls, residuals: np.ndarray, sigma: np.ndarray, points: int) -> "CheckSigmas":
-        """Those of residuals (n, 3) with their sigmas (n, 3), in m.
+        """Make the test from residuals (n, 3) and their sigmas (n, 3), in m.
 
         Parameters
         ----------
@@ -44,7 +44,7 @@ class CheckSigmas:
 
     @property
     def statistic(self) -> float:
-        """Sum of the squares of z, chi-squared distributed where the sigmas hold."""
+        """Sum of squares of z, chi-squared distributed if the sigmas are correct."""
         return float((self.z**2).sum())
 
     @property
@@ -54,14 +54,14 @@ class CheckSigmas:
 
     @property
     def limits(self) -> tuple[float, float]:
-        """Limits that the statistic keeps by chance, but for ``significance``, two-sided."""
+        """Two-sided limits of the statistic at the level ``significance``."""
         tail = SETTINGS.check_significance / 2
         freedom = self.degrees_of_freedom
         return float(chdtri(freedom, 1 - tail)), float(chdtri(freedom, tail))
 
     @property
     def verdict(self) -> str:
-        """``hold``, ``too small`` or ``too large``, as the sigmas are by the test."""
+        """Result of the test: ``hold``, ``too small`` or ``too large``."""
         low, high = self.limits
         if self.statistic > high:
             return "too small"
@@ -71,11 +71,11 @@ class CheckSigmas:
 
     @property
     def factor(self) -> float:
-        """Root mean square of z: by this the sigmas would have to be multiplied."""
+        """Root mean square of z, the factor by which the sigmas would have to be multiplied."""
         return float(np.sqrt(self.statistic / self.degrees_of_freedom))
 
     def document(self) -> dict[str, object]:
-        """The section ``check_sigmas`` of report.json."""
+        """Return the section ``check_sigmas`` of report.json."""
         return {
             "points": self.points,
             "n": len(self.z),

@@ -1,14 +1,13 @@
-"""Control that differs from the cloud by one linear term: a shift, a scale, a turn, a tilt.
+"""Detection of a linear difference between control and cloud: shift, scale, rotation, tilt.
 
-The corrected cloud follows the control, and check points of the same survey follow it too: nothing
-else shows that a net is in ground distances or in another datum. Two explanations of the same
-misclosures are compared by their marginal likelihoods (Kass and Raftery 1995): a POS whose errors
-are as the estimate models them, with their own scales and correlation times; and the same POS with
-a linear term of the control beside it, whose size is open within a wide prior. A POS that errs by
-several times its stated sigma is possible, but seldom along a straight line.
+The corrected cloud follows the control, and check points of the same survey do, too, so they do not
+show that a network is in ground distances or in another datum. Two explanations of the misclosures
+are compared by their marginal likelihoods (Kass and Raftery 1995): POS errors as in the estimate,
+with their scales and correlation times; and the same errors plus a linear term of the control with
+a wide prior. POS errors of several stated sigmas are possible, but rarely linear.
 
-A shift can't be told from a constant error of the POS by its shape, only by its size: there the POS
-is taken by its word.
+A shift is not separable from a constant POS error by its shape, only by its size, so the stated
+sigma is trusted there.
 """
 
 from __future__ import annotations
@@ -41,31 +40,31 @@ from mlscorr.survey import Matched, Pos, Statement, Trajectory
 
 SHIFT, HEIGHT, SCALE, TURN, TILT = TERMS = ("shift", "height", "scale", "turn", "tilt")
 UNITS = {SHIFT: "m", HEIGHT: "m", SCALE: "ratio", TURN: "rad", TILT: "m/m"}
-COLUMNS = {SCALE: [0], TURN: [1], TILT: [2, 3]}  # of linear_columns
-SETS = [tuple(s) for k in range(4) for s in combinations(COLUMNS, k)]  # of terms, the empty first
+COLUMNS = {SCALE: [0], TURN: [1], TILT: [2, 3]}  # columns of linear_columns
+SETS = [tuple(s) for k in range(4) for s in combinations(COLUMNS, k)]  # of terms, empty first
 
 
 @dataclass(frozen=True)
 class DatumDifference:
-    """A term by which all control points together differ from the cloud as the POS puts it.
+    """Linear term by which all control points together differ from the cloud.
 
     Parameters
     ----------
     term : str
-        Of TERMS.
+        One of TERMS.
     size, sigma : (k,) array
-        Estimate and its one sigma: E and N (shift), height, scale less one, turn to the left (rad),
-        rise of the control towards E and towards N (tilt). Units: those of UNITS.
+        Estimate and its one sigma: E and N (shift), height, scale minus one, rotation to the left
+        (rad), rise of the control toward E and N (tilt). Units: those of UNITS.
     log_evidence : float
-        Logarithm of the Bayes factor of the term against an error of the POS.
+        Log Bayes factor of the term against a POS error.
     observations : int
-        Number of control observations that it rests on.
+        Number of control observations used.
     extent : float
         RMS distance of the control points from their middle, in plan. Units: m.
     ground : MapFactors, optional
-        Of the survey's CRS at the control; None without a CRS.
+        Factors of the survey's CRS at the control; None without a CRS.
     assumed_sigma : float, optional
-        Of the POS, where nobody stated one; only a shift and a height are judged by it. Units: m.
+        Sigma of the POS if it was not stated; used only for a shift and a height. Units: m.
     """
 
     term: str
@@ -79,14 +78,14 @@ class DatumDifference:
 
     @property
     def length(self) -> float:
-        """The shift, or what the term makes at the extent. Units: m."""
+        """Size of the shift, or effect of the term at the extent. Units: m."""
         size = float(np.linalg.norm(self.size))
         if self.term in (SHIFT, HEIGHT):
             return size
         return size * self.extent
 
     def document(self) -> dict[str, object]:
-        """The row of ``datum[]`` in report.json."""
+        """Return the row of ``datum[]`` in report.json."""
         ground = None
         if self.ground is not None:
             ground = self.ground.document()
@@ -105,7 +104,7 @@ class DatumDifference:
 
     @property
     def statement(self) -> Statement:
-        """The term with its size, the evidence for it, and what its likely cause is judged by."""
+        """Term with its size, evidence, and data on its likely cause."""
         values = {"size": self.size, "log_evidence": self.log_evidence}
         values["observations"] = self.observations
         if self.term in (SHIFT, HEIGHT):
@@ -121,7 +120,7 @@ class DatumDifference:
         return Statement(self.term, "warning", values)
 
     def _has_ground_scale(self):
-        """Whether the scale is that of ground distances; not where the map's is unknown."""
+        """True if the scale is that of ground distances; False if the map's is unknown."""
         if self.ground is None:
             return False
         expected = 1 / self.ground.combined - 1
@@ -129,29 +128,29 @@ class DatumDifference:
 
     @property
     def sentence(self) -> str:
-        """The warning that check, correct and the page share."""
+        """Warning used by check, correct and the page."""
         return self.statement.sentence(DATUM)
 
 
 def datum_differences(
     control: Matched, trajectory: Trajectory, pos: Pos, crs: str | None = None
 ) -> tuple[DatumDifference, ...]:
-    """Terms of the control that explain its misclosures better than an error of the POS does.
+    """Find terms of the control that explain its misclosures better than a POS error.
 
     Parameters
     ----------
     control : Matched
-        Control points that take part in the estimate.
+        Control points used in the estimate.
     trajectory : Trajectory
-        As recorded.
+        Recorded trajectory.
     pos : Pos
     crs : str, optional
-        Of the survey: the map's own scale and convergence are stated beside those found.
+        CRS of the survey, whose scale and convergence are stated with the estimated ones.
 
     Returns
     -------
     tuple of DatumDifference
-        With strong evidence (a Bayes factor of 20) each; empty for fewer than three observations.
+        Terms with strong evidence (a Bayes factor of 20); empty for fewer than three observations.
     """
     if len(control) < 3:
         return ()
@@ -177,7 +176,7 @@ def datum_differences(
 
 
 def linear_columns(place: np.ndarray) -> np.ndarray:
-    """Partial derivatives (n, 3, 4) of places by scale, turn to the left, and rise to E and N.
+    """Partial derivatives (n, 3, 4) of positions by scale, rotation to the left, rise to E and N.
 
     Parameters
     ----------
@@ -197,7 +196,7 @@ def linear_columns(place: np.ndarray) -> np.ndarray:
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
 def _linear_terms(control, trajectory, pos):
-    """(term, size, sigma, log evidence) of each linear term in the most probable set of them."""
+    """Pairs (term, size, sigma, log evidence) of each linear term in the most probable set."""
     adjustment = position_adjustment(trajectory, control, pos, ESTIMATE.order, position_prior)
     adjustment = with_drift_history(adjustment)
     columns = linear_columns(control.surveyed.position)
@@ -214,18 +213,18 @@ def _linear_terms(control, trajectory, pos):
 
 
 class _Evidence:
-    """Marginal likelihood of sets of linear terms beside the POS error.
+    """Marginal likelihood of sets of linear terms together with the POS error.
 
-    For given parameters of the POS the terms' coefficients x ~ N(0, D^2) are integrated out in
-    closed form: with r = M'P l and N = M'P M the likelihood is that without them times
-    exp(r'(N + D^-2)^-1 r / 2) / sqrt(det(I + D N D)). The parameters are the most probable ones of
-    each covariance family, without any term and with all of them; the better of the two counts.
+    For given parameters of the POS, the terms' coefficients x ~ N(0, D^2) are integrated out in
+    closed form: with r = M'P l and N = M'P M the likelihood is that without terms times exp(r'(N +
+    D^-2)^-1 r / 2) / sqrt(det(I + D N D)). The parameters are the most probable ones of each
+    covariance family, without any term and with all of them; the better of the two counts.
 
     Parameters
     ----------
     adjustment : Adjustment
     columns : (n, 3, k) array
-        M, of the n observations.
+        M of the n observations.
     prior : (k,) array
         D, one sigma of each coefficient.
     """
@@ -239,7 +238,8 @@ class _Evidence:
         self.modes = []  # (family, log posterior without terms, N, r)
         for family in (*FAMILIES, INTEGRATED):
             plain, _ = objective.maximum(family, objective.initial)
-            # From the same start: from the mode of a POS that explains all, it would stay there
+            # From the same start: from the mode of a POS that explains everything, the search would
+            # not move
             beside, _ = complete.maximum(family, complete.initial)
             for logarithms in (plain, beside):
                 value = objective(family, logarithms)
@@ -247,7 +247,7 @@ class _Evidence:
                 self.modes.append((family, value, *_normal(adjustment, parameters, matrix)))
 
     def of(self, terms: Iterable[str]) -> float:
-        """Log evidence of a set of terms, but for a constant.
+        """Log evidence of a set of terms, up to a constant.
 
         Parameters
         ----------
@@ -259,7 +259,7 @@ class _Evidence:
         return float(logsumexp(list(best.values())))
 
     def size(self, terms: Iterable[str], term: str) -> tuple[np.ndarray, np.ndarray]:
-        """Coefficients and one sigma of a term among others, under the most probable parameters.
+        """Coefficients and one sigma of a term among others, with the most probable parameters.
 
         Parameters
         ----------
@@ -272,7 +272,7 @@ class _Evidence:
         return size[rows], np.sqrt(np.diag(covariance))[rows]
 
     def _gain(self, terms, normal, right):
-        """By how much the terms raise the log-likelihood."""
+        """Increase of the log-likelihood by the terms."""
         numbers, covariance, size = self._solved(terms, normal, right)
         if len(numbers) == 0:
             return 0.0
@@ -280,7 +280,7 @@ class _Evidence:
         return 0.5 * float(right[numbers] @ size + spread)
 
     def _solved(self, terms, normal, right):
-        """Numbers of the coefficients, their covariance and their values."""
+        """Indices of the coefficients, their covariance and their values."""
         numbers = np.array([number for term in terms for number in COLUMNS[term]], dtype=int)
         information = normal[np.ix_(numbers, numbers)] + np.diag(self.prior[numbers] ** -2.0)
         covariance = np.linalg.inv(information)
@@ -288,7 +288,7 @@ class _Evidence:
 
 
 def _normal(adjustment: Adjustment, parameters: SignalParameters, matrix: np.ndarray):
-    """N = M'P M and r = M'P l, where P leaves out the trend."""
+    """N = M'P M and r = M'P l, where P eliminates the trend."""
     solved = adjustment.solve(parameters)
     white = solved.solver.whiten(np.column_stack([solved.design, matrix, solved.misclosure]))
     known = solved.design.shape[1]
@@ -303,7 +303,7 @@ def _normal(adjustment: Adjustment, parameters: SignalParameters, matrix: np.nda
 
 
 def _spread(control):
-    """At most as many observations as one likelihood takes, of control points along the drive."""
+    """Select observations up to the limit of one likelihood, spread along the drive."""
     names = list(dict.fromkeys(np.array(control.name)[np.argsort(control.gps_time)].tolist()))
     passes = max(1.0, len(control) / len(names))
     count = min(len(names), max(3, int(ESTIMATE.block / passes)))
@@ -312,10 +312,10 @@ def _spread(control):
 
 
 def _shift(misclosure, sigma, term):
-    """(term, size, sigma, log evidence) of what all misclosures (n, k) share, where it is a datum.
+    """Result (term, size, sigma, log evidence) of a shift common to all misclosures (n, k).
 
-    Two hypotheses of the same mean, which is known much better than either: N(0, s^2) of a POS that
-    errs alike all along, as it states, and N(0, D^2) of a datum.
+    Two hypotheses have the same, well determined mean: N(0, s^2) of a POS error that is constant
+    throughout, and N(0, D^2) of a datum.
     """
     weights = sigma**-2
     shift = np.sum(weights * misclosure, axis=0) / np.sum(weights, axis=0)
@@ -324,19 +324,21 @@ def _shift(misclosure, sigma, term):
     limit = _common_sigma(sigma.max(axis=1))
     ratio = SETTINGS.datum_shift / limit
     gain = 0.5 * (size / limit) ** 2 * (1 - ratio**-2) - len(shift) * np.log(ratio)
-    # What scatters as much as it is shifted is a POS that drifts, by more than it states
+    # Scatter as large as the shift indicates a POS that drifts by more than it states
     if gain > np.log(ESTIMATE.strong_evidence) and 3 * scatter < size:
         known = scatter / np.sqrt(len(misclosure))
         yield term, shift, np.full(len(shift), known), float(gain)
 
 
 def _common_sigma(sigma):
-    """Sigma of a mean of POS errors that may all be one, with a good mounting. Units: m."""
+    """Sigma of a mean of POS errors that may be fully correlated, with a good mounting. Units:
+    m.
+    """
     mean = np.sum(1.0 / sigma) / np.sum(sigma**-2)
     return float(np.hypot(mean, POS.unstated_sigmas[0]))
 
 
 def _extent(place):
-    """RMS distance of places (n, 3) from their middle, in plan. Units: m."""
+    """RMS distance of positions (n, 3) from their middle, in plan. Units: m."""
     local = place[:, :2] - place[:, :2].mean(axis=0)
     return float(np.sqrt(np.mean(np.sum(local**2, axis=1))))

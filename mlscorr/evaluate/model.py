@@ -1,4 +1,4 @@
-"""The sections of report.json and calibration.json on the estimate: its model, and its ties."""
+"""Sections of report.json and calibration.json on the estimate: its model, and its ties."""
 
 import numpy as np
 
@@ -8,18 +8,18 @@ from mlscorr.survey import TIE_KINDS, Survey, Trajectory
 
 
 def model_section(estimate: Estimate, warnings: tuple[str, ...] = ()) -> dict[str, object]:
-    """What was estimated, by which parameters, and how sure it is.
+    """Section on the model: estimated quantities, parameters, and their uncertainty.
 
-    ``alternatives`` are the covariance families that the correction averages over; ``orders`` sets
-    other orders of the trend beside the one in use; ``tests`` has one row per used target, with w,
-    redundancy and detectable error for each pass; ``determined`` says which components of the pose
-    the control points tell, by the ratio of posterior to prior variance.
+    ``alternatives`` are the covariance families that the correction averages over; ``orders``
+    compares other orders of the trend with the one in use; ``tests`` has one row per used target,
+    with w, redundancy and detectable error for each pass; ``determined`` states which components of
+    the pose the control points determine, by the ratio of posterior to prior variance.
 
     Parameters
     ----------
     estimate : Estimate
     warnings : tuple of str
-        On what went into it, beside its own.
+        Warnings on its input, in addition to its own.
     """
     guards = estimate.guards
     return {
@@ -48,14 +48,14 @@ def model_section(estimate: Estimate, warnings: tuple[str, ...] = ()) -> dict[st
 def largest_sigma(trajectory: Trajectory, survey: Survey | None = None) -> dict[str, float]:
     """3D sigma of a trajectory's position in m: ``median``, ``largest``, and the latter's ``time``.
 
-    Of the epochs with points of the clouds.
+    It refers to epochs with points of the clouds.
 
     Parameters
     ----------
     trajectory : Trajectory
-        None is told of one without sigmas.
+        The result is empty without sigmas.
     survey : Survey, optional
-        As recorded: then ``stated``, the median by its POS, stands beside them, if it is stated.
+        Recorded survey; adds ``stated``, the median stated by its POS, if there is one.
     """
     scanned = trajectory.scanned_rows
     sigma = np.linalg.norm(trajectory.position_sigma[scanned], axis=1)
@@ -68,7 +68,7 @@ def largest_sigma(trajectory: Trajectory, survey: Survey | None = None) -> dict[
 
 
 def _observations(estimate):
-    """What the parameters were chosen by."""
+    """Observations from which the parameters were chosen."""
     if estimate.ties is None or not estimate.ties.used.any():
         return "the control points"
     if len(estimate.adjustment.names):
@@ -125,11 +125,11 @@ def _by_component(values):
 
 
 def tie_section(estimate: Estimate) -> dict[str, object] | None:
-    """What ties did to an estimate, or the reason why there is none; None where nobody looked.
+    """Section on ties: their effect, or the reason why there are none; None without a search.
 
-    ``pairs`` has the misclosures of each two passes before and after, of the ties that were used;
-    ``share`` what control and ties each bring; ``sufficient_control`` with how many control points
-    the drive would have been known about as well.
+    ``pairs`` has the misclosures of each two passes before and after, for the used ties; ``share``
+    the information from control and from ties; ``sufficient_control`` the number of control points
+    that would give about the same accuracy.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def tie_section(estimate: Estimate) -> dict[str, object] | None:
 
 
 def misfit_section(residuals: TieResiduals | None) -> dict[str, object] | None:
-    """Numbers and misclosures of ties before and after; None where there is none.
+    """Numbers and misclosures of ties before and after; None without ties.
 
     Parameters
     ----------
@@ -172,7 +172,8 @@ def misfit_section(residuals: TieResiduals | None) -> dict[str, object] | None:
 def pair_rows(residuals: TieResiduals) -> list[dict[str, object]]:
     """Numbers of ties of each two passes, and their misclosures before and after.
 
-    Each scanner's passes have numbers of their own; scanners count from 1, as in survey.toml.
+    Passes are numbered separately for each scanner; scanners are numbered from 1, as in
+    survey.toml.
 
     Parameters
     ----------

@@ -45,7 +45,7 @@ GROUPS = {"check": "check points", "control": "control points", "leave_one_out":
 
 @dataclass(frozen=True)
 class Gate:
-    """A condition under which a result is not good enough.
+    """Condition under which a result is not good enough.
 
     Parameters
     ----------
@@ -63,12 +63,12 @@ class Gate:
 
 
 def read_gate(text: str) -> Gate:
-    """The gate that a sentence such as ``check.rmse_h > 0.03`` states (lengths in m).
+    """Parse a gate such as ``check.rmse_h > 0.03`` (lengths in m).
 
     Raises
     ------
     ValueError
-        For another form or an unknown quantity, naming the nearest known one.
+        If the form or the quantity is unknown; the message names the most similar one.
 
     >>> read_gate("check.rmse_3d > 0.05")
     Gate(quantity='check.rmse_3d', operator='>', limit=0.05)
@@ -93,7 +93,7 @@ def read_gate(text: str) -> Gate:
 
 
 def quantities() -> dict[str, str]:
-    """Names of all quantities that a gate can ask for, with what they are."""
+    """Names of all quantities available in gates, with their meanings."""
     named = COUNTS | WEAK
     for group, title in GROUPS.items():
         for statistic in ("rmse", "mean", "std", "min", "max"):
@@ -106,27 +106,27 @@ def quantities() -> dict[str, str]:
 
 
 def failures(gates: Iterable[Gate], report: dict) -> list[str]:
-    """A sentence for each gate that a report fails.
+    """Return a sentence for each gate that a report fails.
 
-    A quantity that was not determined fails every gate: what isn't known isn't good enough.
+    A quantity that was not determined fails every gate.
 
     Parameters
     ----------
     gates : iterable of Gate
     report : dict
-        The content of report.json.
+        Contents of report.json.
     """
     return [failure.sentence(GATES) for failure in failed(gates, report)]
 
 
 def failed(gates: Iterable[Gate], report: dict) -> Iterator[Statement]:
-    """The gates that a report fails, with the value of each, if it has one.
+    """Yield the gates that a report fails, with their values, if any.
 
     Parameters
     ----------
     gates : iterable of Gate
     report : dict
-        The content of report.json.
+        Contents of report.json.
     """
     for gate in gates:
         value = _value(gate.quantity, report)
@@ -138,7 +138,7 @@ def failed(gates: Iterable[Gate], report: dict) -> Iterator[Statement]:
 
 
 def _value(quantity, report):
-    """The number that a report holds for a quantity, or None."""
+    """Value of a quantity in a report, or None."""
     group, name = quantity.split(".")
     if quantity == "model.outliers":
         return len(report["model"]["outliers"])

@@ -1,4 +1,4 @@
-"""Rows on what remains at surveyed points: made once, then written, printed, shown and drawn."""
+"""Rows on residuals at surveyed points, made once for files, screen and pictures."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ import numpy as np
 from mlscorr.evaluate.wording import reason_in_words
 from mlscorr.survey import Statement
 
-NAMES = ("rmse", "mean", "std", "min", "max")  # of statistics, as documents have them
+NAMES = ("rmse", "mean", "std", "min", "max")  # of statistics, as in documents
 VECTORS = ("surveyed", "observed", "sigma", "before", "after", "left_out")  # of a TargetRow
 SINGLE = ("name", "gps_time", "role", "used")
-CHECK_POINT = Statement("check point")  # why it took no part in the estimate
-SEEN_BY_OTHERS = Statement("seen by others")  # and that this scanner had no part in
-Reason = tuple[str, Statement | None]  # name of a point, and why it took no part
+CHECK_POINT = Statement("check point")  # reason for exclusion from the estimate
+SEEN_BY_OTHERS = Statement("seen by others")  # for targets of another scanner
+Reason = tuple[str, Statement | None]  # name of a point, and reason for its exclusion
 
 
 @dataclass(frozen=True)
@@ -26,10 +26,10 @@ class Statistics:
     Parameters
     ----------
     n : int
-        How many residuals they are of.
+        Number of residuals.
     rmse, mean, std, minimum, maximum : (5,) array
-        E, N, H, horizontal and 3D; NaN where so few residuals don't have it. std is that of the
-        sample about its mean. Units: m.
+        E, N, H, horizontal and 3D; NaN if there are too few residuals. std is the sample standard
+        deviation. Units: m.
     """
 
     n: int
@@ -41,7 +41,7 @@ class Statistics:
 
     @classmethod
     def of(cls, residuals: np.ndarray) -> Statistics:
-        """Statistics of residuals (n, 3) in m.
+        """Make the statistics of residuals (n, 3) in m.
 
         >>> statistics = Statistics.of(np.array([[0.3, 0.0, -0.1], [-0.4, 0.0, 0.1]]))
         >>> statistics.rmse[:3].round(4).tolist(), float(statistics.maximum[3])
@@ -60,11 +60,11 @@ class Statistics:
 
     @property
     def table(self) -> np.ndarray:
-        """The statistics (5, 5): a row each for E, N, H, horizontal and 3D."""
+        """Statistics (5, 5), with a row each for E, N, H, horizontal and 3D."""
         return np.stack([self.rmse, self.mean, self.std, self.minimum, self.maximum], axis=1)
 
     def document(self) -> dict:
-        """The statistics as documents have them, None where they are not determined."""
+        """Return the statistics as in documents, None if undetermined."""
         east, north, height, horizontal, spatial = (
             _numbers(values) or [None] * len(NAMES) for values in self.table
         )
@@ -79,16 +79,16 @@ class Statistics:
 
 @dataclass(frozen=True)
 class Score:
-    """What remains at control or at check points, before and after a correction.
+    """Misclosures and residuals at control or check points, before and after a correction.
 
     Parameters
     ----------
     before, after : Statistics
     left_out : Statistics or None
-        Of control points once the others alone have corrected them.
+        Leave-one-out residuals of control points.
     sigma : (3,) array or None
-        RMS of one sigma of what is left of check points after the correction, or of control points
-        that are left out: of targets, their survey and the correction there. Units: m.
+        RMS of one sigma of residuals of check points, or of leave-one-out residuals of control
+        points: from targets, their survey and the correction. Units: m.
     """
 
     before: Statistics
@@ -102,7 +102,7 @@ class Score:
         return self.after.n
 
     def document(self) -> dict:
-        """The section ``control`` or ``check`` of report.json."""
+        """Return the section ``control`` or ``check`` of report.json."""
         document = {"n": self.n, "before": self.before.document(), "after": self.after.document()}
         if self.left_out is not None:
             document["leave_one_out"] = {"n": self.left_out.n, **self.left_out.document()}
@@ -117,20 +117,20 @@ class TargetRow:
     ----------
     name : str
     pass_number : int or None
-        Passes count from 1 in time.
+        Passes are numbered from 1 in order of time.
     gps_time : float or None
-        Of the observation, or of that which was refused as that of the point. Units: s.
+        Time of the observation, or of one that was refused for the point. Units: s.
     role : str
         ``control`` or ``check``.
     surveyed, observed, sigma, before, after, left_out : (3,) array
-        Places, one sigma of the misclosure, and misclosures (surveyed - observed) as recorded,
-        corrected, and corrected by the other points alone; NaN where not known. Units: m.
+        Positions, one sigma of the misclosure, and misclosures (surveyed - observed) as recorded,
+        corrected, and leave-one-out; NaN if unknown. Units: m.
     used : bool
-        Whether it took part in the estimate.
+        True if it was used in the estimate.
     why : Statement or None
-        The reason why it did not; ``reason`` is its sentence.
+        Reason why it was not used; ``reason`` has its sentence.
     scanned : bool
-        Whether points of the cloud lie about it, so that it should have been observed.
+        True if there are points of the cloud around it, so that it should have been observed.
     """
 
     name: str
@@ -158,7 +158,7 @@ class TargetRow:
         scanned: bool = True,
         gps_time: float | None = None,
     ) -> TargetRow:
-        """The row of a surveyed point that was not observed, or has an observation refused then."""
+        """Make the row of a surveyed point without an observation, or with a refused one."""
         nan = np.full(3, np.nan)
         unknown: dict[str, Any] = dict.fromkeys(VECTORS[1:], nan)
         start = name, pass_number, gps_time, role, surveyed
@@ -166,7 +166,7 @@ class TargetRow:
 
     @classmethod
     def read(cls, row: dict) -> TargetRow:
-        """The row that stands in ``targets[]`` of report.json."""
+        """Read a row of ``targets[]`` in report.json."""
         fields: dict[str, Any] = {name: row[name] for name in SINGLE}
         for name in VECTORS:
             fields[name] = np.array(row.get(name) or [np.nan] * 3, dtype=float)
@@ -177,21 +177,21 @@ class TargetRow:
 
     @property
     def reason(self) -> str | None:
-        """Why it took no part in the estimate, in words; None where it did."""
+        """Reason for exclusion from the estimate, in words; None if it was used."""
         if self.why is None:
             return None
         return reason_in_words(self.why)
 
     @property
     def is_observed(self) -> bool:
-        """Whether the scanner saw it."""
+        """True if the target was observed."""
         return bool(np.isfinite(self.observed).all())
 
     @property
     def group(self) -> str:
-        """Where it belongs: ``control``, ``check`` or ``unused``.
+        """Group of the row: ``control``, ``check`` or ``unused``.
 
-        No check point takes part in the estimate, so it counts as unused only where it was not
+        Check points are never used in the estimate, so they count as unused only if they were not
         observed.
         """
         if self.used or (self.role == "check" and self.is_observed):
@@ -199,7 +199,7 @@ class TargetRow:
         return "unused"
 
     def document(self) -> dict:
-        """The row of ``targets[]`` in report.json."""
+        """Return the row of ``targets[]`` in report.json."""
         return {
             "name": self.name,
             "pass": self.pass_number,
@@ -214,20 +214,19 @@ class TargetRow:
 
 @dataclass(frozen=True)
 class PointCounts:
-    """How many surveyed points of a role took part, each counted once whatever its passes.
+    """Numbers of surveyed points of a role, each counted once regardless of its passes.
 
     Parameters
     ----------
     surveyed, observed, scored : int
-        In the control file; observed under their names; used as control points, or tested by as
-        check points.
+        In the control file; observed with their names; used as control or check points.
     missing : tuple of (str, Statement or None)
-        Name and reason of each that has points of the cloud about it and no observation.
+        Name and reason of each with surrounding points of the cloud but no observation.
     refused, outside : tuple of (str, Statement or None)
-        Name and reason of each that was observed and not used, and of each about which nothing was
-        scanned, or by another scanner alone.
+        Name and reason of each that was observed but not used, and of each whose surroundings were
+        not scanned, or only by another scanner.
     misplaced : tuple of (str, Statement or None)
-        Those of the missing of which something was found that does not fit: in place, kind or size.
+        Missing points with a nearby object that differs in position, kind or size.
     """
 
     surveyed: int
@@ -240,12 +239,12 @@ class PointCounts:
 
     @property
     def hidden(self) -> tuple[Reason, ...]:
-        """Those of the missing of which nothing was found."""
+        """Missing points without any nearby object."""
         return tuple(point for point in self.missing if point not in self.misplaced)
 
     @classmethod
     def of(cls, rows: Iterable[TargetRow], role: str) -> PointCounts:
-        """Counts of the points of a role.
+        """Make the counts of the points of a role.
 
         Parameters
         ----------
@@ -269,7 +268,7 @@ class PointCounts:
         return cls(*counts, *map(reasons, (missing, observed - scored, outside, misplaced)))
 
     def document(self) -> dict[str, object]:
-        """What the sections ``control`` and ``check`` of report.json have of it."""
+        """Return the counts of sections ``control`` and ``check`` of report.json."""
         return {
             "n_surveyed": self.surveyed,
             "n_seen": self.observed,
@@ -282,7 +281,7 @@ class PointCounts:
 
 
 def _numbers(values):
-    """A list of floats, None for each that is not known; None where none is."""
+    """List of floats, with None for unknown ones; None if all are unknown."""
     numbers = [value if np.isfinite(value) else None for value in values.tolist()]
     if all(value is None for value in numbers):
         return None

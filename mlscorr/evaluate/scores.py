@@ -1,4 +1,4 @@
-"""What remains at surveyed points before and after a correction: scores, accuracy, rows."""
+"""Residuals at surveyed points before and after a correction: scores, accuracy, rows."""
 
 from collections.abc import Container, Iterable, Sequence
 
@@ -13,7 +13,7 @@ from mlscorr.targets import Candidates, search_radius
 
 
 def misclosures(matched: Matched, correction: Correcting | None = None) -> np.ndarray:
-    """Surveyed - observed (n, 3), after a correction if one is given. Units: m.
+    """Return surveyed - observed (n, 3), after a correction if one is given. Units: m.
 
     Parameters
     ----------
@@ -32,16 +32,16 @@ def score(
     left_out: np.ndarray | None = None,
     sigma: np.ndarray | None = None,
 ) -> Score:
-    """What remains of observations before and after a correction.
+    """Score the residuals of observations before and after a correction.
 
     Parameters
     ----------
     matched : Matched
     correction : anything with ``apply(cloud) -> cloud``
     left_out : (n, 3) array, optional
-        Misclosures once the other points alone have corrected them, NaN where not known. Units: m.
+        Leave-one-out misclosures, NaN if unknown. Units: m.
     sigma : (k, 3) array, optional
-        Of what a verdict rests on: of those left out, else of those after. Units: m.
+        Sigmas of the leave-one-out misclosures, if given, otherwise of the residuals. Units: m.
     """
     before = Statistics.of(matched.misclosure)
     after = Statistics.of(misclosures(matched, correction))
@@ -57,15 +57,14 @@ def score(
 def accuracy(
     check: Matched, control: Matched, correction: Correcting, left_out: np.ndarray
 ) -> dict[str, object]:
-    """Accuracy by the check points; without any, by the control points left out in turn.
+    """Accuracy from check points, or from leave-one-out residuals of control points without any.
 
     Parameters
     ----------
     check, control : Matched
     correction : anything with ``apply(cloud) -> cloud``
     left_out : (n, 3) array
-        Misclosures of the control points once the others alone have corrected them, NaN where
-        that isn't known. Units: m.
+        Leave-one-out misclosures of the control points, NaN if unknown. Units: m.
     """
     if len(check):
         residuals = misclosures(check, correction)
@@ -86,16 +85,16 @@ def surveyed_rows(
     outliers: Iterable[TargetTest],
     left_out: np.ndarray | None = None,
 ) -> list[TargetRow]:
-    """Rows of all observed points, control before check.
+    """Make rows of all observed points, control before check.
 
     Parameters
     ----------
     control, check : Matched
     correction : anything with ``apply(cloud) -> cloud``
     outliers : iterable of TargetTest
-        Control points that took no part.
+        Control points that were not used.
     left_out : (n, 3) array, optional
-        Of the control points, as for ``target_rows``.
+        For the control points; see ``target_rows``.
     """
     reason = {
         test.name: Statement(
@@ -115,7 +114,7 @@ def target_rows(
     reasons: Sequence[Statement | None],
     left_out: np.ndarray | None = None,
 ) -> list[TargetRow]:
-    """One row for each observation of some surveyed points.
+    """Make one row for each observation of some surveyed points.
 
     Parameters
     ----------
@@ -124,10 +123,9 @@ def target_rows(
     role : str
         ``control`` or ``check``.
     reasons : sequence of n (Statement or None)
-        Why an observation took no part in the estimate; None where it did.
+        Reason why an observation was not used; None if it was used.
     left_out : (n, 3) array, optional
-        What remains once the other points alone have corrected it; NaN where that isn't known.
-        Units: m.
+        Leave-one-out residuals, NaN if unknown. Units: m.
     """
     observations = matched.observations
     before = matched.misclosure
@@ -147,17 +145,17 @@ def target_rows(
 def unseen_rows(
     survey: Survey, refusals: Iterable[Refusal], candidates: Candidates, scanned: Container[str]
 ) -> list[TargetRow]:
-    """One TargetRow for each surveyed point without an observation, with the reason.
+    """Make one TargetRow for each surveyed point without an observation, with the reason.
 
     Parameters
     ----------
     survey : Survey
     refusals : iterable of Refusal
-        What the matching gave as reasons.
+        Reasons from the matching.
     candidates : Candidates
-        Their points without a pose are a better reason.
+        Points without a pose are a better reason.
     scanned : container of str
-        Names of the points that have points of the cloud about them.
+        Names of the points with surrounding points of the cloud.
     """
     rows = []
     for refusal in refusals:
@@ -179,7 +177,7 @@ def unseen_rows(
 
 
 def _no_pose(point: ControlPoints, survey, candidates):
-    """Why a target was not seen, when points near it have no pose; else None."""
+    """Reason if nearby points of an unobserved target have no pose, otherwise None."""
     distance = np.linalg.norm(candidates.unplaced.xyz - point.position, axis=1)
     times = candidates.unplaced.gps_time[distance <= search_radius(survey, point)[0]]
     if len(times) == 0:

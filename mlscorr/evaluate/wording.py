@@ -1,4 +1,4 @@
-"""The sentences of an evaluation: why points took no part, what is doubtful, how accurate it is."""
+"""Sentences of an evaluation: reasons for unused points, doubts, accuracy."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ FOLLOWS = "The corrected cloud follows the control; find out which of the two is
 
 
 def _bayes_factor(log_evidence):
-    """A Bayes factor in words: its power of ten where it is large."""
+    """Bayes factor in words: its power of ten if it is large."""
     power = log_evidence / np.log(10)
     if power < 3:
         return f"{np.exp(log_evidence):.0f}"
@@ -24,7 +24,7 @@ def _evidence(observations, log_evidence):
 
 
 def _assumed(sigma):
-    """The end of a sentence that rests on a sigma which nobody stated."""
+    """End of a sentence that depends on an unstated sigma."""
     if sigma is None:
         return ""
     return (
@@ -55,7 +55,7 @@ def _height(size, observations, log_evidence, assumed_sigma):
 
 
 def _net(words, length, extent, observations, log_evidence):
-    """What all control points together are beside the cloud."""
+    """Sentence on the difference of all control points from the cloud."""
     return (
         f"The net of control points is {words} ({length:.3f} m at {extent:.0f} m from its middle; "
         f"{_evidence(observations, log_evidence)})."
@@ -63,7 +63,7 @@ def _net(words, length, extent, observations, log_evidence):
 
 
 def _scale(size, sigma, ground, is_ground, **net):
-    """The scale beside that of ground distances, and how to declare it."""
+    """Sentence on the scale compared with ground distances, and how to declare it."""
     words = f"larger than in the cloud by {1e6 * size[0]:+.0f} +/- {1e6 * sigma[0]:.0f} ppm"
     factor = f"scale_factor = {1 / (1 + size[0]):.6f}"
     if ground is None:
@@ -115,7 +115,7 @@ def _tilt(size, sigma, **net):
 
 
 def _other_clock(file, lag, later, beside, shifted, samples):
-    """Points lie about the vehicle `later` s after their times; beside it at these."""
+    """Sentence on points that surround the vehicle `later` s after their times."""
     order = "earlier"
     side = "after"
     clocks = "cloud seems to be in UTC, the trajectory in GPS time"
@@ -170,7 +170,7 @@ def _inaccurate(axis, survey):
     )
 
 
-REASONS: dict[str, Wording] = {  # why a surveyed point took no part in the estimate
+REASONS: dict[str, Wording] = {  # reasons for unused surveyed points
     **MATCHING,
     "check point": "check point",
     "outlier": "outlier: statistic {statistic:.1f} against {critical:.1f}",
@@ -178,14 +178,14 @@ REASONS: dict[str, Wording] = {  # why a surveyed point took no part in the esti
     "the trajectory or outside it, and nothing is interpolated there.",
     "seen by others": "Another scanner saw it, this one did not.",
 }
-DATUM: dict[str, Wording] = {  # by what control and cloud differ as a whole
+DATUM: dict[str, Wording] = {  # overall differences of control and cloud
     "shift": _shift,
     "height": _height,
     "scale": _scale,
     "turn": _turn,
     "tilt": _tilt,
 }
-BEAMS: dict[str, Wording] = {  # points of another survey, times that are wrong
+BEAMS: dict[str, Wording] = {  # points of another survey, wrong times
     "no time": "{count} of {samples} points sampled from {file} have gps_time {values}: they were "
     "written without times, and stay as they are (exit code 4). Export them with gps_time, or "
     "remove them.",
@@ -210,19 +210,19 @@ ACCURACY: dict[str, Wording] = {  # by the standard
     "class": _classes,
     "inaccurate points": _inaccurate,
 }
-GATES: dict[str, Wording] = {  # that a report fails
+GATES: dict[str, Wording] = {  # failed by a report
     "not determined": "{quantity}: {what} was not determined.",
     "exceeded": "{quantity}: {what} is {value:.4g} {operator} {limit:g}.",
 }
 
 
 def reason_in_words(why: Statement | None) -> str:
-    """Why a surveyed point took no part; empty where nothing is known of it.
+    """Return the reason for an unused surveyed point; empty if unknown.
 
     Parameters
     ----------
     why : Statement or None
-        Of a key of REASONS.
+        With a key of REASONS.
     """
     if why is None:
         return ""

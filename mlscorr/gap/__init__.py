@@ -1,15 +1,14 @@
-"""Which effect explains the difference between a survey and its simulation.
+"""Diagnosis of the difference between a survey and its simulation.
 
-The story, a room each:
+The packages, in order:
 
-- residuals: observed minus simulated, at targets, surfaces and planes that passes share
-- contrast: channels beside geometry, of a real and a simulated cloud
-- signatures: what each effect does to residuals, and the simulator as the survey states it
-- evidence: the verdict, causes with their parameters, where the gap lies, what is separable
-- closure: the simulator with the cause in it, on data that were not used to find it
-- plan: what to measure next, and what a survey will show before it is driven
-- advice, wording, document: what to do about it, its sentences, and all of it as plain numbers
-  and words
+- residuals: observed minus simulated, at targets, surfaces and planes in overlaps
+- contrast: non-geometric channels of a real and a simulated cloud
+- signatures: effects of the library in the residuals, and the simulator stated by the survey
+- evidence: verdict, causes with parameters, location of the gap, separability
+- closure: the simulator with the cause, on data not used to find it
+- plan: next measurements, and expected results of a planned survey
+- advice, wording, document: recommended actions, sentences, and the document of all results
 """
 
 from mlscorr.gap.document import (

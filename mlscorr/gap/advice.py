@@ -1,6 +1,4 @@
-"""What to do about a verdict; and how far observed things lie from where they belong, beside what
-the accuracies state.
-"""
+"""Advice on a verdict, and agreement of observations with their stated accuracies."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -18,7 +16,7 @@ from mlscorr.survey import Statement
 
 @dataclass(frozen=True)
 class Agreement:
-    """Of the things of one channel, as recorded, less the effects that the simulator has.
+    """Agreement of one channel's observations, as recorded, without the simulator's effects.
 
     Parameters
     ----------
@@ -38,7 +36,7 @@ class Agreement:
 
 
 def agreements(rows: Rows, background: Background) -> list[Agreement]:
-    """An Agreement of each channel that has a residual in m.
+    """Make an Agreement of each channel with residuals in m.
 
     Parameters
     ----------
@@ -57,7 +55,7 @@ def agreements(rows: Rows, background: Background) -> list[Agreement]:
     return parts
 
 
-OF_EXCESS = {  # key of the advice where no cause is named, by what is left is more than
+OF_EXCESS = {  # key of the advice without a cause, by what the residuals exceed
     "": "nothing to do",
     "stated": "errors above stated",
     "chance": "gap above chance",
@@ -67,7 +65,7 @@ OF_EXCESS = {  # key of the advice where no cause is named, by what is left is m
 def excess_of(
     inference: Inference, closure: Closure, agreement: Iterable[Agreement], is_stated: bool = True
 ) -> str:
-    """What it is more than that is left where no cause is named: stated, chance, or nothing.
+    """Threshold that the residuals exceed without a named cause: stated, chance, or nothing.
 
     Parameters
     ----------
@@ -76,7 +74,7 @@ def excess_of(
         Of its verdict.
     agreement : iterable of Agreement
     is_stated : bool
-        Whether somebody stated the sigmas of the POS: nothing is more than a default.
+        True if the sigmas of the POS were stated; defaults cannot be exceeded.
     """
     if inference.verdict.label != "none":
         return ""
@@ -90,12 +88,12 @@ def excess_of(
 
 
 def distinct_parameters(cause: Cause) -> tuple[CauseParameter, ...]:
-    """Parameters of a cause; those of one name have the name of their effect before it.
+    """Parameters of a cause; those with the same name are prefixed by their effect.
 
     Parameters
     ----------
     cause : Cause
-        Its parts are in the order of its parameters.
+        With parts in the order of its parameters.
     """
     often = Counter(parameter.name for parameter in cause.parameters)
     parts = [(part.name, {*part.parameters, *part.kind.moment()}) for part, _ in cause.parts]
@@ -127,11 +125,11 @@ def advice_of(
         Of its verdict.
     next_data : sequence of NextData
     excess : str
-        As ``excess_of`` gives it.
+        From ``excess_of``.
     is_stated : bool
-        Whether somebody stated the sigmas of the POS.
+        True if the sigmas of the POS were stated.
     left_out : mapping of str to Statement
-        Why effects were not judged.
+        Reasons why effects were not judged.
     """
     verdict = inference.verdict
     advice = []
@@ -147,7 +145,7 @@ def advice_of(
         if unjudged:
             advice.append(Statement("unstated mounting", values={"effects": unjudged}))
         advice.append(Statement("unknown error", values={"lead": verdict.lead}))
-        if closure.effect != "none":  # it impersonates the cause
+        if closure.effect != "none":  # it mimics the cause
             share = None if closure.is_within_noise else max(0.0, closure.shrink)
             values = {"effect": closure.effect, "share": share}
             advice.append(Statement("nearest effect", "warning", values))
@@ -168,7 +166,7 @@ def advice_of(
 
 
 def without_nothing_to_do(advice: Iterable[Statement]) -> list[Statement]:
-    """An advice to which something is added.
+    """Remove "nothing to do" from an advice with further statements.
 
     Parameters
     ----------

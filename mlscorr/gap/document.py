@@ -1,4 +1,4 @@
-"""The content of gap.json: everything that a diagnosis says, as plain numbers and words."""
+"""Contents of gap.json: all results of a diagnosis, as plain numbers and words."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
@@ -23,8 +23,8 @@ from mlscorr.gap.wording import advice_sentences, headline, left_out_sentences, 
 from mlscorr.survey import Statement, Survey
 from mlscorr.wording import with_articles
 
-MAP_POINTS = 1500  # of trajectory and rows on the map: more can't be seen on a page
-LISTED = 1e-4  # probability from which on a pair is listed in the evidence
+MAP_POINTS = 1500  # of trajectory and rows on the map: more are not visible on a page
+LISTED = 1e-4  # probability above which a pair is listed in the evidence
 
 
 def gap_document(
@@ -39,25 +39,25 @@ def gap_document(
     absence: Absence,
     further_advice: Sequence[Statement] = (),
 ) -> dict:
-    """Content of gap.json.
+    """Make the contents of gap.json.
 
     Parameters
     ----------
     survey : Survey
-        With what the simulator believes of scanner and POS.
+        With the simulator's assumptions on scanner and POS.
     rows : Rows
     inference : Inference
     closure : Closure
     next_data : sequence of NextData
     effects : iterable of Effect
-        That the simulator had already.
+        Effects already in the simulator.
     left_out : mapping of str to Statement
-        Why effects were not considered.
+        Reasons why effects were not considered.
     warnings : iterable of str
     absence : Absence
-        Of surveyed targets that have no row.
+        Absence of surveyed targets without a row.
     further_advice : sequence of Statement
-        Of whoever knows more than the verdict.
+        Advice beyond the verdict.
     """
     verdict = inference.verdict
     where = inference.where
@@ -104,15 +104,15 @@ def gap_document(
 
 
 def assumed_document(survey: Survey, inference: Inference, scale: float) -> list[dict]:
-    """What nobody stated: the default, and how far the POS errs by the survey itself.
+    """List unstated values: the default, and the POS error according to the survey itself.
 
     Parameters
     ----------
     survey : Survey
-        As it was diagnosed.
+        Diagnosed survey.
     inference : Inference
     scale : float
-        That it has on the defaults of the sigmas of the POS.
+        Scale on the default sigmas of the POS.
     """
     model = inference.evidence.likely_model(inference.verdict.label)
     scaled = [f"pos.{name}" for name in open_sigmas(survey)]
@@ -141,7 +141,7 @@ def _split(split):
 
 
 def cause_document(rows: Rows, cause: Cause) -> dict:
-    """A cause with its parameters, and its target where it is of one.
+    """Make the document of a cause with its parameters, and its target if it concerns one.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def cause_document(rows: Rows, cause: Cause) -> dict:
 
 
 def separability_document(compared: Separability) -> dict:
-    """Classes, correlations and minimal detectable biases.
+    """Make the document of classes, correlations and minimal detectable biases.
 
     Parameters
     ----------
@@ -198,7 +198,7 @@ def _closure(closure):
 
 
 def _evidence(inference):
-    """The ladder."""
+    """Document of the evidence ladder."""
     chance = inference.probability
     score = inference.joint.score
     return [
@@ -223,7 +223,7 @@ def _innovations(rows, where):
 
 
 def windows_document(cause: Cause, survey: Survey) -> list[dict]:
-    """When the events of a cause act.
+    """List the intervals in which the events of a cause act.
 
     Parameters
     ----------
@@ -235,7 +235,7 @@ def windows_document(cause: Cause, survey: Survey) -> list[dict]:
 
 
 def map_document(survey: Survey) -> dict:
-    """Way and targets of a survey on the map.
+    """Make the document of a survey's path and targets on the map.
 
     Parameters
     ----------

@@ -1,11 +1,11 @@
-"""Scale of the default sigma of a POS whose sigma nobody stated, estimated from the survey.
+"""Scale of a default POS sigma that nobody stated, estimated from the survey.
 
-The inference averages over scales about a stated sigma, within a prior that a default does not
-deserve: a POS of another grade would look like noise, or like something unknown. So where a
-default stands in, its scale is the one under which the residuals are most probable. They may have
-any cause, so that an effect is not taken for drift, but for those that a larger sigma is the plain
-word for: what the POS itself does, and what is unknown. It is one at least: a default that is too
-large hides small errors, but makes no claim.
+The inference averages over scales around a stated sigma, with a prior that is too narrow for a
+default: a POS of another grade would resemble noise, or like something unknown. For a default, the
+scale with the most probable residuals is therefore used. Any cause is allowed, so that an effect is
+not mistaken for drift, except those that a larger sigma describes better: errors of the POS itself,
+and unknown ones. The scale is at least one: too large a default hides small errors, but makes no
+false claims.
 """
 
 from dataclasses import replace
@@ -20,9 +20,9 @@ from mlscorr.survey import Pos, Survey
 
 SIGMAS = ("position_sigma", "attitude_sigma")
 STEP = float(np.sqrt(max(POS.process_scales) / min(POS.process_scales)))
-# from one scale to the next: half of what the inference averages over, so that these overlap
+# between scales: half of the averaging width of the inference, so that these overlap
 LEAST_GAIN = 1.0
-# log evidence by which a scale must be better: less is not worth a mention (Kass, Raftery 1995)
+# log evidence required for a scale: less is not worth a mention (Kass, Raftery 1995)
 
 
 def open_sigmas(survey: Survey) -> tuple[str, ...]:
@@ -37,15 +37,15 @@ def open_sigmas(survey: Survey) -> tuple[str, ...]:
 
 
 def with_scale(pos: Pos, scale: float, names: tuple[str, ...]) -> Pos:
-    """A POS of other sigmas, whose windows err as much as before.
+    """Return a POS with scaled sigmas, whose windows keep their errors.
 
     Parameters
     ----------
     pos : Pos
     scale : float
-        On the sigmas.
+        Scale on the sigmas.
     names : tuple of str
-        Of SIGMAS: those that it is on.
+        Scaled ones of SIGMAS.
     """
     scaled = {name: scale * getattr(pos, name) for name in names}
     windows = pos.windows
@@ -57,15 +57,15 @@ def with_scale(pos: Pos, scale: float, names: tuple[str, ...]) -> Pos:
 def likely_scale(
     rows: Rows, survey: Survey, signatures: tuple[Signature, ...], rng: np.random.Generator
 ) -> float:
-    """The scale on assumed sigmas under which residuals are most probable.
+    """Scale on assumed sigmas with the most probable residuals.
 
-    It is looked for upwards from one, as long as that is worth a step.
+    The search goes upward from one, as long as a step is worthwhile.
 
     Parameters
     ----------
     rows : Rows
     survey : Survey
-        As believed.
+        With the simulator's assumptions.
     signatures : tuple of Signature
         Of the rows.
     rng : numpy.random.Generator

@@ -1,9 +1,9 @@
-"""The sentences of a diagnosis: verdict, advice, why effects are not judged, and the headline.
+"""Sentences of a diagnosis: verdict, advice, reasons for unjudged effects, and headline.
 
-The headline says how large the gap is and where most of it lies. A cause moves some residuals more
-than others, and so by chance also those of some range or brightness that it has nothing to do with.
-So a cause is located by the covariates on which it acts alone; without a cause, by what exceeds its
-null band.
+The headline states the size of the gap and where most of it is. A cause moves some residuals more
+than others, and thus by chance also those of an unrelated range or brightness. A cause is therefore
+located only by the covariates on which it acts; without a cause, by bins that exceed their null
+band.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -57,7 +57,7 @@ ADVICE: dict[str, Wording] = {
     "second clouds": "Run mlscorr diagnose with your second clouds alone: they tell what is left.",
 }
 
-LEFT_OUT: dict[str, Wording] = {  # why an effect is not judged
+LEFT_OUT: dict[str, Wording] = {  # reasons why an effect is not judged
     "no mounting": "It acts on the {stage}, and the survey has no [mounting].",
     "unstated size": "survey.toml does not state how large it is: [scanner] {name}.",
     "no row": "No row of this survey depends on it.",
@@ -68,14 +68,14 @@ LEFT_OUT: dict[str, Wording] = {  # why an effect is not judged
 
 
 def no_cause(labels: Sequence[str], excess: str) -> str:
-    """What is said where no cause is named, without a full stop.
+    """Phrase if no cause is named, without a full stop.
 
     Parameters
     ----------
     labels : sequence of str
-        That hold 95 %.
+        Labels with 95 % probability.
     excess : str
-        As ``excess_of`` gives it.
+        From ``excess_of``.
     """
     if excess:
         return f"No cause is shown, but the two differ by more than {excess}"
@@ -85,13 +85,13 @@ def no_cause(labels: Sequence[str], excess: str) -> str:
 
 
 def sentence_of(inference: Inference, excess: str) -> str:
-    """The verdict in a sentence.
+    """Return the verdict in a sentence.
 
     Parameters
     ----------
     inference : Inference
     excess : str
-        As ``excess_of`` gives it.
+        From ``excess_of``.
     """
     verdict = inference.verdict
     cause = inference.cause
@@ -112,7 +112,7 @@ def sentence_of(inference: Inference, excess: str) -> str:
 
 
 def advice_sentences(advice: Iterable[Statement]) -> list[str]:
-    """The sentences of an advice, those that two effects share once.
+    """Return the sentences of an advice, without repetitions for two effects.
 
     Parameters
     ----------
@@ -124,17 +124,17 @@ def advice_sentences(advice: Iterable[Statement]) -> list[str]:
 
 
 def left_out_sentences(left_out: Mapping[str, Statement]) -> dict[str, str]:
-    """The sentences on why effects are not judged.
+    """Return the sentences on effects that are not judged.
 
     Parameters
     ----------
     left_out : mapping of str to Statement
-        By the effects' names, of the keys of LEFT_OUT.
+        By name of the effect, with keys of LEFT_OUT.
     """
     return {name: why.sentence(LEFT_OUT) for name, why in left_out.items()}
 
 
-ACTS_ON = {  # covariates by which the size of an effect differs, by the effect's name
+ACTS_ON = {  # covariates by which the size of an effect varies, by name of the effect
     "time_offset": ("speed", "turn_rate"),
     "clock_drift": ("time", "speed", "turn_rate"),
     "time_jitter": ("speed", "turn_rate"),
@@ -174,7 +174,7 @@ AXIS_WORDS = {"E": "in easting", "N": "in northing", "H": "in height"}
 
 
 class _GapPlace(NamedTuple):
-    """A range of a covariate: its share of what the cause moves or of the gap, and of rows."""
+    """Range of a covariate: its share of the cause's shift or of the gap, and of rows."""
 
     share: float
     rows: float
@@ -182,7 +182,7 @@ class _GapPlace(NamedTuple):
 
 
 def headline(where: Where, label: str, lead: str, start: float) -> str:
-    """Return the sentence on the size of the gap and on where most of it lies.
+    """Return the sentence on the size of the gap and on its largest part.
 
     Parameters
     ----------
@@ -190,9 +190,9 @@ def headline(where: Where, label: str, lead: str, start: float) -> str:
     label : str
         Of the verdict.
     lead : str
-        What an unknown error looks like; else empty.
+        Hint of an unknown error; otherwise empty.
     start : float
-        The gps_time from which the covariate time counts. Units: s.
+        The gps_time at which the covariate time is zero. Units: s.
     """
     low, high = where.null_band
     is_measurable = where.before > high
@@ -214,7 +214,7 @@ def headline(where: Where, label: str, lead: str, start: float) -> str:
 
 
 def _acts_on(label: str, lead: str) -> Callable[[str], bool] | None:
-    """Return True if a cause acts on a covariate; None if that is not known."""
+    """Function that is True for covariates on which a cause acts; None if unknown."""
     if label == "unknown" and lead:
         return lambda by: NAMES.get(by, (by,))[0] in lead
     effects = label.split("+")
@@ -225,13 +225,13 @@ def _acts_on(label: str, lead: str) -> Callable[[str], bool] | None:
 
 
 def _largest(places: Iterable[_GapPlace]) -> _GapPlace | None:
-    """The place whose share exceeds that of its residuals most; None where none does plainly."""
+    """Bin whose share exceeds that of its residuals most; None if none does clearly."""
     plain = [place for place in places if place.share > SETTINGS.plain * place.rows]
     return max(plain, key=lambda place: place.share - place.rows, default=None)
 
 
 def _places(splits, acts_on, start):
-    """Places of the splits on which a cause acts, or of bins that exceed their null band."""
+    """Bins of the splits on which a cause acts, or that exceed their null band."""
     for split in splits:
         if acts_on is not None and not acts_on(split.by):
             continue
@@ -260,7 +260,7 @@ def _bin_words(split: Split, start: float) -> list[str]:
 
 
 def _range_words(by, low, high, start):
-    """A range of a covariate in the unit that a surveyor reads."""
+    """Range of a covariate in the unit used by surveyors."""
     if by == "time":
         return WORDS[by].format(f"{start + low:.1f}", f"{start + high:.1f}")
     if by == "intensity":

@@ -1,4 +1,4 @@
-"""Which observation is which surveyed target: all of them decided together."""
+"""Joint matching of all observations with surveyed targets."""
 
 from mlscorr.matching._wording import REASONS
 from mlscorr.matching.association import Matches, match

@@ -1,15 +1,15 @@
-"""How misclosures are believed to change along a drive.
+"""Prior models of the change of misclosures along a drive.
 
-Per map axis the misclosure of an observation at time t is
+For each map axis, the misclosure of an observation at time t is
 
     l(t) = c + g(t) s(t) + noise,   g(t)^2 = (k sigma(t))^2 + b^2 + u^2   (pos.Predictive).
 
-c is what datum and mounting do, constant but for its turning with the vehicle. s is a smooth
-process of unit variance (Matern 3/2: position and rate) that starts anew where the drift of the POS
-does, sigma(t) what the POS states, k how far that is from the truth, b a bias and u a smaller and
-rougher error that it doesn't know of. The noise is that of survey and extraction, of the stated
-attitude across the range, and a part of g and u that isn't smooth. k, b and u are not known:
-several beliefs compete, and the observations decide.
+c is the effect of datum and mounting, constant except that part of it turns with the vehicle. s is
+a smooth process of unit variance (Matern 3/2: position and rate) that restarts where the drift of
+the POS does. sigma(t) is the sigma stated by the POS, k its scale error, b a bias, and u a smaller
+and rougher unstated error. The noise comprises survey, extraction, the stated attitude over the
+range, and the part of g and u that is not smooth. k, b and u are unknown: several prior models
+compete, and the observations decide.
 """
 
 from typing import NamedTuple
@@ -23,7 +23,7 @@ from mlscorr.survey import ControlPoints, TargetObservations, Trajectory
 
 
 class Chain(NamedTuple):
-    """n observations in order of time, under m beliefs.
+    """Observations in order of time (n), under m prior models.
 
     Parameters
     ----------
@@ -35,17 +35,17 @@ class Chain(NamedTuple):
     noise : (m, n, 3) array
         Variance per axis, without the control point's. Units: m^2.
     otherwise : (n,) array
-        Logarithm of the density of what is none of the surveyed points (1/m^3), over the odds of
-        a surveyed point's being visible.
+        Log density of objects that are not surveyed points (1/m^3), over the odds that a surveyed
+        point is visible.
     rate : (m,) array
         sqrt(3) over the correlation time. Units: 1/s.
     segment : (n,) int array
-        Drift starts anew between two of them.
+        Drift restarts between two segments.
     pairs : CandidatePairs
     pair_variance : (p, 3) array
-        Of the control points' positions. Units: m^2.
+        Variance of the control points' positions. Units: m^2.
     moved_share : (p,) array
-        Probability that a pair's surveyed point lies elsewhere, by what isn't in the chain.
+        Probability that a pair's surveyed point is elsewhere, from information outside the chain.
     """
 
     gps_time: np.ndarray
@@ -64,8 +64,8 @@ class Chain(NamedTuple):
 def transition(chain: Chain, start: int, end: int) -> np.ndarray:
     """Transitions F of c, s and its rate from one observation to another, later or earlier.
 
-    All three are divided by their sigmas before any observation: their covariance is I then, and
-    stays so with a process noise of I - F F^T.
+    All three are divided by their prior sigmas, so their prior covariance is I, and remains I with
+    a process noise of I - F F^T.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def transition(chain: Chain, start: int, end: int) -> np.ndarray:
     Returns
     -------
     matrix : (m + 1, 3, 3) array
-        Of each belief, and at last of a drift that starts anew.
+        One for each model, and last that of a restarting drift.
     """
     turned = 1.0 - chain.forward[start] @ chain.forward[end]
     share = (SETTINGS.turning_sigma / SETTINGS.constant_sigma) ** 2
@@ -99,16 +99,16 @@ def build_chain(
     errors: PosErrors,
     pairs: CandidatePairs,
 ) -> Chain:
-    """Chain of observations in order of time.
+    """Build the chain of observations in order of time.
 
     Parameters
     ----------
     observations : TargetObservations
     control : ControlPoints
     pose : Trajectory
-        At the observations.
+        Trajectory at the observations.
     errors : PosErrors
-        Of the drive.
+        Error model of the drive.
     pairs : CandidatePairs
     """
     distance = np.linalg.norm(observations.position - pose.position, axis=1)
@@ -134,7 +134,7 @@ def build_chain(
 
 
 def _lookalikes(observations, pose):
-    """Density (n,) of objects of each observation's kind and size. Units: 1/m^3."""
+    """Density (n,) of objects with each observation's kind and size. Units: 1/m^3."""
     keys = zip(observations.kind, observations.size.round(2), strict=True)
     appearance = np.array([f"{kind} {size}" for kind, size in keys])
     _, number, count = np.unique(appearance, return_inverse=True, return_counts=True)

@@ -1,9 +1,9 @@
-"""Hypotheses of who is who, followed along the drive with a Kalman filter each.
+"""Association hypotheses along the drive, each with a Kalman filter.
 
-A hypothesis names a control point, or none, for each observation so far; its weight is its
-probability density, and its state what the named ones say of the misclosure. Unlikely hypotheses
-are dropped, and those that differ only long ago are merged (multiple hypothesis tracking, Reid
-1979).
+A hypothesis assigns a control point, or none, to each observation so far. Its weight is its
+probability density, and its state the estimate of the misclosure from the assigned ones. Unlikely
+hypotheses are dropped, and those that differ only in older observations are merged (multiple
+hypothesis tracking, Reid 1979).
 """
 
 from typing import NamedTuple
@@ -15,7 +15,7 @@ from mlscorr.matching.settings import SETTINGS
 
 
 class Hypotheses(NamedTuple):
-    """b hypotheses of several beliefs at one observation, before it is used.
+    """Set of b hypotheses under several models at one observation, before it is used.
 
     Parameters
     ----------
@@ -23,14 +23,13 @@ class Hypotheses(NamedTuple):
     weight : (b,) array
         Logarithms.
     mean : (b, 3, 3) array
-        Of c, s and its rate (last axis) per map axis, over their sigmas before any observation.
+        Of c, s and its rate (last axis) for each map axis, in units of their prior sigmas.
     covariance : (b, 3, 3, 3) array
-        Of these per map axis.
+        Of these, for each map axis.
     used : (b, w) int array
-        Control points of the observations in ``window`` (w,), those of the last two seconds; -1
-        for none.
+        Control points of the observations in ``window`` (w,), the last two seconds; -1 for none.
     history : (b, h) int array
-        The last pairs of the memory.
+        Last pairs of each hypothesis.
     """
 
     belief: np.ndarray
@@ -43,7 +42,7 @@ class Hypotheses(NamedTuple):
 
 
 def start(chain: Chain) -> Hypotheses:
-    """One hypothesis of each belief, before any observation.
+    """Make one hypothesis for each model, before any observation.
 
     Parameters
     ----------
@@ -69,7 +68,7 @@ def select(now: Hypotheses, rows: np.ndarray, kept: int, w: int) -> Hypotheses:
     now : Hypotheses
     rows : (r,) int array
     kept, w : int
-        So many observations, the last ones, stay in the window of w; others are to be filled in.
+        Number of last observations that remain in the window of w; the others are filled later.
     """
     old = len(now.window) - kept
     window = np.empty(w, dtype=int)
@@ -88,14 +87,14 @@ def select(now: Hypotheses, rows: np.ndarray, kept: int, w: int) -> Hypotheses:
 
 
 def predict(now: Hypotheses, chain: Chain, last: int, row: int) -> Hypotheses:
-    """The hypotheses at the next observation: the drift went on, or started anew in any belief.
+    """Predict hypotheses at the next observation: the drift continues, or restarts in any model.
 
     Kalman prediction x = F x, P = I + F (P - I) F^T per axis.
 
     Parameters
     ----------
     now : Hypotheses
-        After the last observation, the heaviest first.
+        After the last observation, sorted by decreasing weight.
     chain : Chain
     last, row : int
         Rows of the last observation and the next one, later or earlier.
@@ -116,22 +115,22 @@ def predict(now: Hypotheses, chain: Chain, last: int, row: int) -> Hypotheses:
     matrix = transition(chain, last, row)
     f = matrix[np.concatenate([after.belief[:b], np.full(renewed * m, m)])][:, None]
     after.belief[b:] = np.tile(np.arange(m), renewed)
-    after.history[b:] = -2  # as of no other hypothesis
+    after.history[b:] = -2  # matches no other hypothesis
     after.mean[:] = (f @ after.mean[..., None])[..., 0]
     after.covariance[:] = f @ (after.covariance - np.eye(3)) @ f.swapaxes(2, 3) + np.eye(3)
     return after
 
 
 def log_likelihoods(now: Hypotheses, chain: Chain, row: int) -> np.ndarray:
-    """Log densities (b, 2 k + 1) of what an observation is, by the misclosures of its k pairs.
+    """Log densities (b, 2 k + 1) of an observation's identities, from misclosures of its k pairs.
 
-    First its being each pair's target, then its being a target whose surveyed point lies elsewhere,
-    at last its being none of them. A pair of two appearances may be a target taken down wrong.
+    The order is: each pair's target; each pair's target with its surveyed point elsewhere; none of
+    them. A pair with different kind or size may be a target that was recorded incorrectly.
 
     Parameters
     ----------
     now : Hypotheses
-        Their weights are a part of the densities.
+        Their weights are included in the densities.
     chain : Chain
     row : int
     """
@@ -155,7 +154,7 @@ def log_likelihoods(now: Hypotheses, chain: Chain, row: int) -> np.ndarray:
 
 
 def displacement(now: Hypotheses, chain: Chain, row: int) -> tuple[np.ndarray, np.ndarray]:
-    """Misclosure (b, 3) by the states, and its variance without survey's. Units: m, m^2.
+    """Misclosure (b, 3) from the states, and its variance without the survey. Units: m, m^2.
 
     Parameters
     ----------
@@ -172,12 +171,12 @@ def displacement(now: Hypotheses, chain: Chain, row: int) -> tuple[np.ndarray, n
 
 
 def _in_use(now, chain, row, control):
-    """Points (b, k) that each hypothesis uses already in this pass."""
+    """Flag (b, k) of points that a hypothesis already uses in this pass."""
     is_same_pass = chain.pass_number[now.window] == chain.pass_number[row]
     return (now.used[:, is_same_pass, None] == control).any(axis=1)
 
 
 def _log_normal(square, variance):
-    """Log density of three independent normal errors by their squares (..., 3)."""
+    """Log density of three independent normal errors, given their squares (..., 3)."""
     total = (square / variance).sum(axis=-1)
     return -0.5 * (total + np.log((2.0 * np.pi * variance).prod(axis=-1)))

@@ -1,9 +1,9 @@
-"""How probable each pair is, given all other observations before and after it.
+"""Probability of each pair, given all other observations before and after it.
 
-The hypotheses on a drive branch at each observation, from its start and from its end; the heaviest
-stay, and those that no later observation can tell apart are merged. Each side is what Kalman
-filters know: their product, over the prior that both hold, is what all other observations say
-(two-filter smoother, Fraser and Potter 1969).
+The hypotheses on a drive branch at each observation, from its start and from its end. Those with
+the largest weights are kept, and those that later observations cannot separate are merged. Each
+side is a set of Kalman filter states. Their product, divided by the common prior, is the prediction
+from all other observations (two-filter smoother, Fraser and Potter 1969).
 """
 
 from typing import NamedTuple
@@ -25,18 +25,18 @@ SHORT_DRIVE = 1000  # observations; hypotheses of so many are kept: some 30 kB e
 
 
 class Marginals(NamedTuple):
-    """How probable pairs are, and what all others make of each observation.
+    """Probability of each pair, and prediction of each observation from all others.
 
     Parameters
     ----------
     sound : (p,) array
-        Probability of a pair's being right and its surveyed point where the target is.
+        Probability that a pair is right and its surveyed point is at the target.
     moved : (p,) array
-        Of its being right and the surveyed point elsewhere.
+        Probability that it is right and the surveyed point is elsewhere.
     expected : (n, 3) array
-        Misclosure by the other observations. Units: m.
+        Misclosure predicted from the other observations. Units: m.
     sigma : (n, 3) array
-        Of the difference to it. Units: m.
+        Sigma of the difference from it. Units: m.
     """
 
     sound: np.ndarray
@@ -46,10 +46,10 @@ class Marginals(NamedTuple):
 
 
 def marginals(chain: Chain) -> Marginals:
-    """Join hypotheses from the start of a drive with those from its end.
+    """Combine hypotheses from the start of a drive with those from its end.
 
-    Of the past's hypotheses only those at the start of each part of the drive are kept, and the
-    part is walked again where the future comes to it: memory grows with sqrt(n).
+    Of the forward hypotheses only those at the start of each segment are kept. A segment is
+    filtered again when the backward pass reaches it, so memory grows with sqrt(n).
 
     Parameters
     ----------
@@ -84,14 +84,14 @@ def marginals(chain: Chain) -> Marginals:
 
 
 def _pass(now, chain, row, following):
-    """The hypotheses before the observation that follows this one, which is used."""
+    """Hypotheses before the observation that follows this one, which is used."""
     return predict(use(now, chain, row), chain, row, following)
 
 
 def _fill(both, chain, row, result):
-    """Fill in the marginals of an observation."""
+    """Store the marginals of an observation."""
     if len(both.weight) == 0:
-        return  # past and future agree in no belief: nothing is said
+        return  # no common model of past and future: no prediction
     density = _probabilities(log_likelihoods(both, chain, row))
     pairs = chain.pairs.of(row)
     k = density.shape[1] // 2
@@ -105,21 +105,21 @@ def _fill(both, chain, row, result):
 
 
 def _probabilities(weight):
-    """Probabilities of logarithmic weights."""
+    """Probabilities from logarithmic weights."""
     probability = np.exp(weight - weight.max())
     return probability / probability.sum()
 
 
 def join(before: Hypotheses, after: Hypotheses, chain: Chain) -> Hypotheses:
-    """Pairs (past, future) of hypotheses of one belief, joined; their prior counts once.
+    """Join pairs (past, future) of hypotheses of one model; their common prior counts once.
 
-    With precisions L and means m, L = L1 + L2 - I and L m = L1 m1 + L2 m2. Both windows are
-    joined, and the histories are those of the past.
+    With precisions L and means m, L = L1 + L2 - I and L m = L1 m1 + L2 m2. Both windows are joined;
+    the histories are those of the past.
 
     Parameters
     ----------
     before, after : Hypotheses
-        At an observation, by those before it and by those after it.
+        At an observation, from the observations before and after it.
     chain : Chain
     """
     rows, others = np.nonzero(before.belief[:, None] == after.belief)
@@ -149,7 +149,7 @@ def _information(now):
 
 
 def _inverse(matrix):
-    """Inverses of symmetric matrices (..., 3, 3) by their cofactors, and their determinants."""
+    """Inverses of symmetric matrices (..., 3, 3) by cofactors, and their determinants."""
     a = matrix[..., 0, 0]
     b = matrix[..., 0, 1]
     c = matrix[..., 0, 2]
@@ -169,7 +169,9 @@ def _inverse(matrix):
 
 
 def _clash(both, w, chain):
-    """Pairs (b,) that use one control point twice in one visit; w observations are of the past."""
+    """Flag (b,) of pairs that use a control point twice in one visit; the first w are of the
+    past.
+    """
     past = both.window[:w, None]
     future = both.window[w:]
     is_visit = chain.pass_number[past] == chain.pass_number[future]
@@ -179,15 +181,15 @@ def _clash(both, w, chain):
 
 
 def use(now: Hypotheses, chain: Chain, row: int) -> Hypotheses:
-    """The hypotheses after an observation: each branches into its pairs and none.
+    """Update hypotheses by an observation: each branches into its pairs and none.
 
     Parameters
     ----------
     now : Hypotheses
-        Before it.
+        Before the observation.
     chain : Chain
     row : int
-        Of the observation.
+        Row of the observation.
     """
     pairs = np.arange(chain.pairs.first[row], chain.pairs.first[row + 1])
     k = len(pairs)
@@ -204,7 +206,7 @@ def use(now: Hypotheses, chain: Chain, row: int) -> Hypotheses:
     after.window[w] = row
     after.weight[:] = weight[kept]
     after.used[:, w] = np.append(chain.pairs.control, -1)[pair]
-    is_sound = choice < k  # takes up the sound pairs only
+    is_sound = choice < k  # only the sound pairs update the state
     after.history[is_sound, :-1] = after.history[is_sound, 1:]
     after.history[is_sound, -1] = pair[is_sound]
     groups, total = merge(after.belief, after.history, after.used, after.weight)
@@ -217,7 +219,7 @@ def use(now: Hypotheses, chain: Chain, row: int) -> Hypotheses:
 
 
 def _update(after, chain, row, pair, is_moved):
-    """Kalman update, in place, of hypotheses by the pair, or none, that each takes.
+    """Kalman update, in place, of hypotheses by the pair, or none, that each assigns.
 
     K = P H^T / S, x = x + K v, P = P - K H P with H = (sigma, g, 0) per axis.
     """
@@ -236,7 +238,7 @@ def _update(after, chain, row, pair, is_moved):
 
 
 def heaviest(now: Hypotheses) -> Hypotheses:
-    """Those of each belief that are joined with the other side's.
+    """Select the hypotheses of each model that are joined with the other side's.
 
     Parameters
     ----------
@@ -251,15 +253,15 @@ def heaviest(now: Hypotheses) -> Hypotheses:
 def best_of_each(
     belief: np.ndarray, weight: np.ndarray, count: int, smallest_weight: float
 ) -> np.ndarray:
-    """Rows with the largest weights of each belief that aren't negligible, the heaviest first.
+    """Rows with the largest non-negligible weights of each model, sorted by decreasing weight.
 
     Parameters
     ----------
     belief, weight : (b,) array
     count : int
-        At most, of each belief.
+        Largest number for each model.
     smallest_weight : float
-        Logarithm, against the best of all.
+        Logarithm, relative to the best of all.
     """
     rows = np.flatnonzero(weight - weight.max(initial=-np.inf) >= smallest_weight)
     rows = rows[np.argsort(-weight[rows], kind="stable")]
@@ -273,18 +275,18 @@ def best_of_each(
 def merge(
     belief: np.ndarray, history: np.ndarray, used: np.ndarray, weight: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The heaviest of those that agree in belief, last pairs and seconds; their weights' sum.
+    """Merge hypotheses that agree in model, last pairs and seconds; sum their weights.
 
     Parameters
     ----------
     belief, weight : (b,) array
-        The heaviest first.
+        Sorted by decreasing weight.
     history, used : (b, h), (b, w) int array
 
     Returns
     -------
     rows : (u,) int array
-        The heaviest of each group.
+        The one with the largest weight of each group.
     weight : (u,) array
         Logarithm of the sum over its group.
     """
@@ -297,8 +299,8 @@ def merge(
 
 
 def _keys(table):
-    """A whole number for each row of integers, equal where they are."""
-    factor = 6364136223846793005  # of a linear congruential sequence modulo 2^64
+    """Hash each row of integers to an integer, equal for equal rows."""
+    factor = 6364136223846793005  # multiplier of a linear congruential sequence modulo 2^64
     key = table[:, 0].copy()
     for column in table[:, 1:].T:
         key = (key ^ (key >> 29)) * factor + column

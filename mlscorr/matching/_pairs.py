@@ -1,4 +1,4 @@
-"""Which observations and surveyed points could belong together, each pair by itself."""
+"""Candidate pairs of observations and surveyed points, each judged by itself."""
 
 from typing import NamedTuple
 
@@ -21,7 +21,7 @@ class CandidatePairs(NamedTuple):
     misclosure : (p, 3) array
         Surveyed - observed. Units: m.
     same : (p,) bool array
-        Which agree in kind and size.
+        True if kind and size agree.
     """
 
     first: np.ndarray
@@ -30,7 +30,7 @@ class CandidatePairs(NamedTuple):
     same: np.ndarray
 
     def of(self, row: int) -> slice:
-        """Slice of an observation's pairs.
+        """Return the slice of an observation's pairs.
 
         Parameters
         ----------
@@ -42,16 +42,16 @@ class CandidatePairs(NamedTuple):
 def same_appearance(
     observations: TargetObservations, rows: np.ndarray, control: ControlPoints, columns: np.ndarray
 ) -> np.ndarray:
-    """Whether observations have the kinds and sizes of control points: bool (k,).
+    """Flag (k,) of observations that have the kind and size of control points.
 
     Parameters
     ----------
     observations : TargetObservations
     rows : (k,) int array
-        Of the observations.
+        Rows of the observations.
     control : ControlPoints
     columns : (k,) int array
-        Of the control points.
+        Rows of the control points.
     """
     kinds = (np.array(part.kind, dtype=object) for part in (observations, control))
     same_kind = np.equal(next(kinds)[rows], next(kinds)[columns]).astype(bool)
@@ -62,7 +62,7 @@ def same_appearance(
 def find_pairs(
     observations: TargetObservations, control: ControlPoints, search_radius: float
 ) -> CandidatePairs:
-    """Pairs within the search radius, with the observations' rows in order.
+    """Find pairs within the search radius, with the observations' rows in order.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The sentences on observations without a name, and on surveyed points without an observation."""
+"""Sentences on observations without a name, and on surveyed points without an observation."""
 
 from collections.abc import Sequence
 
@@ -19,7 +19,7 @@ def _limit(search_radius: float) -> str:
 
 
 def _corrected(neighbours: Sequence[tuple[str, float]], sigma: float) -> str:
-    """By which neighbours an observation was corrected, and how well."""
+    """State the neighbors by which an observation was corrected, and the sigma."""
     if not neighbours:
         return f"no other target tells the misclosure there (sigma {_metres(sigma)})"
     words = [f"{name} ({later:+.1f} s)" for name, later in neighbours]
@@ -27,7 +27,7 @@ def _corrected(neighbours: Sequence[tuple[str, float]], sigma: float) -> str:
 
 
 def _whereabouts(time: float, away: float, found_name: str | None) -> str:
-    """When an observation was made, how far from a surveyed point, and its name if it has one."""
+    """State time of an observation, distance from a surveyed point, and its name if it has one."""
     name = ""
     if found_name is not None:
         name = f" and is {found_name}"
@@ -152,11 +152,11 @@ REASONS: dict[str, Wording] = {
 
 
 def sentence_of(why: Statement) -> str:
-    """The sentence of a reason.
+    """Return the sentence of a reason.
 
     Parameters
     ----------
     why : Statement
-        Of a key of REASONS.
+        With a key of REASONS.
     """
     return why.sentence(REASONS)

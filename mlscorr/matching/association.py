@@ -1,4 +1,4 @@
-"""Which observation is which surveyed point: the joint decision of all matches."""
+"""Matching of observations and surveyed points: the joint decision on all matches."""
 
 from dataclasses import dataclass, replace
 
@@ -25,22 +25,23 @@ from mlscorr.survey import (
 
 @dataclass(frozen=True)
 class Matches:
-    """Matched observations, those left over, and the refusals.
+    """Matched observations, unmatched observations, and refusals.
 
     Parameters
     ----------
     matched : TargetObservations
-        With names.
+        Observations with names.
     unmatched : TargetObservations
-        Without.
+        Observations without names.
     refusals : tuple of Refusal
-        Of surveyed points without an observation.
+        Refusals of surveyed points without an observation.
     probability : (n,) array
-        Of each match, given all others.
+        Probability of each match, given all others.
     why : tuple of m Statement
-        Why each unmatched observation has no name; ``reasons`` are their sentences.
+        Reason why each unmatched observation has no name; ``reasons`` has the sentences.
     moved : TargetObservations, optional
-        Those unmatched that show where a surveyed point's target stands instead, with its name.
+        Unmatched observations that show the true position of a displaced surveyed point, with its
+        name.
     """
 
     matched: TargetObservations
@@ -52,11 +53,11 @@ class Matches:
 
     @property
     def reasons(self) -> tuple[str, ...]:
-        """Why each unmatched observation has no name, in a sentence each."""
+        """Reason, as a sentence, why each unmatched observation has no name."""
         return tuple(sentence_of(statement) for statement in self.why)
 
     def by_role(self, survey: Survey) -> tuple[Matched, Matched]:
-        """The matched control points, and the matched check points.
+        """Return the matched control points and the matched check points.
 
         Parameters
         ----------
@@ -76,12 +77,12 @@ def match(
 ) -> Matches:
     """Assign observations to control points, at most one per control point and visit.
 
-    Kind and size must agree and the distance lie within the search radius. Misclosures change
-    smoothly along the drive; by how much is not known, whatever the POS states. A match is used
-    when its probability, given all other observations before and after it and over all that the
-    drift may be, is at least 0.99, and refused with a reason otherwise. So is one to a surveyed
-    point that lies elsewhere than its target by more than its neighbours' credible motion; all
-    passes decide that together.
+    Kind and size must agree, and the distance must be within the search radius. Misclosures change
+    smoothly along the drive, by an unknown amount whatever the POS states. A match is used if its
+    probability, given all other observations and averaged over all possible drifts, is at least
+    0.99; otherwise it is refused with a reason. A match is also refused if the surveyed point
+    differs from its target by more than the drift between neighbors can explain; all passes decide
+    this together.
 
     Parameters
     ----------
@@ -89,16 +90,16 @@ def match(
     control : ControlPoints
         Control and check points together.
     trajectory : Trajectory
-        As recorded.
+        Recorded trajectory.
     pos : Pos, optional
-        Beliefs, used where the trajectory has no sigmas.
+        Assumed accuracy, used if the trajectory has no sigmas.
     search_radius : float
-        How far a surveyed point may lie from its observation. Units: m.
+        Largest distance of an observation from its surveyed point. Units: m.
 
     Raises
     ------
     ValueError
-        Where an observation lies outside the trajectory.
+        If an observation is outside the trajectory.
     """
     order = np.argsort(observations.gps_time, kind="stable")
     ordered = observations[order]
@@ -109,7 +110,7 @@ def match(
     refusals, reasons = explain(ordered, control, pairs, decision, search_radius)
     rank = np.argsort(order)
     column = decision.column[rank]
-    known = (*control.name, None)  # the last, -1, of what has no name
+    known = (*control.name, None)  # the last one, -1, for observations without a name
     named = replace(observations, name=tuple(known[c] for c in column))
     elsewhere = decision.moved(pairs)[rank]
     names = tuple(control.name[c] for c in elsewhere[elsewhere >= 0])
@@ -121,9 +122,9 @@ def match(
 
 
 def _decide(chain, count):
-    """The Decision; where points were seen repeatedly, what each pass tells of them counts in all.
+    """Make the Decision; for points with repeated observations, all passes count together.
 
-    A surveyed point that other passes found in its place is no explanation of a jump in this one.
+    A surveyed point that other passes confirm cannot explain a jump in this one.
     """
     first = marginals(chain)
     decision = decide(chain.pairs, first, count, chain.moved_share)

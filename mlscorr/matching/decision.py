@@ -1,4 +1,4 @@
-"""Which pairs are used."""
+"""Decision on the pairs to use."""
 
 from dataclasses import dataclass
 
@@ -12,18 +12,18 @@ from mlscorr.matching.settings import SETTINGS
 
 @dataclass(frozen=True)
 class Decision:
-    """The matches, and what they rest on; n observations in order of time, k control points.
+    """Matches and their basis, for n observations in order of time and k control points.
 
     Parameters
     ----------
     column : (n,) int array
         Control point of each observation, -1 for none.
     probability : (n,) array
-        Of that match.
+        Probability of that match.
     wrong : (k,) array
-        Probability that a surveyed point lies elsewhere than its target, by all passes.
+        Probability, from all passes, that a surveyed point is not at its target.
     passes : (k,) int array
-        Number of observations that tell it.
+        Number of observations behind it.
     marginals : Marginals
     """
 
@@ -34,15 +34,15 @@ class Decision:
     marginals: Marginals
 
     def moved(self, pairs: CandidatePairs) -> np.ndarray:
-        """Surveyed point (n,) that each unnamed observation shows elsewhere, -1 for none.
+        """Surveyed point (n,) that each unnamed observation shows to be displaced, -1 for none.
 
-        Where it is too probable that the point is wrong to use it, it counts: what is refused for
-        that is told here.
+        A point counts if it is too probably wrong to be used: every refusal for this reason is
+        listed.
 
         Parameters
         ----------
         pairs : CandidatePairs
-            Those that were decided on.
+            Pairs that were decided on.
         """
         column = np.full(len(self.column), -1)
         probable = pairs.same & (self.marginals.sound + self.marginals.moved >= 0.5)
@@ -53,16 +53,16 @@ class Decision:
 
 
 def decide(pairs: CandidatePairs, marginals: Marginals, count: int, share: np.ndarray) -> Decision:
-    """Decide on all pairs: of a surveyed point's place, all observations of it decide jointly.
+    """Decide on all pairs; all observations of a surveyed point decide jointly on its position.
 
     Parameters
     ----------
     pairs : CandidatePairs
     marginals : Marginals
     count : int
-        Of control points.
+        Number of control points.
     share : (p,) array
-        Probabilities that the surveyed points lie elsewhere which the marginals hold already.
+        Probabilities of displaced surveyed points that the marginals already include.
     """
     sound = marginals.sound
     moved = marginals.moved
@@ -87,9 +87,10 @@ def decide(pairs: CandidatePairs, marginals: Marginals, count: int, share: np.nd
 
 
 def _in_drift(is_wrong, passes):
-    """Which control points (k,) seem wrong, but are too many for it: the estimate decides on them.
+    """Flag (k,) of control points that seem wrong but are too many; the estimate decides on them.
 
-    Where one pass tells it, a short drift of the POS looks alike. A single point tells of no habit.
+    With a single pass, a short drift of the POS is not separable from wrong points. One single
+    point does not show a pattern.
     """
     lone = is_wrong & (passes == 1)
     number = np.sum(lone)
@@ -99,14 +100,14 @@ def _in_drift(is_wrong, passes):
 
 
 def log_share(number: int, total: int, share: float) -> float:
-    """Log probability that just some of a number of things are wrong, where few or many may be.
+    """Log probability that exactly some of a number of items are wrong, with an uncertain share.
 
     Parameters
     ----------
     number, total : int
-        Of those, and of all things.
+        Numbers of wrong items, and of all items.
     share : float
-        Of all things that are expected to be wrong; nothing else is known of it, Beta(1, b).
+        Expected share of wrong items, with a prior Beta(1, b).
     """
     others = 1.0 / share - 1.0
     return float(betaln(1.0 + number, others + total - number) - betaln(1.0, others))
@@ -115,12 +116,12 @@ def log_share(number: int, total: int, share: float) -> float:
 def moved_share_by_others(
     pairs: CandidatePairs, marginals: Marginals, count: int, share: np.ndarray
 ) -> np.ndarray:
-    """Probability (p,) that each pair's surveyed point lies elsewhere, by its other observations.
+    """Probability (p,) that each pair's surveyed point is displaced, from its other observations.
 
     Parameters
     ----------
     pairs, marginals, count, share
-        As of ``decide``.
+        See ``decide``.
     """
     probable = pairs.same & (marginals.sound + marginals.moved >= 0.5)
     odds = np.where(probable, _odds(marginals, share), 0.0)
@@ -131,7 +132,7 @@ def moved_share_by_others(
 
 
 def _odds(marginals, share):
-    """Log likelihood ratios (p,) of a surveyed point's lying elsewhere."""
+    """Log likelihood ratios (p,) of displaced surveyed points."""
     sound = marginals.sound
     moved = marginals.moved
     rest = np.clip(1.0 - sound - moved, np.finfo(float).eps, None)

@@ -1,4 +1,4 @@
-"""Why an observation has no name, and a surveyed point no observation."""
+"""Reasons why observations have no name, and surveyed points no observation."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,17 +15,17 @@ from mlscorr.survey import ControlPoints, Statement, TargetObservations
 
 @dataclass(frozen=True)
 class Refusal:
-    """A control point that stays without observation.
+    """Control point without an observation.
 
     Parameters
     ----------
     name : str
     pass_number : int or None
-        None where it is so in all passes.
+        None for all passes.
     why : Statement
-        The reason; ``reason`` is its sentence.
+        Reason; ``reason`` has its sentence.
     gps_time : float, optional
-        Of the observation that was refused. Units: s.
+        Time of the refused observation. Units: s.
     """
 
     name: str
@@ -35,13 +35,13 @@ class Refusal:
 
     @property
     def reason(self) -> str:
-        """Why it has none, in a sentence."""
+        """Reason as a sentence."""
         return sentence_of(self.why)
 
 
 @dataclass(frozen=True)
 class _Case:
-    """What the reasons are made of: observations in order of time, and what was decided."""
+    """Input of the reasons: observations in order of time, and the decision."""
 
     observations: TargetObservations
     control: ControlPoints
@@ -50,13 +50,13 @@ class _Case:
     search_radius: float
 
     def free(self, row, columns):
-        """Which control points (k,) have no match in the pass of an observation."""
+        """Flag (k,) of control points without a match in the pass of an observation."""
         number = self.observations.pass_number[row]
         return np.array([(number, column) not in self.in_passes for column in columns], bool)
 
     @cached_property
     def in_passes(self):
-        """(pass number, control point) of all matches."""
+        """Pairs (pass number, control point) of all matches."""
         matches = self.observations.pass_number[self.matched], self.decision.column[self.matched]
         return frozenset(zip(*matches, strict=True))
 
@@ -67,11 +67,11 @@ class _Case:
 
     @cached_property
     def by_control(self):
-        """The pairs in order of their control points."""
+        """Pairs in order of their control points."""
         return np.argsort(self.pairs.control, kind="stable")
 
     def pairs_of(self, column):
-        """The pairs (k,) of a control point, and the rows of their observations."""
+        """Pairs (k,) of a control point, and the rows of their observations."""
         span = np.searchsorted(self.pairs.control, [column, column + 1], sorter=self.by_control)
         pairs = self.by_control[slice(*span)]
         return pairs, np.searchsorted(self.pairs.first, pairs, side="right") - 1
@@ -83,7 +83,7 @@ class _Case:
         return self.control.name[column]
 
     def of_pairs(self, row):
-        """Control points (k,) of an observation's pairs, most probable first, and probabilities."""
+        """Control points (k,) of an observation's pairs and probabilities, in decreasing order."""
         pairs = self.pairs.of(row)
         marginals = self.decision.marginals
         probability = marginals.sound[pairs] + marginals.moved[pairs]
@@ -94,7 +94,7 @@ class _Case:
         return self.control.position[column] - self.observations.position[row]
 
     def off(self, row, column):
-        """How far a control point lies from where the neighbours say it should (m)."""
+        """Distance of a control point from its position predicted by the neighbors (m)."""
         expected = self.decision.marginals.expected[row]
         return float(np.linalg.norm(self.misclosure(row, column) - expected))
 
@@ -103,7 +103,7 @@ class _Case:
         return float(np.linalg.norm(self.misclosure(row, column)))
 
     def corrected(self, row):
-        """By which neighbours an observation was corrected: names, how much later, and sigma."""
+        """Neighbors by which an observation was corrected: names, time differences, and sigma."""
         time = self.observations.gps_time
         column = self.decision.column
         matched = self.matched
@@ -122,7 +122,7 @@ class _Case:
         }
 
     def whereabouts(self, point, row):
-        """When an observation was made, how far from a control point, and its name if any."""
+        """Time of an observation, distance from a control point, and its name if any."""
         away = np.linalg.norm(self.observations.position[row] - self.control.position[point])
         column = self.decision.column[row]
         name = None
@@ -138,12 +138,12 @@ def explain(
     decision: Decision,
     search_radius: float,
 ) -> tuple[tuple[Refusal, ...], list[Statement | None]]:
-    """Say why control points have no observation, and observations no name.
+    """Explain why control points have no observation, and observations no name.
 
     Parameters
     ----------
     observations : TargetObservations
-        In order of time.
+        Sorted by time.
     control : ControlPoints
     pairs : CandidatePairs
     decision : Decision
@@ -184,7 +184,7 @@ def explain(
 
 
 def _of_another_kind(case, row):
-    """The control point of another kind or size that an observation probably is, or None."""
+    """Return the control point of another kind or size that an observation probably is, or None."""
     column, probability, same = case.of_pairs(row)
     if len(column) == 0 or same[0] or probability[0] < 0.5:
         return None
@@ -192,7 +192,7 @@ def _of_another_kind(case, row):
 
 
 def _exchanged(case, row, other_kind):
-    """The reason for a position that fits and a kind or size that doesn't."""
+    """Return the reason if the position fits but kind or size does not."""
     observed = case.observations
     surveyed = case.control
     column = other_kind[row]
@@ -213,7 +213,7 @@ def _exchanged(case, row, other_kind):
 
 
 def _wrong_place(case, row):
-    """(control points, reason) of an observation whose surveyed point lies elsewhere."""
+    """Return (control points, reason) of an observation whose surveyed point is displaced."""
     column, probability, _ = case.of_pairs(row)
     wrong = case.decision.wrong
     if len(column) == 0 or probability[0] < 0.5 or wrong[column[0]] <= 0.5:
@@ -232,7 +232,7 @@ def _wrong_place(case, row):
 
 
 def _doubt(case, row):
-    """(control points, reason) where an observation may be one of them, but isn't surely."""
+    """Return (control points, reason) of an observation that may be one of them, but not surely."""
     column, probability, _ = case.of_pairs(row)
     if probability.max(initial=0.0) < 2 * (1.0 - SETTINGS.smallest_probability):
         return None
@@ -262,7 +262,9 @@ def _doubt(case, row):
 
 
 def _rival(case, row, column):
-    """The other observation of the pass that most probably is this control point, or None."""
+    """Return the other observation of the pass that most probably is this control point, or
+    None.
+    """
     number = case.observations.pass_number
     marginals = case.decision.marginals
     others, rows = case.pairs_of(column)
@@ -274,9 +276,9 @@ def _rival(case, row, column):
 
 
 def _not_there(case, row):
-    """(control points, reason) where a free one is near, but not where the neighbours say.
+    """Return (control points, reason) if an unmatched one is near, but not where predicted.
 
-    An object as far from it as no target is moved says nothing of it.
+    An object farther away than any plausible displacement gives no information on it.
     """
     column, _, same = case.of_pairs(row)
     free = column[same & case.free(row, column)]
@@ -298,7 +300,7 @@ def _not_there(case, row):
 
 
 def _without_point(case, row, tree):
-    """The reason for an observation that no free surveyed point is near to."""
+    """Return the reason for an observation without an unmatched surveyed point nearby."""
     values = {"time": case.time(row)} | case.appearance(row)
     if tree is None:
         return Statement("no control", values=values)
@@ -315,7 +317,7 @@ def _without_point(case, row, tree):
 
 
 def _without_observation(case, refused, reasons):
-    """Refusals for the control points that no pass observed."""
+    """Make refusals for the control points that no pass observed."""
     column = case.decision.column
     known = {case.name(c) for c in column[column >= 0]} | {refusal.name for refusal in refused}
     missing = [i for i, name in enumerate(case.control.name) if name not in known]
@@ -326,9 +328,7 @@ def _without_observation(case, refused, reasons):
 
 
 def _why_missing(case, point, reasons, tree):
-    """The reason for a control point: of its like, what is near was refused, has another name, or
-    isn't there.
-    """
+    """Return the reason for a missing control point, from nearby objects of its kind."""
     values = {"kind": case.control.kind[point], "size": float(case.control.size[point])}
     pairs, rows = case.pairs_of(point)
     rows = rows[case.pairs.same[pairs]]

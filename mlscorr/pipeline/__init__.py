@@ -1,6 +1,6 @@
-"""The story from files to files, one module a command, each loaded when it is used."""
+"""Commands from files to files, one module for each, loaded when used."""
 
 import lazy_loader
 
-# __init__.pyi lists what is offered, for type checkers too
+# __init__.pyi lists the public names, also for type checkers
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

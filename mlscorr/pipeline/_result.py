@@ -1,6 +1,6 @@
-"""Files of a command's result: clouds, tables, document and pages, written whole or not at all.
+"""Files of a command's result: clouds, tables, document and pages, written atomically.
 
-A command's result says what it has as ``ResultFiles``; how that is written stands here alone.
+A command's result lists its files as ``ResultFiles``; only this module writes them.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from mlscorr.survey import InputFile, Summary
 
 LOG = logging.getLogger(__name__)
 Table = Callable[[Path], object]  # writes the file of this path
-Page = Callable[[Path, dict], object]  # likewise, of the document
+Page = Callable[[Path, dict], object]  # likewise, from the document
 
 
 class WrittenFiles(NamedTuple):
-    """Clouds and tables that stand in the folder of a result, before its document is made.
+    """Clouds and tables already in the folder of a result, before its document is made.
 
     Attributes
     ----------
     folder : Path
     clouds : object
-        What the function that wrote the clouds returned; None without clouds.
+        Result of the function that wrote the clouds; None without clouds.
     tables : dict
-        What the function of each table returned, by the table's name.
+        Result of the function of each table, by name of the table.
     """
 
     folder: Path
@@ -39,15 +39,15 @@ class WrittenFiles(NamedTuple):
 
 
 class Reported(NamedTuple):
-    """Content of a result's document, and the pages that show it.
+    """Contents of a result's document, and the pages that show it.
 
     Attributes
     ----------
     content : dict
-        Of the document, with or without its schema.
+        Contents of the document, with or without its schema.
     pages : dict
-        Functions of a path and the document that write a page, a picture, or a folder of
-        pictures, by its name.
+        Functions of a path and the document that write a page, a picture, or a folder of pictures,
+        by name.
     """
 
     content: dict
@@ -56,18 +56,18 @@ class Reported(NamedTuple):
 
 @dataclass(frozen=True)
 class ResultFiles:
-    """All that a command writes into its folder: clouds, tables, document, pages, in this order.
+    """All files that a command writes into its folder: clouds, tables, document, then pages.
 
     Parameters
     ----------
     name : str
-        Of the document: NAME.json, with the schema mlscorr.NAME/1.
+        Name of the document: NAME.json, with the schema mlscorr.NAME/1.
     inputs : sequence of InputFile
-        Files that must stay as they are.
+        Files that must not change.
     report : function of WrittenFiles
-        Makes what is Reported, once clouds and tables stand: a document may name them.
+        Makes the Reported after clouds and tables, because a document may name them.
     tables : dict
-        Functions of a path that write a table, by its name.
+        Functions of a path that write a table, by name.
     """
 
     name: str
@@ -84,12 +84,12 @@ class ResultFiles:
         tables: Mapping[str, Table],
         pages: Mapping[str, Page],
     ) -> ResultFiles:
-        """Files of a result whose document depends on none of them.
+        """Make the files of a result whose document depends on none of them.
 
         Parameters
         ----------
         name, inputs, content, tables, pages
-            As of ResultFiles and Reported.
+            See ResultFiles and Reported.
         """
         return cls(name, inputs, lambda _: Reported(content, pages), tables)
 
@@ -100,17 +100,17 @@ class ResultFiles:
         clouds: Callable[[Path], object] | None = None,
         folders: Sequence[str] = (),
     ) -> dict:
-        """Write all files into a folder, which appears whole or not at all.
+        """Write all files into a folder, atomically.
 
         Parameters
         ----------
         out : path
         overwrite : bool
-            Whether files of the same name are replaced.
+            True to replace files of the same name.
         clouds : function of a folder, optional
             Streams the clouds into it.
         folders : sequence of str
-            Below ``out``, that hold files of this result.
+            Subfolders of ``out`` with files of this result.
 
         Returns
         -------
@@ -120,9 +120,9 @@ class ResultFiles:
         Raises
         ------
         ValueError
-            When the folder holds an input, or holds anything without overwrite.
+            If the folder contains an input, or anything without overwrite.
         OSError
-            When writing fails.
+            If writing fails.
         """
         with output_folder(out, self.inputs, overwrite, folders) as folder:
             if clouds is None:
@@ -132,13 +132,13 @@ class ResultFiles:
             return self.write_beside(folder, written)
 
     def write_beside(self, folder: Path, clouds: object) -> dict:
-        """Write all but the clouds into a folder that is there, and return the document.
+        """Write everything except the clouds into an existing folder, and return the document.
 
         Parameters
         ----------
         folder : Path
         clouds : object
-            What the document says of the clouds.
+            Information on the clouds for the document.
         """
         tables = {}
         for name, write in self.tables.items():
@@ -158,32 +158,32 @@ class ResultFiles:
 
 
 class KnownResult(Summary):
-    """Dataclasses of a result whose document is known before anything is written."""
+    """Base of results whose document is known before anything is written."""
 
     _name: ClassVar[str]  # of the document
 
     @cached_property
     def document(self) -> dict:
-        """The JSON document, made once."""
+        """JSON document, made only once."""
         return document(self._name, self._content())
 
     def _content(self) -> dict:
-        """The document without its schema."""
+        """Return the document without its schema."""
         raise NotImplementedError
 
     def _files(self) -> ResultFiles:
-        """All that ``write`` writes."""
+        """Return the files for ``write``."""
         raise NotImplementedError
 
     def write(self, out: str | Path, overwrite: bool = False) -> dict:
-        """Write the document as JSON, and the tables, pictures and pages beside it, into a folder.
+        """Write the document as JSON, with tables, pictures and pages, into a folder.
 
         Parameters
         ----------
         out : path
-            The folder, which appears whole or not at all.
+            Folder, written atomically.
         overwrite : bool
-            Whether files of the same name are replaced.
+            True to replace files of the same name.
 
         Returns
         -------
@@ -193,8 +193,8 @@ class KnownResult(Summary):
         Raises
         ------
         ValueError
-            When the folder holds an input, or holds anything without overwrite.
+            If the folder contains an input, or anything without overwrite.
         OSError
-            When writing fails.
+            If writing fails.
         """
         return self._files().write(out, overwrite)

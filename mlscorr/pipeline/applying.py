@@ -1,4 +1,4 @@
-"""``apply``: what was found wrong with clock, datum or mounting, taken out of the clouds."""
+"""``apply``: removal of known errors of clock, datum or mounting from the clouds."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ from mlscorr.wording import joined
 def apply(
     survey: Survey, effects: Iterable[Effect | FoundEffects] | Effect | FoundEffects
 ) -> AppliedSurvey:
-    """Take effects of known size out of a survey: clock offset, mounting, datum.
+    """Remove effects of known size from a survey: clock offset, mounting, datum.
 
     Parameters
     ----------
     survey : Survey
-        As recorded, with the effects in it.
+        Recorded survey, with the effects.
     effects : iterable of Effect or FoundEffects, or one
-        ``mlscorr.effects.make_effect`` makes them, ``read_effects`` reads what was found.
+        From ``mlscorr.effects.make_effect``, or from ``read_effects`` for the effects found.
 
     Returns
     -------
@@ -45,9 +45,8 @@ def apply(
     Raises
     ------
     ValueError
-        For what is no effect, effects that nothing can take out, those that were found in other
-        clouds, and for a mounting where there is none, or several, or where the clouds are not as
-        it puts them.
+        For invalid effects, effects that cannot be removed, effects found in other clouds, and a
+        mounting effect if there is no mounting, or several, or if the clouds do not match it.
 
     >>> import mlscorr, numpy as np, tempfile
     >>> from mlscorr.effects import make_effect
@@ -94,7 +93,7 @@ def apply(
             )
     correction = _correction(survey, effects)
     mounting = correction.corrected_mounting
-    if mounting is None or len(mounted) > 1:  # of several nobody knows how well it is known
+    if mounting is None or len(mounted) > 1:  # the accuracy of several together is unknown
         return AppliedSurvey(survey, effects, correction)
     mounting = replace(mounting, covariance=mounted[0].covariance)
     correction = replace(correction, corrected_mounting=mounting)
@@ -102,7 +101,7 @@ def apply(
 
 
 def _effects_together(given) -> list[FoundEffects]:
-    """One effect or a list of them, each by itself or as it was found; a ValueError for others."""
+    """List effects, each alone or as found; raises ValueError for other values."""
     is_list = isinstance(given, Iterable) and not isinstance(given, str)
     effects = tuple(given) if is_list else (given,)
     for effect in effects:
@@ -115,7 +114,7 @@ def _effects_together(given) -> list[FoundEffects]:
 
 
 def _correction(survey, effects):
-    """From the survey with the effects to that without."""
+    """Correction from the survey with the effects to that without."""
     recorded = survey.trajectory
     late = 0.0
     shift = np.zeros(3)
@@ -132,7 +131,7 @@ def _correction(survey, effects):
             shift[:2] += size
         else:
             shift[2] += size[0]
-    times = recorded.gps_time  # a stamp t of the scanner was t - late by the clock of the POS
+    times = recorded.gps_time  # a stamp t of the scanner was t - late in the POS clock
     known = recorded.segment(times - late) == recorded.segment(times)
     here = recorded.at(times[known])
     there = recorded.at(times[known] - late)
@@ -145,18 +144,18 @@ def _correction(survey, effects):
 
 @dataclass(frozen=True, repr=False)
 class AppliedSurvey(Summary):
-    """A survey without what was found wrong, and ``write``.
+    """Survey without the removed effects, and ``write``.
 
     Parameters
     ----------
     survey : Survey
-        As recorded.
+        Recorded survey.
     effects : tuple of Effect
-        That are taken out.
+        Removed effects.
     correction : Correction
-        Of trajectory and mounting.
+        Correction of trajectory and mounting.
     note : str
-        On what the sigmas of the mounting rest.
+        Origin of the sigmas of the mounting.
     """
 
     survey: Survey
@@ -167,24 +166,24 @@ class AppliedSurvey(Summary):
     def write(
         self, out: str | Path, overwrite: bool = False, progress: Callable | None = None
     ) -> dict:
-        """Write clouds, survey.toml, applied.json and, if it moves, trajectory.csv into a folder.
+        """Write clouds, survey.toml, applied.json and, if it changes, trajectory.csv into a folder.
 
         Parameters
         ----------
         out : path
-            The folder, which appears whole or not at all.
+            Folder, written atomically.
         overwrite : bool
         progress : function, optional
 
         Returns
         -------
         dict
-            The document of applied.json.
+            Document of applied.json.
 
         Raises
         ------
         ValueError, OSError
-            As ``CorrectedSurvey.write`` does.
+            See ``CorrectedSurvey.write``.
         """
         survey = self.survey
         by_time = [effect.name for effect in self.effects if effect.name not in DATUM]
@@ -198,7 +197,7 @@ class AppliedSurvey(Summary):
         return content
 
     def _files(self, out, by_time):
-        """trajectory.csv if it moves, survey.toml and applied.json."""
+        """Write trajectory.csv if it changes, survey.toml and applied.json."""
         survey = self.survey
         correction = self.correction
         mounting = correction.corrected_mounting
@@ -229,7 +228,7 @@ class AppliedSurvey(Summary):
         return ResultFiles("applied", survey.inputs, report, tables)
 
     def _warn(self, content, by_time):
-        """Warn of clouds that are torn now, and of a reference surface that stays."""
+        """Warn of clouds that are now torn, and of an unchanged reference surface."""
         survey = self.survey
         correction = self.correction
         left = sum(row["untouched"] for row in content["files"])

@@ -1,7 +1,7 @@
-"""Turning rate and origin of the beams of a line scanner, by its cloud alone.
+"""Rotation rate and origin of a line scanner's beams, from its cloud only.
 
-The points of a line scanner lie in one plane of the vehicle, and seen from the scanner their angle
-in it grows evenly with time. From anywhere else it does not.
+The points of a line scanner are in one plane of the vehicle, and their angle in it as seen from the
+scanner increases linearly with time. From any other position it does not.
 """
 
 from dataclasses import replace
@@ -14,14 +14,14 @@ from mlscorr.survey import CloudFile, PointCloud, Survey, Trajectory
 
 
 def with_beam_origin(survey: Survey, file: CloudFile) -> Survey:
-    """The survey of a file with the place of its scanner, where its beams show it.
+    """Return the survey of a file with the position of its scanner, if its beams show it.
 
     Parameters
     ----------
     survey : Survey
-        Of one scanner. It stays as it is where its mounting is given.
+        Of one scanner; unchanged if its mounting is given.
     file : CloudFile
-        Some runs of points are read of it.
+        Some runs of its points are read.
     """
     if survey.mounting is not None:
         return survey
@@ -38,20 +38,20 @@ def with_beam_origin(survey: Survey, file: CloudFile) -> Survey:
 
 
 def beam_origin(cloud: PointCloud, trajectory: Trajectory) -> np.ndarray | None:
-    """Where the beams of a line scanner that turns evenly come from, in body axes.
+    """Origin of the beams of a uniformly rotating line scanner, in body axes.
 
     Parameters
     ----------
     cloud : PointCloud
-        A run of points, in any order.
+        Run of points, in any order.
     trajectory : Trajectory
 
     Returns
     -------
     (3,) array or None
-        Right, forward, up from the navigation centre. None where the points lie in no plane, no
-        rate stands out or the beams don't meet in a point: a swinging mirror, several beams at
-        once, a narrow view. Units: m.
+        Right, forward, up from the navigation center. None if the points are not in a plane, no
+        rate is significant or the beams do not meet in a point: an oscillating mirror, several
+        beams, or a narrow view. Units: m.
     """
     beams = sampled_beams(cloud, trajectory)
     if beams is None:
@@ -63,7 +63,7 @@ def beam_origin(cloud: PointCloud, trajectory: Trajectory) -> np.ndarray | None:
 
 
 def _origin(time, place):
-    """The origin (3,) of beams that ended at places (n, 3) in body axes, or None. m."""
+    """Origin (3,) of beams that ended at positions (n, 3) in body axes, or None. m."""
     axes = np.linalg.svd(place - place.mean(axis=0), full_matrices=False)[2]
     across = place @ axes[2]
     offset = float(np.median(across))
@@ -80,10 +80,10 @@ def _origin(time, place):
 
 
 def _meeting_point(time, place, rate):
-    """The point (2,) from which places (n, 2) are seen under an angle that grows evenly. m.
+    """Point (2,) from which positions (n, 2) appear at an angle that increases linearly. m.
 
-    Least squares of the distances at which the beams pass by it, with the rate (rad/s) and the
-    angle at time zero; beams that pass far from it, as of moved things, weigh less.
+    Least squares of the distances of the beams from it, with the rate (rad/s) and the angle at time
+    zero; distant beams, such as of moving objects, have less weight.
     """
     phase = np.arctan2(place[:, 1], place[:, 0]) - rate * time
     state = np.array([0.0, 0.0, np.angle(np.mean(np.exp(1j * phase))), rate])
@@ -108,20 +108,20 @@ def _meeting_point(time, place, rate):
 
 
 def line_rate(cloud: PointCloud, trajectory: Trajectory) -> float | None:
-    """Turns a second of the beam about the vehicle's forward axis, where it turns evenly.
+    """Rotations per second of the beam about the vehicle's forward axis, if it is uniform.
 
-    The rate is that by which the angle of the beam, less what it turned, scatters least.
+    It is the rate that minimizes the scatter of the beam's angle minus its rotation.
 
     Parameters
     ----------
     cloud : PointCloud
-        A run of points with a pose, in any order.
+        Run of points with a pose, in any order.
     trajectory : Trajectory
 
     Returns
     -------
     float or None
-        None where no rate stands out: a swinging mirror, several beams at once, a narrow view.
+        None if no rate is significant: an oscillating mirror, several beams, or a narrow view.
         Units: 1/s.
     """
     beams = sampled_beams(cloud, trajectory)
@@ -137,7 +137,7 @@ def line_rate(cloud: PointCloud, trajectory: Trajectory) -> float | None:
 def sampled_beams(
     cloud: PointCloud, trajectory: Trajectory
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """Times (n,) from the first on and places (n, 3) in body axes of some points of a run.
+    """Times (n,) from the first one and positions (n, 3) in body axes of some points of a run.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def sampled_beams(
     Returns
     -------
     tuple of array, or None
-        None where too few of them have a pose. Units: s, m.
+        None if too few of them have a pose. Units: s, m.
     """
     some = cloud[np.abs(cloud.gps_time - np.median(cloud.gps_time)) < SETTINGS.turning_time / 2]
     some = some[:: max(1, len(some) // SETTINGS.turning_points)]
@@ -161,7 +161,7 @@ def sampled_beams(
 
 
 def turning_rate(time: np.ndarray, direction: np.ndarray) -> float | None:
-    """Turns a second that leave of directions the least scatter, where they turn evenly.
+    """Rotations per second that minimize the scatter of directions, if they rotate uniformly.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def turning_rate(time: np.ndarray, direction: np.ndarray) -> float | None:
     Returns
     -------
     float or None
-        Negative where they turn clockwise. Units: 1/s.
+        Negative for clockwise rotation. Units: 1/s.
     """
     length = float(np.ptp(time))
     if length < SETTINGS.turning_time / 10:
@@ -194,6 +194,8 @@ def turning_rate(time: np.ndarray, direction: np.ndarray) -> float | None:
 
 
 def _evenness(rates, time, *directions):
-    """Length (d, k) of the mean of directions (n,) left by each rate: 1 where it explains all."""
+    """Length (d, k) of the mean of directions (n,) after removal of each rate: 1 if it explains
+    all.
+    """
     turns = (np.exp(-2j * np.pi * rate * time) for rate in rates)
     return np.array([[abs(np.mean(each * turn)) for each in directions] for turn in turns]).T

@@ -1,4 +1,4 @@
-"""The blind check: surveys with sealed labels, answers to them, and the score."""
+"""Blind check: surveys with sealed labels, answers to them, and the score."""
 
 import hashlib
 import json
@@ -37,7 +37,7 @@ def make_blind(
 ) -> int:
     """Make the surveys of a blind check: OUT/cases, seals.json (public) and key.json (labels).
 
-    What was interrupted goes on where it stopped. Returns the number of cases that are there.
+    An interrupted run is continued. Returns the number of existing cases.
 
     Parameters
     ----------
@@ -45,18 +45,18 @@ def make_blind(
     cases : int
     seed : int
     workers : int
-        Processes: each wants a core and a gigabyte.
+        Number of processes: each needs a core and a gigabyte.
     mechanisms : Path, optional
-        File with mechanisms that no library knows; by default the half of the grammar that grades.
+        File with mechanisms outside the library; by default the half of the grammar for grading.
     progress : function, optional
         progress(title, total) returns a function of the number of cases just done.
     effects : Path, optional
-        Python file of a user's effects, which are registered already: they are drawn like others.
+        Python file of a user's effects, already registered: they are drawn like others.
 
     Raises
     ------
     ValueError
-        When OUT holds another check, or a case can't be made.
+        If OUT contains another check, or a case cannot be made.
     """
     out = Path(out)
     names = tuple(outside_mechanisms(mechanisms))
@@ -78,27 +78,27 @@ def make_blind(
 def run_blind(
     out: Path, workers: int, progress: Callable | None = None, effects: Path | None = None
 ) -> tuple[int, int]:
-    """Diagnose each survey of a blind check that has no answer yet: OUT/answers.
+    """Diagnose each survey of a blind check without an answer: OUT/answers.
 
-    Each diagnosis sees a copy of its survey's folder in a process of its own; the key can't be
-    read meanwhile.
+    Each diagnosis receives a copy of its survey's folder in a separate process; the key is not
+    readable meanwhile.
 
     Parameters
     ----------
     out : Path
     workers : int
     progress, effects
-        As in ``make_blind``.
+        See ``make_blind``.
 
     Returns
     -------
     answered, failed : int
-        Numbers of answers there, and of diagnoses that gave up.
+        Numbers of answers, and of failed diagnoses.
 
     Raises
     ------
     ValueError
-        When there are no cases, or a folder holds a truth or a key.
+        If there are no cases, or a folder contains a truth or a key.
     """
     out = Path(out)
     folders = sorted(path for path in (out / "cases").glob("*") if not path.name.startswith("."))
@@ -129,7 +129,7 @@ def score_blind(out: Path) -> dict:
     Raises
     ------
     ValueError
-        When a label or its key was changed after it was sealed, or nothing is answered yet.
+        If a label or its key was changed after sealing, or there are no answers yet.
     """
     out = Path(out)
     key = _read(out / "key.json")["labels"]
@@ -164,7 +164,7 @@ def _seal(sealed):
 
 
 def _opened(out, plan):
-    """The key of a check that was begun with this plan, or a new one."""
+    """Key of a check begun with this plan, or a new one."""
     path = out / "key.json"
     if path.exists():
         key = _read(path)
@@ -191,7 +191,7 @@ def _write_key(out, key):
 
 @contextmanager
 def _locked(path):
-    """No one but root can read a file meanwhile."""
+    """Make a file unreadable for everyone except root meanwhile."""
     path.chmod(0o000)
     try:
         yield
@@ -200,7 +200,7 @@ def _locked(path):
 
 
 def _check_blind(folder):
-    """Refuse a folder in which a diagnosis could read what it should find."""
+    """Refuse a folder in which a diagnosis could read its answer."""
     readable = sorted(p for name in SECRET for p in folder.rglob(name) if p.is_file())
     if readable:
         raise ValueError(
@@ -210,8 +210,8 @@ def _check_blind(folder):
 
 
 def _in_processes(jobs, workers, effects):
-    """Results of jobs (function, folder, ...) as (folder, result), in the order in which they
-    are done. A process is a fresh interpreter with one thread in BLAS.
+    """Yield results of jobs (function, folder, ...) as (folder, result), in order of
+    completion. A process is a fresh interpreter with one BLAS thread.
     """
     context = get_context("spawn")
     with ProcessPoolExecutor(workers, context, _begin, (effects,)) as pool:
@@ -223,7 +223,7 @@ def _in_processes(jobs, workers, effects):
 
 
 def _begin(effects):
-    """What a process does first."""
+    """Initialize a process."""
     threadpool_limits(1)
     if effects is not None:
         register_file(effects)
@@ -235,7 +235,7 @@ def _matched(survey):
 
 
 def _make(folder, case, entropy, mechanisms):
-    """Make a case in a process of its own, whole or not at all; its label."""
+    """Make a case in a separate process, atomically, and return its label."""
     warnings.simplefilter("ignore")
     with tempfile.TemporaryDirectory(prefix=".", dir=folder.parent) as place:
         made = Path(place) / folder.name
@@ -247,7 +247,7 @@ def _make(folder, case, entropy, mechanisms):
 
 
 def _diagnose(folder):
-    """Answer of the diagnosis, which is given a copy of the folder and nothing else."""
+    """Answer of the diagnosis, which receives only a copy of the folder."""
     from mlscorr.pipeline.diagnosis import diagnose
 
     warnings.simplefilter("ignore")

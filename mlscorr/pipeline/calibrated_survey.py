@@ -1,4 +1,4 @@
-"""What a calibration gives of one scanner, and its files."""
+"""Result of the calibration of one scanner, and its files."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 class CalibrationResult(Summary):
-    """What is written of a calibration, of one scanner or of those calibrated together.
+    """Files of a calibration, of one scanner or of several calibrated together.
 
     Parameters
     ----------
@@ -36,11 +36,11 @@ class CalibrationResult(Summary):
 
     @property
     def parts(self) -> dict[str, CalibratedSurvey]:
-        """The calibration of each scanner by its name."""
+        """Calibration of each scanner by its name."""
         raise NotImplementedError
 
     def report(self, with_drift: bool = False) -> dict[str, object]:
-        """The content of calibration.json."""
+        """Return the contents of calibration.json."""
         raise NotImplementedError
 
     def write(
@@ -56,24 +56,24 @@ class CalibrationResult(Summary):
         Parameters
         ----------
         out : path
-            The folder, which appears whole or not at all.
+            Folder, written atomically.
         with_drift : bool
-            Write the POS error that was estimated along with the mounting as trajectory.csv.
+            True to write the POS error estimated together with the mounting as trajectory.csv.
         clouds : bool
-            Write the clouds as the calibrated mounting (and trajectory) puts them; survey.toml
-            then names these.
+            True to write the clouds for the calibrated mounting (and trajectory); survey.toml then
+            names these.
         overwrite : bool
         progress : function, optional
 
         Returns
         -------
         dict
-            The document of calibration.json.
+            Document of calibration.json.
 
         Raises
         ------
         ValueError, OSError
-            As ``CorrectedSurvey.write`` does.
+            See ``CorrectedSurvey.write``.
         """
         survey = self.survey
 
@@ -88,7 +88,7 @@ class CalibrationResult(Summary):
         return files.write(out, overwrite, write_corrected if clouds else None)
 
     def _files(self, out, with_drift, clouds):
-        """trajectory.csv, survey.toml, calibration.json and its page."""
+        """Write trajectory.csv, survey.toml, calibration.json and its page."""
         from mlscorr.report import calibration_page
 
         survey = self.survey
@@ -97,7 +97,7 @@ class CalibrationResult(Summary):
         if clouds:
             names = [[written_name(file.path) for file in part.survey.clouds] for part in parts]
         tables = {}
-        if with_drift:  # the one of all
+        if with_drift:  # common to all
             drift = next(iter(parts)).calibration.drift
             tables["trajectory.csv"] = lambda path: write_trajectory_csv(path, drift.corrected)
         tables[FILE_NAME] = lambda path: write_survey_copy(
@@ -127,7 +127,7 @@ class CalibrationResult(Summary):
 
 @dataclass(frozen=True, repr=False)
 class CalibratedSurvey(CalibrationResult):
-    """A calibrated survey: the calibration, the targets, and ``write``.
+    """Calibrated survey: the calibration, the targets, and ``write``.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ class CalibratedSurvey(CalibrationResult):
     missing : list of TargetRow
         Surveyed points without an observation.
     warnings : tuple of str
-        Sentences on this scanner, and on what all share where it is the one.
+        Sentences on this scanner, and on common parts if it is the only one.
     """
 
     survey: Survey
@@ -149,12 +149,12 @@ class CalibratedSurvey(CalibrationResult):
 
     @property
     def parts(self) -> dict[str, CalibratedSurvey]:
-        """Itself alone, under no name."""
+        """The survey itself, under an empty name."""
         return {"": self}
 
     @property
     def components(self) -> list[dict]:
-        """Rows of what the recorded lever arm (m) and boresight (deg) lack, by component."""
+        """Rows of the corrections of lever arm (m) and boresight (deg), by component."""
         units = ["m"] * 3 + ["deg"] * 3
         scale = np.where(np.array(units) == "m", 1.0, np.degrees(1.0))
         columns = {"component": MOUNTING_COMPONENTS, "unit": units}
@@ -166,11 +166,11 @@ class CalibratedSurvey(CalibrationResult):
         return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
     def to_frame(self) -> pandas.DataFrame:
-        """The components as a data frame; pandas is needed for it."""
+        """Return the components as a data frame; requires pandas."""
         return rows_frame(self.components)
 
     def _overview(self):
-        """What a notebook shows."""
+        """Return the rows that a notebook shows."""
         rows = [("", "correction", "1 sigma", "", "")]
         for row in self.components:
             numbers = (f"{row[f'lsc_{name}']:.4f}" for name in ("correction", "sigma"))
@@ -182,12 +182,12 @@ class CalibratedSurvey(CalibrationResult):
         return [(f"{self.survey.name}: what the recorded mounting lacks",), *rows]
 
     def report(self, with_drift: bool = False) -> dict[str, object]:
-        """The content of calibration.json, of one scanner.
+        """Return the contents of calibration.json, for one scanner.
 
         Parameters
         ----------
         with_drift : bool
-            Whether with what the POS error beside the mounting explains.
+            True to include the POS error.
         """
         from mlscorr.report import calibration_screen
 
@@ -234,7 +234,7 @@ class CalibratedSurvey(CalibrationResult):
 
     @property
     def used(self) -> Matched:
-        """The control points that took part."""
+        """Control points used in the calibration."""
         return self.matched_control[self.calibration.used]
 
     def _statistics(self, role, correction):
@@ -247,7 +247,7 @@ class CalibratedSurvey(CalibrationResult):
 
 
 def _correction(calibration, with_drift):
-    """The Correction of the mounting, and of the trajectory too where the drift is wanted."""
+    """Correction of the mounting, and of the trajectory if the drift is included."""
     if with_drift:
         return calibration.correction_with_drift
     return calibration.correction()
@@ -269,7 +269,7 @@ def estimate_section(correction: np.ndarray, sigma: np.ndarray) -> dict[str, obj
 
 
 def _scanner_errors(errors):
-    """What ranges (m) and encoder (ratio) lack; None where nobody looked."""
+    """Corrections of ranges (m) and encoder (ratio); None if they were not estimated."""
     if errors is None:
         return None
     columns = {name: values.tolist() for name, values in vars(errors).items()}
@@ -281,7 +281,7 @@ def _scanner_errors(errors):
 
 
 def _parameters(weighed):
-    """The POS error's parameters on average, and the probability of each covariance family."""
+    """Averaged parameters of the POS error, and the probability of each covariance family."""
     names = {"position_scale": "drift_scale", "position_time": "drift_time"}
     names |= {name: name for name in ("attitude_scale", "attitude_time")}
     mean = {

@@ -51,31 +51,30 @@ def calibrate(
     progress: Callable | None = None,
     ties: bool | None = None,
 ) -> CalibratedSurvey | CalibratedScanners:
-    """Estimate what a survey's recorded mounting lacks by its targets, and what passes both saw.
+    """Estimate corrections of a survey's recorded mounting from targets and tie features.
 
     Parameters
     ----------
     survey : Survey
-        Where it has several scanners, one estimate has the mountings of all, and the POS error that
-        they share, by the targets of all and by what any two of them both saw.
+        With several scanners, all mountings and the common POS error are estimated together, from
+        the targets of all and from tie features between any two of them.
     rng : numpy.random.Generator, optional
         For the plane fit's random samples; the same seed each time by default.
     progress : function, optional
         ``progress(title, total)`` returns a function of the number of points just done.
     ties : bool, optional
-        Whether planes and poles that two passes, or scanners, both saw take part; where they do,
-        less than 3 control points, or none, are enough. What survey.toml says by default.
+        True to use planes and poles in overlaps of passes or scanners; fewer than 3 control points,
+        or none, then suffice. By default as stated in survey.toml.
 
     Returns
     -------
-    CalibratedSurvey, or CalibratedScanners where there are several
-        The check points take no part.
+    CalibratedSurvey, or CalibratedScanners for several
+        Check points are not used.
 
     Raises
     ------
     ValueError
-        Without a mounting, for clouds that are not as it puts them, and as
-        ``calibrate_together``.
+        If there is no mounting, or the clouds do not match it; see also ``calibrate_together``.
 
     >>> import mlscorr, numpy as np, tempfile, warnings
     >>> from mlscorr.simulate import Scenario, simulate
@@ -142,14 +141,16 @@ def calibrate(
 
 
 def _title(name):
-    """What stands before a sentence on a scanner, where there are several."""
+    """Prefix of a sentence on a scanner, if there are several."""
     if name:
         return f"Scanner {name}: "
     return ""
 
 
 def _numbered(survey: Survey, finding: MatchedTargets) -> Iterator[Matched]:
-    """The matched control points, then the check points, with the numbers of their scanners."""
+    """Yield the matched control points, then the check points, with the indices of their
+    scanners.
+    """
     of_pass = finding.scanners
     for matched in finding.matches.by_role(survey):
         scanner = [of_pass[number] for number in matched.observations.pass_number]
@@ -159,24 +160,24 @@ def _numbered(survey: Survey, finding: MatchedTargets) -> Iterator[Matched]:
 def calibrate_together(
     survey: Survey, control: Matched, features: TieFeatures | None, notes: Sequence[str] = ()
 ) -> Calibration:
-    """All mountings of a survey by matched control points, and by what was seen twice.
+    """Calibrate all mountings of a survey from matched control points and tie features.
 
     Parameters
     ----------
     survey : Survey
         With a mounting of each scanner.
     control : Matched
-        With the numbers of the scanners.
+        With the indices of the scanners.
     features : TieFeatures or None
-        None where ties are left out.
+        None without ties.
     notes : sequence of str
         Sentences on targets that were not found, for the error.
 
     Raises
     ------
     ValueError
-        Where a scanner saw less than 3 control points, or all of them at one time, and nothing that
-        was seen twice, or ties are not wanted.
+        If a scanner has fewer than 3 control points, or all of them at one time, and there are no
+        tie features, or ties are excluded.
     """
     faults = [control_fault(control, number) for number in range(len(survey.mountings))]
     if all(faults):
@@ -201,7 +202,7 @@ def calibrate_together(
 
 
 def _parts(survey, control, check, finding, calibration):
-    """CalibratedSurvey of each scanner by its name, with the sentences on it alone."""
+    """CalibratedSurvey of each scanner by its name, with its own sentences."""
     parts = {}
     of_pass = finding.scanners
     for number, (name, part) in enumerate(survey.by_scanner.items()):
@@ -228,15 +229,15 @@ def _parts(survey, control, check, finding, calibration):
 
 @dataclass(frozen=True, repr=False)
 class CalibratedScanners(CalibrationResult):
-    """A survey whose scanners were calibrated together, and ``write``.
+    """Survey whose scanners were calibrated together, and ``write``.
 
     Parameters
     ----------
     survey : Survey
     calibration : Calibration
-        Of all mountings, and of the POS error that the scanners share.
+        Calibration of all mountings, with the common POS error.
     by_scanner : dict
-        CalibratedSurvey by the scanner's name.
+        CalibratedSurvey by name of the scanner.
     """
 
     survey: Survey
@@ -245,16 +246,16 @@ class CalibratedScanners(CalibrationResult):
 
     @property
     def parts(self) -> dict[str, CalibratedSurvey]:
-        """Those of ``by_scanner``."""
+        """Calibrations of ``by_scanner``."""
         return self.by_scanner
 
     def report(self, with_drift: bool = False) -> dict[str, object]:
-        """The content of calibration.json: by scanner what it is of one, and what all share.
+        """Return the contents of calibration.json: by scanner, and common parts.
 
         Parameters
         ----------
         with_drift : bool
-            As of ``CalibratedSurvey.report``.
+            See ``CalibratedSurvey.report``.
         """
         from mlscorr.report import scanners_screen
 
@@ -277,7 +278,7 @@ class CalibratedScanners(CalibrationResult):
 
 
 def warn_of_scanners(survey: Survey) -> None:
-    """Warn where two cloud files were measured at the same time, as by two scanners.
+    """Warn if two cloud files were measured at the same time, as by two scanners.
 
     Parameters
     ----------

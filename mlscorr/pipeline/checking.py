@@ -1,4 +1,4 @@
-"""``check``: all that is wrong with a survey before it is corrected, and what that will take."""
+"""``check``: all faults of a survey before its correction, and the resources it needs."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -32,25 +32,25 @@ from mlscorr.survey import ControlPoints, Matched, Survey
 
 @dataclass(frozen=True)
 class CheckedSurvey:
-    """What a check of a survey says.
+    """Result of a check of a survey.
 
     Parameters
     ----------
     faults : tuple of Fault
-        What stops a correction, or makes it wrong.
+        Faults that stop a correction, or make it wrong.
     warnings : tuple of str
-        What may be wrong.
+        Possible faults.
     notes : tuple of str
-        What was worked out, and what was looked at.
+        Findings, and checked items.
     unchecked : tuple of str
-        What was not checked, and why.
+        Unchecked items, with reasons.
     is_searched : bool
-        Whether a control point was found and matched, as a correction needs one.
+        True if a control point was found and matched, as a correction requires.
     read, written, needed : tuple of Amount
-        Of a correction. Empty where a fault hides the survey.
+        Amounts for a correction; empty if a fault prevents reading.
     datum : tuple of DatumDifference
-        By what the control that was looked at differs from the cloud as a whole; the warnings hold
-        its sentences.
+        Overall differences of the checked control from the cloud; the warnings include its
+        sentences.
     """
 
     faults: tuple[Fault, ...]
@@ -65,15 +65,15 @@ class CheckedSurvey:
 
 
 def check(path: str | Path) -> CheckedSurvey:
-    """Check a survey in seconds: all of its faults at once, without correcting it.
+    """Check a survey in seconds: all faults at once, without correcting it.
 
-    Clouds are read by their headers, by times spread over them, and near some surveyed points. If
-    no control point is found there, they are read as a correction reads them.
+    Headers, sampled times and points near some surveyed points are read. If no control point is
+    found there, the clouds are read as in a correction.
 
     Parameters
     ----------
     path : path
-        survey.toml, or the folder that holds it.
+        survey.toml, or its folder.
 
     Returns
     -------
@@ -106,15 +106,15 @@ def check(path: str | Path) -> CheckedSurvey:
 
 
 def checked_survey(survey: Survey, faults: Faults, needs_control: bool = True) -> CheckedSurvey:
-    """What a check says of a survey that can be read.
+    """Check a survey that can be read.
 
     Parameters
     ----------
     survey : Survey
     faults : Faults
-        Those that are known; more are added.
+        Known faults; more are added.
     needs_control : bool
-        Whether nothing is corrected where no target is found.
+        True if nothing is corrected without a target.
     """
     for sentence in _crs_conflicts(survey):
         faults.warnings = [warning for warning in faults.warnings if warning != sentence]
@@ -131,7 +131,7 @@ def checked_survey(survey: Survey, faults: Faults, needs_control: bool = True) -
         )
         if is_explained:
             faults.add("data", sentence)
-        elif sentence:  # by a header, which may be wrong
+        elif sentence:  # from a header, which may be wrong
             faults.warn(sentence)
     with counted_noise() as noise:
         sample = faults.of("data", needs.sample_clouds, survey)
@@ -158,14 +158,14 @@ def checked_survey(survey: Survey, faults: Faults, needs_control: bool = True) -
 
 
 def _crs_conflicts(survey) -> Iterator[str]:
-    """A sentence on each file whose own CRS is another one."""
+    """Yield a sentence on each file with another CRS."""
     if survey.crs is not None:
         sentences = (crs_conflict(read_layout(path), survey.crs) for path in survey.cloud_paths)
         yield from filter(None, sentences)
 
 
 def _crs_hints(survey, layouts) -> Iterator[str]:
-    """A sentence where the files state a CRS and survey.toml does not."""
+    """Yield a sentence if the files state a CRS and survey.toml does not."""
     stated = stated_crs(layouts[0]) if survey.crs is None else None
     if stated is not None:
         code = crs_code(stated)
@@ -177,7 +177,7 @@ def _crs_hints(survey, layouts) -> Iterator[str]:
 
 
 def _placed_times(survey) -> tuple[int, list[str]]:
-    """Number of passes that times spread over the files lie in; sentences on those outside."""
+    """Number of passes that contain sampled times of the files; sentences on times outside."""
     placed = []
     outside = []
     for file in survey.clouds:
@@ -191,7 +191,7 @@ def _placed_times(survey) -> tuple[int, list[str]]:
 
 
 def _uncovered(survey, layouts) -> tuple[list[str], bool]:
-    """A sentence on surveyed points outside the boxes of all files; whether all control is."""
+    """Sentences on surveyed points outside the boxes of all files, and flag if all control is."""
     place = survey.surveyed.position[:, :2]
     covered = np.full(len(place), any(read_in_part(file.path) for file in survey.clouds))
     for layout in layouts:
@@ -209,10 +209,10 @@ def _uncovered(survey, layouts) -> tuple[list[str], bool]:
 def _looked(
     survey: Survey, faults: Faults, needs_control: bool, is_beside: bool
 ) -> tuple[QuickLook | None, Matched | None, bool, list[str], tuple[str, ...]]:
-    """Look for some targets.
+    """Search for some targets.
 
-    Gives what that shows, whether a control point was found, and sentences on what was found and
-    on what was not looked at.
+    Returns the quick look, whether a control point was found, and sentences on found and on
+    unchecked items.
     """
     if needs_control:
         faults.of("data", check_control, survey)
@@ -254,7 +254,7 @@ def _looked(
 def _found_notes(
     survey: Survey, points: ControlPoints, matched: Matched
 ) -> tuple[list[str], tuple[str, ...]]:
-    """Sentences on surveyed points that were found, and on those that were not looked at."""
+    """Sentences on found surveyed points, and on unchecked ones."""
     names = set(matched.name)
     lost = [name for name in points.name if name not in names]
     missing = f", not {', '.join(lost)}" if lost else ""

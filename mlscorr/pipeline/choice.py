@@ -1,4 +1,4 @@
-"""Which control and CRS are meant in a folder: one is taken, two are named."""
+"""Choice of control and CRS in a folder: a single one is taken, several are listed."""
 
 import warnings
 from collections.abc import Mapping
@@ -23,21 +23,21 @@ from mlscorr.survey import Trajectory
 def choose_control(
     roles: list[FileRole], trajectory: Trajectory | None, given: Mapping
 ) -> tuple[Path | None, ControlList | None, dict[Path, str]]:
-    """The control list near the trajectory, if there is one, and why others are not taken.
+    """Choose the control list near the trajectory, if any, with reasons against others.
 
     Parameters
     ----------
     roles : list of FileRole
-        Of lists of points, and of tables that are nothing else.
+        Roles of point lists, and of otherwise unknown tables.
     trajectory : Trajectory or None
-        None where it isn't known: then no list is far from it.
+        None if unknown: no list is then far from it.
     given : mapping
-        What is said under [control].
+        Given contents of [control].
 
     Raises
     ------
     ValueError
-        Where several may be meant, or the one can't be used as it is, or none is known to be one.
+        If several are possible, the only one is unusable, or none is certain.
     """
     points = {}
     problems = {}
@@ -79,7 +79,7 @@ def choose_control(
 
 
 def choose_crs(clouds: list[Cloud], drive: Drive, given: str | None) -> tuple[str | None, str]:
-    """The CRS of a folder and where it is from; None where nothing says it and nothing needs it.
+    """Choose the CRS of a folder, with its source; None if it is unknown and not needed.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def choose_crs(clouds: list[Cloud], drive: Drive, given: str | None) -> tuple[st
     Raises
     ------
     ValueError
-        Where clouds and trajectory disagree, or their CRS can't be used.
+        If clouds and trajectory disagree, or their CRS is unusable.
     """
     stated = [(cloud, stated_crs(cloud.layout)) for cloud in clouds]
     stated = [(cloud, crs) for cloud, crs in stated if crs is not None]

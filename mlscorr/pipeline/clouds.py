@@ -1,4 +1,4 @@
-"""Clouds as a correction puts them."""
+"""Corrected clouds."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def write_clouds(
     correction: Correcting | Mapping[str, Correcting],
     done: Callable[[int], object],
 ) -> list[tuple[Path, int, int]]:
-    """Write a survey's clouds into a folder, under their names, as LAZ what was no LAS.
+    """Write a survey's clouds into a folder, with their names, foreign formats as LAZ.
 
     Parameters
     ----------
@@ -28,12 +28,12 @@ def write_clouds(
     folder : Path
     correction : anything with ``apply(cloud) -> cloud``, or that of each scanner by its name
     done : function of a number of points
-        Is told how many were just written.
+        Called with the number of points just written.
 
     Returns
     -------
     list of (path, points, points outside the trajectory)
-        Scanner by scanner, but a file of several once; the last stay as they were.
+        Scanner by scanner, but a file of several only once; points outside are unchanged.
     """
     parts: dict[Path, list[CorrectedPart]] = {}
     for name, part in survey.by_scanner.items():
@@ -54,19 +54,19 @@ def write_clouds(
 
 @dataclass(frozen=True)
 class WrittenClouds:
-    """Corrected clouds, and how many of their points nothing holds or are noise.
+    """Corrected clouds, and numbers of unconstrained and of noise points.
 
     Parameters
     ----------
     files : tuple of (name, SHA-256, points)
     outside : int
-        Points outside the trajectory, which stayed as they were.
+        Unchanged points outside the trajectory.
     uncontrolled : int
-        Before the first or past the last control point.
+        Points before the first or past the last control point.
     extrapolated : int
-        In weak stretches.
+        Points in poorly constrained intervals.
     noise : int
-        Flagged as noise, and not measured.
+        Points flagged as noise, which are not used.
     """
 
     files: tuple[tuple[str, str, int], ...] = ()
@@ -76,7 +76,7 @@ class WrittenClouds:
     noise: int = 0
 
     def below(self, folder: str) -> WrittenClouds:
-        """The same, with names of files in a folder.
+        """Return the clouds with file names in a subfolder.
 
         Parameters
         ----------
@@ -87,7 +87,7 @@ class WrittenClouds:
 
     @classmethod
     def join(cls, parts: Iterable[WrittenClouds]) -> WrittenClouds:
-        """Those of some files together.
+        """Join the clouds of several files.
 
         Parameters
         ----------
@@ -105,16 +105,16 @@ class WrittenClouds:
 
 @dataclass(frozen=True)
 class MovedClouds:
-    """Clouds of a survey, how they are corrected, and what holds that.
+    """Clouds of a survey, their correction, and its constraints.
 
     Parameters
     ----------
     survey : Survey
     correction : Correction
     held : pair of (float, float) and Support
-        First and last control epoch (s), and what holds the correction along the drive.
+        First and last control epoch (s), and constraints of the correction along the drive.
     sample : function, optional
-        As of CorrectedPart.
+        See CorrectedPart.
     """
 
     survey: Survey
@@ -125,14 +125,14 @@ class MovedClouds:
     def parts(
         self, watch: Callable[[np.ndarray, np.ndarray], object], additions: Additions
     ) -> Iterator[CorrectedPart]:
-        """The points of each file and scanner.
+        """Yield the points of each file and scanner.
 
         Parameters
         ----------
         watch : function
-            As of CorrectedPart.
+            See CorrectedPart.
         additions : Additions
-            What the files get beside new places.
+            Additions to the files.
         """
         for part in self.survey.by_scanner.values():
             of_part = self.correction, part.scanner, part.mounting
@@ -147,21 +147,21 @@ def write_counted(
     done: Callable[[int], object],
     additions: Additions,
 ) -> list[WrittenClouds]:
-    """Write the clouds of drives, a file of several once, and count the points that nothing holds.
+    """Write the clouds of drives, each file once, and count unconstrained points.
 
     Parameters
     ----------
     drives : sequence of MovedClouds
-        One, or several that share files.
+        One drive, or several that share files.
     folder : Path
     done : function of a number of points
     additions : Additions
-        What the files get beside new places.
+        Additions to the files.
 
     Returns
     -------
     list of WrittenClouds
-        Of each drive, with the numbers of its own points.
+        Clouds of each drive, with the numbers of its own points.
     """
     counts = [np.zeros(3, int) for _ in drives]
     parts: dict[Path, list[tuple[int, CorrectedPart]]] = {}
@@ -184,7 +184,7 @@ def write_counted(
 
 
 def _counting(held, counts, done):
-    """A function of gps_time and noise that counts, and tells how many there were."""
+    """Function of gps_time and noise that counts points and reports progress."""
     (first, last), support = held
 
     def watch(times, is_noise):

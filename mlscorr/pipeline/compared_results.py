@@ -1,6 +1,6 @@
-"""``compare`` of two results: two runs, settings or releases side by side, number by number.
+"""``compare`` of two results: two runs, settings or releases, value by value.
 
-Both folders were written by ``correct``. Every difference is second - first.
+Both folders come from ``correct``. Every difference is second - first.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 SAME_TIME = 2e-6  # s; trajectory.csv rounds times to 1e-6 s
 SCHEMA = "mlscorr.report/1"
 SIDES = ("first", "second")
-VECTORS = ("surveyed", "observed", "before", "after")  # of a target's row that are compared
-SCORES = {  # parts of report.json with statistics, by what they are called here
+VECTORS = ("surveyed", "observed", "before", "after")  # compared fields of a target's row
+SCORES = {  # parts of report.json with statistics, by their names here
     "check": ("check", "after"),
     "control": ("control", "after"),
     "leave_one_out": ("control", "leave_one_out"),
@@ -48,15 +48,15 @@ FILE_LISTS = ("inputs", "files")  # of report.json
 
 @dataclass(frozen=True)
 class ResultFolder:
-    """A folder that ``correct`` wrote, as far as it is compared.
+    """Folder written by ``correct``, with the data to compare.
 
     Parameters
     ----------
     path : Path
     report : dict
-        The document of report.json.
+        Document of report.json.
     trajectory : Trajectory
-        The corrected one.
+        Corrected trajectory.
     """
 
     path: Path
@@ -65,13 +65,13 @@ class ResultFolder:
 
     @property
     def inputs(self) -> list[InputFile]:
-        """Files that were read of it."""
+        """Files read from it."""
         names = ("report.json", "trajectory.csv")
         return [input_file("result", self.path / name) for name in names]
 
 
 def is_result(path: str | Path) -> bool:
-    """Return True if a folder holds a report.json.
+    """True if a folder contains a report.json.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def is_result(path: str | Path) -> bool:
 
 
 def read_result(path: str | Path) -> ResultFolder:
-    """Read report and trajectory of a folder that ``correct`` wrote.
+    """Read report and trajectory of a folder written by ``correct``.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def read_result(path: str | Path) -> ResultFolder:
     Raises
     ------
     ValueError
-        When the folder is no result of ``correct``, or is damaged.
+        If the folder is not a result of ``correct``, or is damaged.
     """
     path = as_path(path)
     for name in ("report.json", "trajectory.csv"):
@@ -119,7 +119,7 @@ def read_result(path: str | Path) -> ResultFolder:
 
 
 def _no_result(path, name):
-    """Why a folder can't be compared, and the way out."""
+    """Error on a folder that cannot be compared, with the remedy."""
     if is_there(path / "project.json"):
         return (
             f"{path} holds the results of a project. Compare the folders of its drives one by one, "
@@ -133,7 +133,7 @@ def _no_result(path, name):
 
 @dataclass(frozen=True)
 class TrajectoryDifference:
-    """Second - first corrected trajectory at the epochs of the first that both cover.
+    """Second - first corrected trajectory, at the epochs of the first that both cover.
 
     Parameters
     ----------
@@ -142,13 +142,13 @@ class TrajectoryDifference:
     position : (n, 3) array
         E, N, H. Units: m.
     sigmas : pair of (n, 3) array or None
-        One sigma of E, N, H in the first and in the second. Units: m.
+        One sigma of E, N, H in both. Units: m.
     gaps : (k, 2) array
-        Of either trajectory. Units: s.
+        Gaps of either trajectory. Units: s.
     interpolated : int
-        Epochs without a partner in the second, which was interpolated there.
+        Number of epochs without a partner in the second, which was interpolated there.
     only : pair of int
-        Epochs of the first and of the second outside the other one.
+        Numbers of epochs of each outside the other one.
     """
 
     gps_time: np.ndarray
@@ -160,7 +160,7 @@ class TrajectoryDifference:
 
     @classmethod
     def of(cls, first: Trajectory, second: Trajectory) -> TrajectoryDifference:
-        """The difference of two trajectories; empty where they have no common time.
+        """Compute the difference of two trajectories; empty without common times.
 
         Parameters
         ----------
@@ -188,7 +188,7 @@ class TrajectoryDifference:
         return cls(time, difference, (own, sigma), _disjoint(gaps), interpolated, only)
 
     def document(self) -> dict[str, Any]:
-        """The section ``trajectory`` of compare_results.json."""
+        """Return the section ``trajectory`` of compare_results.json."""
         size = np.linalg.norm(self.position, axis=1)
         columns = [*self.position.T, size]
         return {
@@ -208,7 +208,7 @@ class TrajectoryDifference:
         }
 
     def _statistics(self, values):
-        """Median, RMS, and the largest with its sign and time."""
+        """Median, RMS, and largest value with its sign and time."""
         worst = int(np.abs(values).argmax())
         return {
             "median": float(np.median(values)),
@@ -219,7 +219,7 @@ class TrajectoryDifference:
 
 
 def _covered(gps_time, trajectory):
-    """Which times (n,) lie in a trajectory, within the rounding of its ends, and in no gap."""
+    """Flag (n,) of times within a trajectory, to the rounding of its ends, and outside its gaps."""
     start, end = trajectory.gps_time[[0, -1]]
     is_near = (gps_time >= start - SAME_TIME) & (gps_time <= end + SAME_TIME)
     inside = trajectory.segment(np.clip(gps_time, start, end)) >= 0
@@ -229,13 +229,13 @@ def _covered(gps_time, trajectory):
 
 
 def _nearest(epochs, gps_time):
-    """Number of the nearest of sorted epochs to each time."""
+    """Index of the sorted epoch nearest to each time."""
     right = np.clip(np.searchsorted(epochs, gps_time), 1, len(epochs) - 1)
     return right - (gps_time - epochs[right - 1] < epochs[right] - gps_time)
 
 
 def _disjoint(spans):
-    """Spans (k, 2) in order, those that overlap joined."""
+    """Sorted intervals (k, 2), with overlapping ones merged."""
     joined: list[list[float]] = []
     for start, end in sorted(map(tuple, spans)):
         if joined and start <= joined[-1][1]:
@@ -268,11 +268,11 @@ class ComparedResults(KnownResult):
 
     @cached_property
     def difference(self) -> TrajectoryDifference:
-        """The corrected trajectories over time."""
+        """Difference of the corrected trajectories over time."""
         return TrajectoryDifference.of(self.first.trajectory, self.second.trajectory)
 
     def _content(self):
-        """The document without its schema."""
+        """Return the document without its schema."""
         from mlscorr.report import results_screen
 
         reports = self.first.report, self.second.report
@@ -293,7 +293,7 @@ class ComparedResults(KnownResult):
         return results_screen(content) | content
 
     def to_frame(self) -> pandas.DataFrame:
-        """A row for each target and pass, worst first; pandas is needed for it."""
+        """Return a data frame with a row for each target and pass, worst first; requires pandas."""
         rows = []
         for row in self.document["targets"]:
             cells = {key: row[key] for key in ("name", "pass", "role", "gps_time", "change_3d")}
@@ -307,14 +307,14 @@ class ComparedResults(KnownResult):
         return rows_frame(rows)
 
     def plot(self) -> Figure:
-        """The difference of the corrected trajectories over time, E, N and H."""
+        """Plot the difference of the corrected trajectories over time, E, N and H."""
         from mlscorr.report import results_figure
 
         curves = self.difference
         return results_figure(curves.gps_time, curves.position, curves.sigmas, curves.gaps)
 
     def _overview(self):
-        """What terminal and notebook show."""
+        """Return the rows that terminal and notebook show."""
         rows = [(self.document["name"],)]
         rows += [(f"{side}: {self.document[side]['folder']}",) for side in SIDES]
         rows.append(("difference (mm)", "median", "RMS", "largest", "at (s)"))
@@ -329,7 +329,7 @@ class ComparedResults(KnownResult):
         return rows
 
     def _files(self):
-        """compare_results.json and its page."""
+        """Return compare_results.json and its page."""
         from mlscorr.report import write_results
 
         inputs = [*self.first.inputs, *self.second.inputs]
@@ -351,7 +351,7 @@ def compare_results(first: str | Path, second: str | Path) -> ComparedResults:
     Parameters
     ----------
     first, second : path
-        Folders that ``correct`` wrote, with report.json and trajectory.csv.
+        Folders written by ``correct``, with report.json and trajectory.csv.
 
     Returns
     -------
@@ -362,7 +362,7 @@ def compare_results(first: str | Path, second: str | Path) -> ComparedResults:
     Raises
     ------
     ValueError
-        For folders that are no result, and for results of different surveys: in different CRS,
+        If a folder is not a result, or results belong to different surveys: in different CRS,
         without a common time, or without a common target.
 
     >>> import mlscorr, numpy as np, tempfile
@@ -402,7 +402,7 @@ def compare_results(first: str | Path, second: str | Path) -> ComparedResults:
 
 
 def _check_crs(first, second):
-    """Refuse results whose coordinates have nothing to do with each other."""
+    """Refuse results with unrelated coordinates."""
     codes = first.report.get("crs"), second.report.get("crs")
     if None in codes or codes[0] == codes[1] or check_crs(codes[0]) == check_crs(codes[1]):
         return
@@ -413,7 +413,7 @@ def _check_crs(first, second):
 
 
 def _check_targets(first, second):
-    """Refuse results that both have targets, and none in common."""
+    """Refuse results that both have targets, but none in common."""
     names = [{row["name"] for row in result.report["targets"]} for result in (first, second)]
     if all(names) and not names[0] & names[1]:
         raise ValueError(
@@ -424,7 +424,7 @@ def _check_targets(first, second):
 
 
 def _about(result):
-    """Which result it is."""
+    """Identification of a result."""
     model = result.report["model"]
     return {
         "folder": str(result.path),
@@ -436,7 +436,7 @@ def _about(result):
 
 
 def _target_rows(first, second):
-    """A row for each target and pass of either result, the largest change of ``after`` first."""
+    """Make a row for each target and pass of either result, sorted by the change of ``after``."""
     rows = [_target_row(*pair) for pair in _pairs(first, second)]
     return sorted(rows, key=lambda row: (-(row["change_3d"] or 0.0), row["name"] or ""))
 
@@ -444,7 +444,7 @@ def _target_rows(first, second):
 def _pairs(
     first: Sequence[Mapping], second: Sequence[Mapping]
 ) -> Iterator[tuple[Mapping | None, Mapping | None]]:
-    """Rows of one target at one time in both results; None where one lacks it."""
+    """Yield rows of one target at one time in both results; None if missing in one."""
     others = defaultdict(list)
     for row in second:
         others[row["name"]].append(row)
@@ -455,7 +455,7 @@ def _pairs(
             yield row, others[row["name"]].pop(int(np.argmin(times)))
         else:
             singles.append(row)
-    for row in singles:  # seen in one result alone, which the other one lists as unseen
+    for row in singles:  # observed in one result only, listed as unobserved in the other
         rest = others[row["name"]]
         places = [i for i, other in enumerate(rest) if None in (row["gps_time"], other["gps_time"])]
         yield row, rest.pop(places[0]) if places else None
@@ -464,7 +464,7 @@ def _pairs(
 
 
 def _apart(row, other):
-    """Time between two rows of a target; zero where both were not observed. Units: s."""
+    """Time between two rows of a target; zero if both were not observed. Units: s."""
     times = row["gps_time"], other["gps_time"]
     if times == (None, None):
         return 0.0
@@ -474,7 +474,7 @@ def _apart(row, other):
 
 
 def _target_row(first, second):
-    """One row of ``targets`` in compare_results.json."""
+    """Make one row of ``targets`` in compare_results.json."""
     known = first or second
     sides = first or {}, second or {}
     row = {key: known.get(key) for key in ("name", "pass", "role", "gps_time")}
@@ -490,7 +490,7 @@ def _target_row(first, second):
 
 
 def _minus(first, second):
-    """Second - first (3,), None where either is not known."""
+    """Difference second - first (3,), None if either is unknown."""
     if not first or not second or None in (*first, *second):
         return None
     return (np.array(second) - np.array(first)).tolist()
@@ -516,7 +516,7 @@ def _scores(first, second):
 
 
 def _model(first, second):
-    """Order, covariance and use of ties of both, a row each."""
+    """Rows of order, covariance and use of ties of both."""
     flat = []
     for report in (first, second):
         model = report["model"]
@@ -529,7 +529,7 @@ def _model(first, second):
 
 
 def _rows(names, first, second):
-    """A row for each value of both, which says whether it differs."""
+    """Make a row for each value of both, with a flag of differences."""
     rows = []
     for name in names:
         values = first.get(name), second.get(name)
@@ -539,14 +539,14 @@ def _rows(names, first, second):
 
 
 def _is_same(first, second):
-    """Whether two values are equal, numbers up to their last digits."""
+    """True if two values are equal, numbers up to their last digits."""
     if isinstance(first, float) and isinstance(second, float):
         return bool(np.isclose(first, second, rtol=1e-9, atol=0.0))
     return first == second
 
 
 def _warnings(first, second):
-    """Warnings that one result has and the other has not."""
+    """Warnings of only one result."""
     lists = [report["model"].get("warnings") or [] for report in (first, second)]
     return {
         side: [text for text in own if text not in other]

@@ -1,4 +1,4 @@
-"""What a survey observed, against what is believed or what a simulator made of it, as rows."""
+"""Observations of a survey compared with assumptions or with simulated clouds, as rows."""
 
 import warnings
 from collections.abc import Callable, Iterable, Sequence
@@ -28,24 +28,24 @@ LINEAR = (
 
 @dataclass(frozen=True)
 class ComparedRows:
-    """Rows of a survey, check points among them.
+    """Rows of a survey, including check points.
 
     Parameters
     ----------
     rows : Rows
-        Less what the simulator has in it.
+        Minus the effects of the simulator.
     used : (m,) bool array
         False for those of check points.
     simulated : function of a tuple of Effect, or (m,) array
-        What they add to the rows in the simulator; or what its next run changed.
+        Change of the rows by these effects in the simulator, or by its next run.
     absence : Absence
     notes : tuple of str
     contrasts : tuple of Contrast
-        Of the channels beside geometry.
+        Contrasts of non-geometric channels.
     distances : tuple of DistributionDistance
-        Between the clouds, where there are simulated ones.
+        Distances between the clouds, if there are simulated ones.
     next_run : Statement
-        What to run once the simulator has the cause.
+        Command to run with the cause in the simulator.
     """
 
     rows: residuals.Rows
@@ -66,25 +66,25 @@ def compare_with_belief(
     rng: np.random.Generator,
     progress: Callable,
 ) -> ComparedRows:
-    """ComparedRows against what is believed; the simulator runs again on the survey's own pulses.
+    """Compare with assumptions; the simulator replays the survey's own pulses.
 
     Parameters
     ----------
     survey : Survey
     believed : Survey
-        With what the simulator believes.
+        With the simulator's assumptions.
     effects : tuple of Effect
-        That the simulator has.
+        Effects of the simulator.
     library : iterable of Effect classes
     rng : numpy.random.Generator
         For the simulator's noise, and replicas of the contrasts.
     progress : function
-        As of ``diagnose``.
+        See ``diagnose``.
 
     Raises
     ------
     ValueError
-        When there is too little to say anything.
+        If there are too few data.
     """
     pairing, rows, beams, absence, patches = _observed(survey, believed, library, progress)
     progress("Simulating the survey's own pulses")
@@ -92,14 +92,14 @@ def compare_with_belief(
     simulator = BeamSimulator(rows, believed, beams, effects, int(rng.integers(2**63)))
     used = np.arange(len(rows)) < len(pairing.rows)
     observed = without_effects(rows, believed, effects)
-    # how much is contrasted leaves the draws of the verdict alone
+    # so that contrasts do not change the random draws of the verdict
     contrasts = contrast.contrast_returns(believed, patches, _loss(effects), rng.spawn(1)[0])
     notes = (*pairing.notes, *noisy)
     return ComparedRows(observed, used, simulator.added, absence, notes, contrasts, (), NEXT_RUN)
 
 
 def _loss(effects):
-    """Share of returns that a simulator with these effects loses; None where it has no dropout."""
+    """Share of returns lost by a simulator with these effects; None without dropout."""
     lost = [effect.magnitude for effect in effects if effect.name == "dropout"]
     if lost:
         return 1.0 - float(np.prod(1.0 - np.array(lost)))
@@ -114,21 +114,21 @@ def compare_with_clouds(
     rng: np.random.Generator,
     progress: Callable,
 ) -> ComparedRows:
-    """ComparedRows against simulated clouds: those of the first folder.
+    """Compare with the simulated clouds of the first folder.
 
-    What a second folder's differ by is what the simulator's next run changed.
+    Differences of a second folder are changes of the simulator's next run.
 
     Parameters
     ----------
     survey, believed, library, rng, progress
-        As of compare_with_belief.
+        See compare_with_belief.
     folders : sequence of one or two Path
         Survey folders, folders of LAS or LAZ files, or such files.
 
     Raises
     ------
     ValueError
-        For clouds that can't be read or paired, or too little to say anything.
+        If clouds cannot be read or paired, or there are too few data.
     """
     opened = [simulated_survey(folder, believed) for folder in folders]
     sampler = contrast.SampleCollector(believed)
@@ -173,7 +173,7 @@ def compare_with_clouds(
 
 
 def _check_simulated(rows, folder):
-    """Refuse clouds that no simulator made."""
+    """Refuse clouds that are not simulated."""
     if not np.nan_to_num(rows.residual).any():
         raise ValueError(
             f"The clouds of {folder} are the survey's own: none of {len(rows)} differences is "
@@ -209,9 +209,9 @@ def _chunks_alone(collector):
 
 
 def _with_moved(finding: MatchedTargets, survey: Survey) -> MatchedTargets:
-    """The targets with observations of control points that stand elsewhere than was surveyed.
+    """Add observations of displaced control points to the targets.
 
-    Their misclosures are what target_outlier is known by. Check points stay as they were matched.
+    Their misclosures identify target_outlier. Matches of check points do not change.
     """
     moved = finding.matches.moved
     if moved is None:
@@ -224,10 +224,10 @@ def _with_moved(finding: MatchedTargets, survey: Survey) -> MatchedTargets:
 def _read(
     believed, progress, sampler=None
 ) -> tuple[MatchedTargets, residuals.Patches | None, Surroundings, tuple[str, ...]]:
-    """The MatchedTargets, Patches, Surroundings and notes.
+    """Read MatchedTargets, Patches, Surroundings and notes.
 
-    The clouds are read once: targets, patches, what lies about targets and, where there is a
-    SampleCollector, its sample are taken from each chunk as it comes.
+    The clouds are read once: targets, patches, surroundings of targets and, with a SampleCollector,
+    its sample are collected from each chunk.
     """
     collector = residuals.PatchCollector(believed)
     surroundings = Surroundings(believed)
@@ -243,9 +243,7 @@ def _read(
 def _observed(
     survey, believed, library, progress
 ) -> tuple[residuals.Pairing, residuals.Rows, Beams, residuals.Absence, residuals.Patches | None]:
-    """The Pairing, all its rows, check points last, the Beams on which they stand, the Absence, the
-    Patches.
-    """
+    """Pairing, all its rows with check points last, their Beams, the Absence, and the Patches."""
     finding, patches, surroundings, notes = _read(believed, progress)
     progress("Pairing targets and surfaces")
     absence = residuals.find_absence(believed, finding.matches)
@@ -261,7 +259,7 @@ def _observed(
 
 
 def _by_control(survey: Survey, matched: TargetObservations) -> Correction | None:
-    """The Correction by control points alone; None where none was matched."""
+    """Correction from control points only; None without matches."""
     control = matched[np.isin(np.array(matched.name, dtype=str), survey.control.name)]
     if len(control) == 0:
         return None

@@ -28,23 +28,23 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
-ROW_LISTS = ("warnings", "details")  # of a method's row: no numbers for a data frame
+ROW_LISTS = ("warnings", "details")  # of a method's row: not numeric
 
 
 @dataclass(frozen=True, repr=False)
 class ComparedSurvey(Summary):
-    """All methods' rows of compare.json, their corrections by name, and ``write``.
+    """Rows of compare.json for all methods, their corrections by name, and ``write``.
 
     Parameters
     ----------
     survey : Survey
     matched_control, matched_check : Matched
     rows : tuple of dict
-        As ``methods`` of compare.json has them.
+        Rows of ``methods`` in compare.json.
     corrections : dict
-        What has ``apply(cloud)``, by the methods' names.
+        Objects with ``apply(cloud)``, by name of the method.
     groups : int
-        How many times control points were left out, zero without cross-validation.
+        Number of cross-validation groups, zero without cross-validation.
     missing : list of TargetRow
         Surveyed points without an observation.
     """
@@ -58,7 +58,7 @@ class ComparedSurvey(Summary):
     missing: list[TargetRow] = field(default_factory=list)
 
     def row(self, name: str) -> dict:
-        """The row of one method."""
+        """Return the row of one method."""
         return next(row for row in self.rows if row["name"] == name)
 
     @property
@@ -72,7 +72,7 @@ class ComparedSurvey(Summary):
 
     @cached_property
     def document(self) -> dict:
-        """The document of compare.json, without the files."""
+        """Document of compare.json, without the files."""
         from mlscorr.report import comparison_screen
 
         content = {
@@ -91,18 +91,18 @@ class ComparedSurvey(Summary):
         return document("compare", comparison_screen(content, rows) | content)
 
     def to_frame(self) -> pandas.DataFrame:
-        """A row each method, with its statistics as a data frame; pandas is needed for it."""
+        """Return a data frame with a row of statistics for each method; requires pandas."""
         rows = ({k: v for k, v in row.items() if k not in ROW_LISTS} for row in self.rows)
         return rows_frame(rows)
 
     def plot(self) -> Figure:
-        """The RMSE of every method on each axis, the best at the top."""
+        """Plot the RMSE of every method on each axis, the best at the top."""
         from mlscorr.report import comparison_figure
 
         return comparison_figure(self.document)
 
     def _overview(self):
-        """What a notebook shows."""
+        """Return the rows that a notebook shows."""
         rows = []
         for row in self.rows:
             rmse = row[self.scored_by]["rmse"] or [np.nan] * 3
@@ -117,28 +117,28 @@ class ComparedSurvey(Summary):
         overwrite: bool = False,
         progress: Callable | None = None,
     ) -> dict:
-        """Write compare.json and compare.html, and the clouds as some methods correct them.
+        """Write compare.json and compare.html, and the clouds corrected by some methods.
 
         Parameters
         ----------
         out : path
-            The folder, which appears whole or not at all.
+            Folder, written atomically.
         clouds : sequence of str
-            Names of methods; each one's clouds go into a folder of its name.
+            Names of methods, each with a folder for its clouds.
 
         Returns
         -------
         dict
-            The document. Its ``files`` name what was written, with the points outside the
-            trajectory, which time-dependent methods leave as they were.
+            The document. Its ``files`` list the output, with the points outside the trajectory,
+            which time-dependent methods do not change.
 
         Raises
         ------
         ValueError
-            For a method that doesn't exist or wasn't determined, or when the folder holds an
-            input, or holds anything without overwrite.
+            If a method is unknown or undetermined, or the folder contains an input, or anything
+            without overwrite.
         OSError
-            When writing fails.
+            If writing fails.
         """
         from mlscorr.report import write_comparison
 
@@ -160,7 +160,7 @@ class ComparedSurvey(Summary):
         )
 
     def _write_clouds(self, folder, names, progress):
-        """Rows on the files that were written."""
+        """Write the clouds, and return rows on the files."""
         if names:
             done = progress("Writing the clouds", self.survey.points * len(names))
         else:
@@ -180,7 +180,7 @@ class ComparedSurvey(Summary):
 def compare(
     survey: Survey, rng: np.random.Generator | None = None, progress: Callable | None = None
 ) -> ComparedSurvey:
-    """Correct a survey by every method, each fitted to the same control points alone.
+    """Correct a survey by every method, each fitted only to the same control points.
 
     Parameters
     ----------
@@ -193,12 +193,12 @@ def compare(
     Returns
     -------
     ComparedSurvey
-        A method that the control points don't determine says why in its row.
+        The row of a method that the control points do not determine has the reason.
 
     Raises
     ------
     ValueError
-        When no target is found or matched, or no control point among them.
+        If no target is found or matched, or no control point among them.
 
     >>> import mlscorr, numpy as np, tempfile
     >>> from mlscorr.simulate import Scenario, simulate
@@ -254,7 +254,7 @@ def compare(
 
 
 def _row(method, observed, control, check):
-    """A method's row of compare.json, and its correction or None."""
+    """Row of a method in compare.json, and its correction or None."""
     with warnings.catch_warnings(record=True, action="always") as caught:
         correction, details, why, seconds = _fitted(method, observed, control)
     row = {
@@ -273,7 +273,7 @@ def _row(method, observed, control, check):
 
 
 def _fitted(method, observed, matched):
-    """Correction or None, details, why there is none, and seconds."""
+    """Correction or None, details, reason for None, and seconds."""
     start = perf_counter()
     try:
         correction, details = method.fit(observed, matched)
@@ -283,18 +283,18 @@ def _fitted(method, observed, matched):
 
 
 def _score(matched, correction):
-    """N and the statistics of the misclosures; None where there is no correction."""
+    """Number and statistics of the misclosures; None without a correction."""
     return _statistics(misclosures(matched, correction), correction is not None)
 
 
 def _statistics(residuals, determined):
-    """N and the statistics of residuals, None where they tell nothing."""
+    """Number and statistics of residuals, None if meaningless."""
     known = residuals if determined else residuals[:0]
     return {"n": len(residuals), **Statistics.of(known).document()}
 
 
 def _groups(control):
-    """Names of control points to leave out together: one by one, or five groups spread in time."""
+    """Names of control points to omit together: one by one, or five groups spread in time."""
     names = list(dict.fromkeys(control.name[i] for i in np.argsort(control.gps_time)))
     if len(names) <= SETTINGS.single_points:
         number = len(names)
@@ -306,14 +306,14 @@ def _groups(control):
 
 
 def _cross_validated(method, observed, control, groups, of_check, done):
-    """N and the statistics over all points: each control point as the others correct it, each
-    check point as all control points do. Without any group there is nothing to validate.
+    """Number and statistics over all points: each control point corrected by the others, each
+    check point by all control points. Without groups there is no validation.
     """
     parts = [of_check]
     why = None
     for group in groups:
         left_out = np.array([name in group for name in control.name])
-        with warnings.catch_warnings(action="ignore"):  # told of the fit to all control points
+        with warnings.catch_warnings(action="ignore"):  # reported for the fit to all control points
             correction, _, problem, _ = _fitted(method, observed, control[~left_out])
         done(1)
         if correction is None:

@@ -1,4 +1,4 @@
-"""Control without which a survey is not corrected; control and a mounting that were used before."""
+"""Checks of required control, and of control and a mounting that were used before."""
 
 from collections.abc import Iterator
 
@@ -17,7 +17,7 @@ def check_control(survey: Survey | ProjectParts) -> None:
     Raises
     ------
     ValueError
-        A SurveyFileError where no list of them is named.
+        A SurveyFileError if no list of them is given.
     """
     if len(survey.control) == len(survey.check) == 0:
         is_named = any(file.what == "control" for file in survey.inputs)
@@ -38,7 +38,7 @@ def check_control(survey: Survey | ProjectParts) -> None:
 
 
 def reuse_warnings(survey: Survey) -> Iterator[str]:
-    """Sentences on control points and on a mounting that corrected a survey before.
+    """Yield sentences on control points and a mounting used in an earlier correction.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def reuse_warnings(survey: Survey) -> Iterator[str]:
 
 
 def remounting_fault(survey: Survey) -> str:
-    """A sentence where clouds are as another mounting put them than is stated; else empty.
+    """Sentence if the clouds match another mounting than the stated one, otherwise empty.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a correction gives of a survey, and its files."""
+"""Result of a survey's correction, and its files."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ VERSION = version("mlscorr")
 
 @dataclass(frozen=True, repr=False)
 class CorrectedSurvey(Summary):
-    """A corrected survey: the estimate, the targets, the statistics, and ``write``.
+    """Corrected survey: the estimate, the targets, the statistics, and ``write``.
 
     Parameters
     ----------
@@ -66,17 +66,17 @@ class CorrectedSurvey(Summary):
     missing : list of TargetRow
         Surveyed points without an observation.
     fitted : dict
-        The targets by (pass number, gps_time), for their figures.
+        Targets by (pass number, gps_time), for their figures.
     warnings : tuple of str
-        On clouds and control, beside those of the estimate and of ``datum``.
+        On clouds and control, in addition to those of the estimate and of ``datum``.
     datum : tuple of DatumDifference
-        By what the control that was used differs from the cloud as a whole.
+        Overall differences of the used control from the cloud.
     excluded : Matched
-        Control points that the user keeps out.
+        Control points that the user excluded.
     exclusions : tuple of Exclusion
-        What the result gains or loses by each of them.
+        Effect of each of them on the result.
     pdf : bool
-        Whether ``write`` makes certificate.pdf where nothing else is asked for.
+        True if ``write`` makes certificate.pdf by default.
     """
 
     survey: Survey
@@ -93,17 +93,17 @@ class CorrectedSurvey(Summary):
 
     @property
     def trajectory(self) -> Trajectory:
-        """The corrected trajectory, with the sigmas after the estimate."""
+        """Corrected trajectory, with the sigmas after the estimate."""
         return self.estimate.correction.corrected
 
     @property
     def control(self) -> dict:
-        """What remains at the control points, as report.json has it."""
+        """Scores of the control points, as in report.json."""
         return self._control.document() | PointCounts.of(self.targets, "control").document()
 
     @property
     def check(self) -> dict:
-        """What remains at the check points, as report.json has it."""
+        """Scores of the check points, as in report.json."""
         return self._check.document() | PointCounts.of(self.targets, "check").document()
 
     @property
@@ -124,7 +124,7 @@ class CorrectedSurvey(Summary):
 
     @property
     def accuracy(self) -> dict[str, object]:
-        """Accuracy by ASPRS 2023, as report.json has it."""
+        """Accuracy by ASPRS 2023, as in report.json."""
         return accuracy(
             self.matched_check,
             self.matched_control,
@@ -133,17 +133,17 @@ class CorrectedSurvey(Summary):
         )
 
     def to_frame(self) -> pandas.DataFrame:
-        """The rows of targets.csv as a data frame; pandas is needed for it."""
+        """Return the rows of targets.csv as a data frame; requires pandas."""
         return rows_frame(row.document() for row in self.targets)
 
     def plot(self, name: str = "correction") -> Figure:
-        """A figure of the report.
+        """Draw a figure of the report.
 
         Parameters
         ----------
         name : str
-            ``correction`` over time, ``attitude``, ``map``, ``residuals``, or ``ties`` where
-            passes were tied.
+            ``correction`` over time, ``attitude``, ``map``, ``residuals``, or ``ties`` if there are
+            ties.
 
         Returns
         -------
@@ -153,7 +153,7 @@ class CorrectedSurvey(Summary):
         Raises
         ------
         ValueError
-            Where there is no such figure.
+            If there is no such figure.
         """
         from mlscorr.report import correction_figures, draw
 
@@ -163,25 +163,26 @@ class CorrectedSurvey(Summary):
     def to_open3d(
         self, origin: np.ndarray | None = None, color: str = "correction"
     ) -> dict[str, Any]:
-        """The corrected trajectory, the misclosures and the ties as lines about one origin.
+        """Convert trajectory, misclosures and ties to lines about one origin.
 
         Parameters
         ----------
         origin : (3,) array, optional
             A whole meter near the middle of the trajectory by default. Units: m.
         color : str
-            Of the trajectory: ``correction`` or ``sigma``, as of ``PosErrorEstimate.to_open3d``.
+            Color of the trajectory: ``correction`` or ``sigma``; see
+            ``PosErrorEstimate.to_open3d``.
 
         Returns
         -------
         dict
-            ``trajectory``, ``misclosures`` and, where passes were tied, ``ties``: each an
+            ``trajectory``, ``misclosures`` and, if there are any, ``ties``: each an
             open3d.t.geometry.LineSet.
 
         Raises
         ------
         ValueError
-            For another color.
+            If the color is unknown.
         """
         from mlscorr.report import correction_lines, misclosure_lines, tie_lines
 
@@ -196,7 +197,7 @@ class CorrectedSurvey(Summary):
         return lines
 
     def _overview(self):
-        """What a notebook shows."""
+        """Return the rows that a notebook shows."""
         rows = [("m", "", "n", "east", "north", "height", "3D")]
         for name, part in (("check points", self._check), ("control points", self._control)):
             states = {"before": part.before, "after": part.after, "left out": part.left_out}
@@ -225,43 +226,43 @@ class CorrectedSurvey(Summary):
         Parameters
         ----------
         out : path
-            The folder, which appears whole or not at all.
+            Folder, written atomically.
         overwrite : bool
-            Whether files of the same name are replaced.
+            True to replace files of the same name.
         progress : function, optional
         sigma : bool
-            Give each point the fields sigma_easting, sigma_northing and sigma_height.
+            True to add the fields sigma_easting, sigma_northing and sigma_height to each point.
         page : bool
-            Draw report.html and the pictures too, which takes longer than all else where the
-            survey is short.
+            True to make report.html and the pictures, which takes longest for a short survey.
         trajectories : sequence of str
             Further files for the corrected trajectory: NAME.sbet or NAME.out with its smrmsg,
             NAME.tum, NAME.gpkg or NAME.geojson.
         targets : sequence of str
             Further files for the surveyed points: NAME.gpkg or NAME.geojson.
         displacement : bool
-            Give each point the fields displacement_easting, displacement_northing and
+            True to add the fields displacement_easting, displacement_northing and
             displacement_height, corrected - recorded.
         provenance : bool
-            Name mlscorr as the generating software of each cloud, and give it a VLR (user id
-            mlscorr, record id 1) with version, settings, and the hash of the inputs. Without it all
-            but the coordinates stays as it was, byte for byte; so it is not the default.
+            True to name mlscorr as the generating software of each cloud, and to add a VLR (user ID
+            mlscorr, record ID 1) with version, settings, and the hash of the inputs. By default
+            everything except the coordinates is copied byte for byte.
         survey_toml : str, optional
-            Content of a survey.toml to write beside the results, where it was inferred.
+            Contents of an inferred survey.toml to write with the results.
         pdf : bool, optional
-            Write certificate.pdf, two A4 pages to sign, too; as ``correct`` was asked by default.
+            True to write certificate.pdf, two A4 pages to sign; by default as chosen in
+            ``correct``.
 
         Returns
         -------
         dict
-            The document of report.json.
+            Document of report.json.
 
         Raises
         ------
         ValueError
-            When the folder holds an input, or holds anything without overwrite.
+            If the folder contains an input, or anything without overwrite.
         OSError
-            When writing fails.
+            If writing fails.
         """
         check_exports(trajectories, self.survey.crs, is_read=True)
         check_target_exports(targets, self.survey.crs, is_read=True)
@@ -290,7 +291,7 @@ class CorrectedSurvey(Summary):
         return files.write(out, overwrite, clouds)
 
     def _provenance(self):
-        """Text of the VLR that names what corrected a cloud."""
+        """Text of the VLR that names the correcting program."""
         settings = {
             "order": self.estimate.order,
             "ties_used": (self.tie_section or {}).get("used", 0),
@@ -306,7 +307,7 @@ class CorrectedSurvey(Summary):
 
     @property
     def held(self) -> tuple[tuple[float, float], Support]:
-        """First and last control epoch (s), and what holds the correction along the drive."""
+        """First and last control epoch (s), and constraints of the correction along the drive."""
         if self.estimate.used.any():
             span = self.estimate.span
         else:
@@ -322,11 +323,11 @@ class CorrectedSurvey(Summary):
         trajectories: Sequence[str] = (),
         targets: Sequence[str] = (),
     ) -> dict:
-        """Write all but the clouds into a folder that is there, as ``write`` does."""
+        """Write everything except the clouds into an existing folder; see ``write``."""
         return self._files(progress, page, trajectories, targets).write_beside(folder, written)
 
     def _files(self, progress, page, trajectories, targets, sampler=None, certified=False):
-        """Trajectory, targets, weak stretches and report.json; report.html and the pictures."""
+        """Write trajectory, targets, weak intervals and report.json; report.html and pictures."""
         from mlscorr.report import first_screen
 
         survey = self.survey
@@ -371,7 +372,7 @@ class CorrectedSurvey(Summary):
         return ResultFiles("report", survey.inputs, report, tables)
 
     def _pages(self, report, progress, sampler):
-        """report.html and the folder of pictures."""
+        """Functions for report.html and the folder of pictures."""
         from mlscorr.report import correction_figures, view_cloud, write_pictures, write_report
 
         correction = self.estimate.correction
@@ -393,27 +394,27 @@ class CorrectedSurvey(Summary):
 
     @cached_property
     def next_control(self) -> tuple[NextControl, ...]:
-        """Where one more control point each would help most, the best first."""
+        """Best positions for one more control point each, sorted by benefit."""
         return place_control(self.estimate)
 
     @cached_property
     def tie_section(self) -> dict | None:
-        """What ties did, as report.json has it."""
+        """Effect of ties, as in report.json."""
         return tie_section(self.estimate)
 
     def point_sigma(self, survey: Survey | None = None) -> PointSigma:
-        """PointSigma of the corrected cloud: ``.at(xyz, gps_time)`` gives (n, 3) in m.
+        """Return the PointSigma of the corrected cloud: ``.at(xyz, gps_time)`` is (n, 3) in m.
 
         Parameters
         ----------
         survey : Survey, optional
-            One of ``survey.by_scanner``, where there are several scanners.
+            One of ``survey.by_scanner``, if there are several scanners.
         """
         survey = survey or self.survey
         return PointSigma.of(self.estimate.correction, survey.scanner, survey.mounting)
 
     def _report(self, folder, written, exports, targets, weak_names):
-        """The CorrectionReport, once all that it names stands in the folder."""
+        """CorrectionReport, after all files it names are in the folder."""
         from mlscorr.report import FileRow
 
         def described(what, path):
@@ -441,7 +442,7 @@ class CorrectedSurvey(Summary):
 
     @cached_property
     def _draft(self) -> CorrectionReport:
-        """What figures show of the correction: all but files, counts of points, next control."""
+        """Data of the correction for figures: all except files, counts of points, next control."""
         from mlscorr.report import CorrectionReport, Coverage, recorded_time, well_determined
 
         start, end = self.estimate.guards.longest_gap

@@ -1,6 +1,6 @@
 """``correct``: from a survey to corrected clouds, trajectory and report.
 
-It is its stages and nothing else: find targets, match them, estimate the POS error.
+It consists of its stages: find targets, match them, estimate the POS error.
 """
 
 from __future__ import annotations
@@ -55,34 +55,33 @@ def correct(
 ) -> CorrectedSurvey:
     """Find the targets of a survey and estimate the POS error from its control points.
 
-    Planes, poles and paint that two passes both saw hold the passes together, where there are any.
+    Planes, poles and paint in overlaps of passes are used as ties, if there are any.
 
     Parameters
     ----------
     survey : Survey
     order : int
-        Of the polynomial trend of the position error.
+        Order of the polynomial trend of the position error.
     rng : numpy.random.Generator, optional
         For the plane fit's random samples; the same seed each time by default.
     progress : function, optional
         ``progress(title, total)`` returns a function of the number of points just done.
     ties : str, optional
-        ``auto`` where passes overlap, ``off``, or ``only``: then no control point takes part, all
-        of them are check points, and the passes are brought together where the POS says they are.
-        What survey.toml says by default.
+        ``auto`` to use overlaps, ``off``, or ``only``: control points then become check points, and
+        the passes are aligned to the positions of the POS. By default as stated in survey.toml.
     pdf : bool
-        ``write`` of the result makes certificate.pdf, too, unless it is told otherwise.
+        True if ``write`` of the result makes certificate.pdf by default.
 
     Returns
     -------
     CorrectedSurvey
-        The check points take no part.
+        Check points are not used.
 
     Raises
     ------
     ValueError
-        When no target is found or matched, for another use of ties, an order that is none, and
-        where ties alone are asked for and there is none.
+        If no target is found or matched, the use of ties or the order is invalid, or only ties are
+        used and there are none.
 
     >>> import mlscorr, numpy as np, tempfile
     >>> from mlscorr.simulate import Scenario, simulate
@@ -116,7 +115,7 @@ def correct(
         pdf=pdf,
     )
     datum = (difference.sentence for difference in result.datum)
-    # those of the targets were given when they were matched
+    # those of the targets were reported with the matches
     own = (*control_warnings(survey, matches), *inclusion_warnings(survey, estimate))
     for sentence in (*own, *datum, *estimate.warnings):
         warnings.warn(sentence, stacklevel=2)
@@ -124,18 +123,18 @@ def correct(
 
 
 def tie_use(survey: Survey, ties: TieUse | None) -> TieUse:
-    """Use of ties that is asked for; what survey.toml states where nothing is.
+    """Use of ties, by default as stated in survey.toml.
 
     Parameters
     ----------
     survey : Survey
     ties : str or None
-        As of ``correct``.
+        See ``correct``.
 
     Raises
     ------
     ValueError
-        For another use than there is.
+        If the use is unknown.
     """
     if ties is None:
         if survey.use_ties:
@@ -148,7 +147,7 @@ def tie_use(survey: Survey, ties: TieUse | None) -> TieUse:
 
 
 def without_control(survey: Survey) -> Survey:
-    """The survey with all its surveyed points as check points.
+    """Return the survey with all its surveyed points as check points.
 
     Parameters
     ----------
@@ -164,7 +163,7 @@ def observe_survey(
     rng: np.random.Generator | None = None,
     progress: Callable | None = None,
 ) -> tuple[MatchedTargets, TieFeatures | None]:
-    """Read a survey's clouds once, for its targets and for the features that may tie its passes.
+    """Read a survey's clouds once, for its targets and for possible tie features.
 
     Parameters
     ----------
@@ -172,19 +171,19 @@ def observe_survey(
     ties : str
         ``only``: no control point is needed.
     rng, progress
-        As of ``find_targets``.
+        See ``find_targets``.
 
     Returns
     -------
     matches : MatchedTargets
-        With a control point at least, but where ties alone are asked for.
+        With at least one control point, unless only ties are used.
     features : TieFeatures or None
-        None where ties are off.
+        None if ties are off.
 
     Raises
     ------
     ValueError
-        When no target is found or matched, or no control point among them.
+        If no target is found or matched, or no control point among them.
     """
     if ties != "only":
         check_control(survey)
@@ -208,9 +207,9 @@ def corrected_fields(
     survey : Survey
     control, check : Matched
     matches : MatchedTargets
-        Of which these are.
+        Matches of these points.
     estimate : Estimate
-        By the control points.
+        Estimate from the control points.
     """
     used = control[estimate.used]
     return {
@@ -234,7 +233,7 @@ def corrected_fields(
 
 
 def control_warnings(survey: Survey, matches: MatchedTargets) -> tuple[str, ...]:
-    """Warnings on control points that no cloud covers, or that corrected the survey before.
+    """Warnings on control points without a cloud, or used in an earlier correction.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
-"""``diagnose``: where a survey and its simulation differ, why, and how far that can be mended.
+"""``diagnose``: differences of a survey from its simulation, causes, and closure of the gap.
 
-``--until-none`` adds effect after effect to the simulator, until nothing is left.
+``--until-none`` adds one effect after another to the simulator, until no gap remains.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
-STEPS = 6  # of the progress beside reading: the inference, closure, plan
+STEPS = 6  # of the progress besides reading: inference, closure, plan
 
 
 def diagnose(
@@ -61,14 +61,14 @@ def diagnose(
     simulated: Sequence[Path] = (),
     costs: Costs | None = None,
 ) -> DiagnosedSurvey:
-    """Find where a survey differs from its simulation, why, and how far the gap can be closed.
+    """Find differences of a survey from its simulation, their cause, and the closure of the gap.
 
     Parameters
     ----------
     survey : Survey
-        With surveyed targets, a reference surface, or planes that two passes share.
+        With surveyed targets, a reference surface, or planes in overlaps.
     simulator : Simulator, optional
-        What is believed already, as read_simulator reads it; what survey.toml says by default.
+        Assumptions, from read_simulator; by default those of survey.toml.
     library : iterable of Effect classes, optional
         Effects to consider; all known ones by default.
     rng : numpy.random.Generator, optional
@@ -76,18 +76,18 @@ def diagnose(
     progress : function, optional
         ``progress(title, total)`` returns a function of the number just done.
     simulated : sequence of Path
-        Clouds that a simulator of your own made of this survey: a survey folder, a folder of LAS
-        or LAZ files, or a file. The survey is compared with them instead of with what is believed;
-        effects of the simulator are in them already. Those of its next run, with the effect in it,
-        tell how far the gap shrinks.
+        Clouds of this survey from your own simulator: a survey folder, a folder of LAS or LAZ
+        files, or a file. The survey is compared with them instead of with the assumptions; they
+        already include effects of the simulator. Those of its next run, with the effect, show the
+        reduction of the gap.
     costs : Costs, optional
-        Of a false alarm, a miss and of unknown, beside a wrong name: they choose the label.
+        Costs of a false alarm, a miss and of unknown, relative to a wrong name, for the choice of
+        the label.
 
     Raises
     ------
     ValueError
-        When there is too little to say anything, or when a reference surface, the simulator or
-        the costs can't be used.
+        If there are too few data, or a reference surface, the simulator or the costs are unusable.
 
     >>> import mlscorr, numpy as np, tempfile
     >>> from mlscorr.simulate import Scenario, simulate
@@ -115,7 +115,7 @@ def diagnose(
     progress = progress or silent
     if simulator is None:
         simulator = beliefs_of(survey)
-    if simulated:  # the clouds show how noisy the simulator's scanner is
+    if simulated:  # the clouds show the noise of the simulator's scanner
         simulator = replace(simulator, scanner=replace(simulator.scanner, assumed=()))
     believed, effects = as_believed(survey, simulator)
     if simulated:
@@ -131,7 +131,7 @@ def diagnose(
     signs, left_out = signatures(observed, believed, library, rng)
     part = observed.select(used)
     signs_of_part = select(signs, observed, used)
-    # how the scale is found leaves the draws of the verdict alone
+    # so that the search for the scale does not change the random draws of the verdict
     scale = likely_scale(part, believed, signs_of_part, rng.spawn(1)[0])
     believed = replace(believed, pos=with_scale(believed.pos, scale, open_sigmas(believed)))
     step(1)
@@ -139,7 +139,7 @@ def diagnose(
     infer = partial(infer_causes, survey=believed, signatures=signs_of_part, absence=absence)
     inference = infer(part, errors, rng=rng, costs=costs)
     curved = curvature(part, believed, inference.cause.parts)
-    if np.sum(curved**2 / part.noise) > 1:  # what is less is no sigma, of all rows together
+    if np.sum(curved**2 / part.noise) > 1:  # less is not a sigma, for all rows together
         part = replace(part, residual=part.residual - curved)
         inference = infer(part, errors, rng=rng, costs=costs)
     step(2)
@@ -172,14 +172,14 @@ def diagnose(
 
 
 def _of_innovations(rows, errors, inference, rng):
-    """DistributionDistances of innovations from those of replicas, by channel of rows."""
+    """DistributionDistances of innovations from those of replicas, by channel."""
     where = inference.where
     replicas = contrast.replica_innovations(rows, errors, inference, rng)
     return contrast.innovation_distances(rows.channel[where.row], where.innovation, replicas, rng)
 
 
 def _looks_again(absence):
-    """What to measure where surveyed targets have no residual."""
+    """Advice on surveyed targets without a residual."""
     return [
         NextData(
             f"the stretch from {run.gps_time[0]:.1f} to {run.gps_time[-1]:.1f} s again, and its "
@@ -193,9 +193,9 @@ def _looks_again(absence):
 
 @dataclass(frozen=True, repr=False)
 class DiagnosedSurvey(KnownResult):
-    """A survey with its diagnosis: the document of gap.json, and ``write``.
+    """Survey with its diagnosis: the document of gap.json, and ``write``.
 
-    ``scale`` is that on the sigmas of the POS that nobody stated.
+    ``scale`` is the factor on unstated sigmas of the POS.
     """
 
     _name = "gap"
@@ -218,7 +218,7 @@ class DiagnosedSurvey(KnownResult):
 
     @property
     def _believed(self):
-        """The survey as it was diagnosed."""
+        """Survey as diagnosed."""
         believed, _ = as_believed(self.survey, self.simulator)
         pos = with_scale(believed.pos, self.scale, open_sigmas(believed))
         return replace(believed, pos=pos)
@@ -247,12 +247,12 @@ class DiagnosedSurvey(KnownResult):
 
     @property
     def _has_named_cause(self):
-        """Whether an effect is named, which a simulator may take."""
+        """True if the named cause is an effect that a simulator can apply."""
         return self.inference.verdict.label not in ("none", "unknown")
 
     @property
     def _further_advice(self):
-        """Statements on what to run next, and on the channels beside geometry."""
+        """Statements on the next run, and on non-geometric channels."""
         advice = []
         if self._has_named_cause:
             why = self._improvement[1]
@@ -266,12 +266,12 @@ class DiagnosedSurvey(KnownResult):
 
     @property
     def improved(self) -> Simulator:
-        """The Simulator with the cause in it; the same where there is none that it could take."""
+        """Simulator with the cause, or unchanged if it cannot apply it."""
         return self._improvement[0]
 
     @cached_property
     def _improvement(self):
-        """The Simulator with the cause in it, or the same and why it can't take that."""
+        """Simulator with the cause, or unchanged with the reason."""
         if not self._has_named_cause:
             return self.simulator, ""
         believed = self._believed
@@ -280,15 +280,17 @@ class DiagnosedSurvey(KnownResult):
             improved = with_cause(
                 replace(self.simulator, pos=believed.pos), self.survey, self.inference.cause
             )
-            if set(names) <= set(improved.pos.assumed):  # the next run finds their scale again
+            if set(names) <= set(improved.pos.assumed):  # the next run estimates their scale again
                 pos = with_scale(improved.pos, 1.0 / self.scale, names)
                 improved = replace(improved, pos=pos)
             return improved, ""
-        except ValueError as error:  # larger than any survey can have
+        except ValueError as error:  # larger than possible
             return self.simulator, str(error)
 
     def to_frame(self) -> pandas.DataFrame:
-        """A row each parameter of the causes, the best first; pandas is needed for it."""
+        """Return a data frame with a row per parameter of the causes, best first; requires
+        pandas.
+        """
         return rows_frame(
             {"effect": cause["effect"], "probability": cause["probability"], **parameter}
             for cause in self.document["causes"]
@@ -296,7 +298,7 @@ class DiagnosedSurvey(KnownResult):
         )
 
     def plot(self, name: str = "where") -> Figure:
-        """A figure of the page.
+        """Draw a figure of the page.
 
         Parameters
         ----------
@@ -307,7 +309,7 @@ class DiagnosedSurvey(KnownResult):
         Raises
         ------
         ValueError
-            Where there is no such figure, or nothing to show in it.
+            If there is no such figure, or it would be empty.
         """
         from mlscorr.report import draw
         from mlscorr.report.gap import diagnosis_figures
@@ -315,7 +317,7 @@ class DiagnosedSurvey(KnownResult):
         return draw(diagnosis_figures(self.document), name)
 
     def _overview(self):
-        """What a notebook shows."""
+        """Return the rows that a notebook shows."""
         content = self.document
         sentences = [content["verdict"]["sentence"], content["headline"], *content["advice"]]
         return [(sentence,) for sentence in (self.survey.name, *sentences)]
@@ -325,15 +327,15 @@ class DiagnosedSurvey(KnownResult):
 
 
 def gap_files(content: dict, survey: Survey, simulator: Simulator) -> ResultFiles:
-    """gap.json, gap.html and simulator.toml.
+    """Make the files gap.json, gap.html and simulator.toml.
 
     Parameters
     ----------
     content : dict
-        The document of gap.json.
+        Document of gap.json.
     survey : Survey
     simulator : Simulator
-        With what was found.
+        With the cause.
     """
     from mlscorr.report.gap import diagnosis_page
 
@@ -348,14 +350,14 @@ def gap_files(content: dict, survey: Survey, simulator: Simulator) -> ResultFile
 
 @dataclass(frozen=True, repr=False)
 class DiagnosedRounds(KnownResult):
-    """Diagnoses of one survey, each with what those before it found in the simulator.
+    """Diagnoses of one survey, each with the earlier causes in the simulator.
 
     Parameters
     ----------
     rounds : tuple of DiagnosedSurvey
         At least one.
     lone : tuple of LoneEffect
-        Each effect by itself, in the first round.
+        Each single effect, in the first round.
     """
 
     _name = "gap"
@@ -364,7 +366,7 @@ class DiagnosedRounds(KnownResult):
 
     @property
     def ended(self) -> str:
-        """Why it ended, in a sentence."""
+        """Reason for the end, in a sentence."""
         label = self.rounds[-1].inference.verdict.label
         number = len(self.rounds)
         named = [lowered(title(each.inference.verdict.label)) for each in self.rounds[:-1]]
@@ -394,16 +396,16 @@ class DiagnosedRounds(KnownResult):
 
     @cached_property
     def _first(self):
-        """The first round, which needs no advice to run once more: that was done."""
+        """First round, without the advice to run again, which was done."""
         return replace(self.rounds[0], next_run=None)
 
     def _files(self):
-        """gap.json and gap.html of the first round, and the last simulator.toml."""
+        """Files gap.json and gap.html of the first round, and the last simulator.toml."""
         return gap_files(self.document, self._first.survey, self.rounds[-1].improved)
 
 
 def _round_document(number, diagnosed):
-    """What a round found, and the gap with it; none after what no simulator can take."""
+    """Result of a round, and the gap with it; none if no simulator can apply it."""
     cause = diagnosed.inference.cause
     closure = diagnosed.closure
     content = cause_document(diagnosed.rows, cause)
@@ -412,7 +414,7 @@ def _round_document(number, diagnosed):
     gap = {name: getattr(closure, name) for name in kept}
     if closure.is_within_noise:
         gap["shrink"] = None
-    if closure.effect != label:  # that of the nearest known effect, which was not put in
+    if closure.effect != label:  # that of the nearest known effect, which was not added
         gap |= {"after": None, "shrink": None}
     windows = windows_document(cause, diagnosed.survey)
     return {"round": number, "label": label} | content | gap | {"windows": windows}
@@ -421,23 +423,23 @@ def _round_document(number, diagnosed):
 def diagnose_until_none(
     survey: Survey, simulator: Simulator | None, progress: Callable | None, costs: Costs | None
 ) -> DiagnosedRounds:
-    """Diagnose, put what was named into the simulator, and again, until nothing is left.
+    """Diagnose, add the named cause to the simulator, and repeat until no gap remains.
 
     Parameters
     ----------
     survey, simulator, progress, costs
-        As of ``diagnose``.
+        See ``diagnose``.
 
     Raises
     ------
     ValueError
-        As ``diagnose`` does.
+        See ``diagnose``.
     """
     rounds = [diagnose(survey, simulator, progress=progress, costs=costs)]
     while len(rounds) < SETTINGS.diagnosis_rounds:
         last = rounds[-1]
         improved = rounds[-1].improved
-        if improved is last.simulator:  # nothing is left, or nothing that a simulator can take
+        if improved is last.simulator:  # nothing remains, or nothing that a simulator can apply
             break
         rounds.append(diagnose(survey, improved, progress=progress, costs=costs))
     first = rounds[0]

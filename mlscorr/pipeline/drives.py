@@ -1,4 +1,4 @@
-"""Which clouds and which trajectory are meant in a folder: one is taken, two are named."""
+"""Choice of clouds and trajectory in a folder: a single one is taken, several are listed."""
 
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -28,12 +28,12 @@ from mlscorr.io.trajectories import (
 )
 from mlscorr.survey import CloudFile, Pos, Trajectory
 
-WORLD = ("EPSG:3857", "EPSG:6933")  # project all places: latitudes come out in two ways
+WORLD = ("EPSG:3857", "EPSG:6933")  # project the whole world: latitudes differ between them
 
 
 @dataclass(frozen=True)
 class Cloud:
-    """A cloud file by its header.
+    """Cloud file described by its header.
 
     Parameters
     ----------
@@ -44,32 +44,32 @@ class Cloud:
 
     @property
     def name(self) -> str:
-        """Of the file."""
+        """Name of the file."""
         return self.layout.cloud.name
 
     @cached_property
     def records(self) -> np.ndarray:
-        """Points spread over the file; as spread_records."""
+        """Points spread over the file; see spread_records."""
         return spread_records(self.layout)[1]
 
     @property
     def times(self) -> np.ndarray:
-        """Times spread over the file, without an offset of its own. Units: s."""
+        """Times spread over the file, without the file's own offset. Units: s."""
         return self.records["gps_time"] + self.layout.time_offset
 
     @property
     def known_times(self) -> np.ndarray:
-        """Those of points that have a time. Units: s."""
+        """Times of points that have one. Units: s."""
         return self.times[~lacks_time(self.records["gps_time"])]
 
     @property
     def takes_turns(self) -> bool:
-        """Whether ids of points come again and again, not one after the other as of strips."""
+        """True if IDs of points alternate, instead of following each other as for strips."""
         ids = self.records["point_source_id"][np.argsort(self.times, kind="stable")]
         return bool(np.count_nonzero(np.diff(ids)) > 2 * (len(np.unique(ids)) - 1))
 
     def file(self, match: TimeMatch | None = None) -> CloudFile:
-        """Its CloudFile, with what makes its times those of the trajectory."""
+        """Return its CloudFile, with the conversion to the trajectory's times."""
         file = CloudFile(self.layout.cloud, self.layout.points, self.layout.time_offset, "")
         if match is None:
             return file
@@ -77,7 +77,7 @@ class Cloud:
         return replace(file, time_constant=constant, new_week=match.new_week)
 
     def match(self, trajectory: Trajectory, setting: str = "auto") -> TimeMatch:
-        """How its times become those of a trajectory; as match_times."""
+        """Match its times with those of a trajectory; see match_times."""
         offset = self.layout.time_offset
         is_standard = self.layout.is_standard
         return match_times(self.name, self.times, is_standard, trajectory, setting, offset)
@@ -85,17 +85,17 @@ class Cloud:
 
 @dataclass(frozen=True)
 class Drive:
-    """A trajectory that covers the clouds of a folder, in one file or in one of each session.
+    """Trajectory that covers the clouds of a folder, in one file or one per session.
 
     Parameters
     ----------
     paths : tuple of Path
     section : TrajectorySection
-        What is said of each.
+        Section of each.
     recorded : Sessions
-        In the first of WORLD where it needs a CRS.
+        In the first of WORLD if it needs a CRS.
     lack : str
-        The sentence of its reader where it needs a CRS.
+        Message of its reader if it needs a CRS.
     is_geographic : bool
     """
 
@@ -107,11 +107,11 @@ class Drive:
 
     @property
     def name(self) -> str:
-        """Of its files."""
+        """Names of its files."""
         return ", ".join(path.name for path in self.paths)
 
     def read(self, crs: str | None, accuracy: Mapping[Path, Path] | None = None) -> Trajectory:
-        """The trajectory in a CRS, each file with its accuracy."""
+        """Read the trajectory in a CRS, each file with its accuracy."""
         if not self.lack:
             return self.recorded.trajectory
         files = [SessionFile(p, (accuracy or {}).get(p), self.section) for p in self.paths]
@@ -124,14 +124,14 @@ class Drive:
 
     @property
     def layout(self) -> tuple[object, ...]:
-        """What files of one export have in common."""
+        """Common properties of the files of one export."""
         if self.lack:
             return self.recorded.is_sbet, self.is_geographic, self.paths[0].suffix.lower()
         return tuple(text.replace(self.name, "") for text in self.recorded.layouts)
 
     @property
     def zone(self) -> str:
-        """EPSG code of the UTM zone of a geographic one."""
+        """EPSG code of the UTM zone of a geographic trajectory."""
         place = np.median(self.recorded.trajectory.position[:, :2], axis=0)
         to_degrees = Transformer.from_crs(WORLD[0], "EPSG:4326", always_xy=True)
         longitude, latitude = to_degrees.transform(*place)
@@ -141,20 +141,20 @@ class Drive:
 def choose_trajectory(
     roles: list[FileRole], clouds: list[Cloud], given: Mapping
 ) -> tuple[Drive, dict[Path, str]]:
-    """The trajectory that covers the clouds in time, and why others are not taken.
+    """Choose the trajectory that covers the clouds in time, with reasons against others.
 
     Parameters
     ----------
     roles : list of FileRole
-        Of files that may be trajectories, and of tables that are nothing else.
+        Roles of possible trajectories, and of otherwise unknown tables.
     clouds : list of Cloud
     given : mapping
-        What is said under [trajectory].
+        Given contents of [trajectory].
 
     Raises
     ------
     ValueError
-        Where none can be read and covers the clouds, and where several do.
+        If no readable one covers the clouds, or several do.
     """
     drives = {}
     readable = {}
@@ -162,7 +162,7 @@ def choose_trajectory(
     places: list[OpenPlace] = []
     for path in [role.path for role in roles if role.role == "trajectory"]:
         try:
-            with warnings.catch_warnings(action="ignore"):  # said when the survey is read
+            with warnings.catch_warnings(action="ignore"):  # reported when the survey is read
                 readable[path] = _read_drive(path, given)
                 for cloud in clouds:
                     cloud.match(readable[path].recorded.trajectory)
@@ -183,7 +183,7 @@ def choose_trajectory(
 
 
 def _overlaps(drives):
-    """A sentence where two trajectories that don't cover the clouds overlap in time."""
+    """Sentence on two incomplete trajectories that overlap in time."""
     drives = sorted(drives, key=lambda drive: drive.span[0])
     for first, second in pairwise(drives):
         if (end := min(first.span[1], second.span[1])) >= second.span[0]:
@@ -195,18 +195,18 @@ def _overlaps(drives):
 
 
 def join_drives(drives: list[Drive], clouds: list[Cloud]) -> Iterator[Drive]:
-    """Trajectories of one export that follow each other, and cover the clouds together only.
+    """Yield trajectories of one export in sequence that cover the clouds only together.
 
     Parameters
     ----------
     drives : list of Drive
-        Of one file each.
+        Each with one file.
     clouds : list of Cloud
 
     Yields
     ------
     Drive
-        Of two files or more.
+        With two files or more.
     """
     for layout in dict.fromkeys(drive.layout for drive in drives):
         group = sorted((d for d in drives if d.layout == layout), key=lambda d: d.span[0])
@@ -228,7 +228,7 @@ def join_drives(drives: list[Drive], clouds: list[Cloud]) -> Iterator[Drive]:
 
 
 def _joined(drives):
-    """One Drive of several that don't overlap."""
+    """Drive of several that do not overlap."""
     names = [drive.name for drive in drives]
     parts = [drive.recorded.trajectory for drive in drives]
     check_systems(names, parts)
@@ -239,7 +239,7 @@ def _joined(drives):
 
 
 def _no_trajectory(roles):
-    """A sentence on what would be a trajectory, and on the tables that might."""
+    """Sentence on requirements for a trajectory, and on candidate tables."""
     tables = [f"{role.path.name} ({role.reason})" for role in roles if role.role == "table"]
     hint = (
         f" If it is {' or '.join(tables)}, say so, as --set 'trajectory.file = ...' and "
@@ -253,7 +253,7 @@ def _no_trajectory(roles):
 
 
 def _read_drive(path, given):
-    """Drive of a file. Raises ValueError as its reader."""
+    """Drive of a file. Raises ValueError like its reader."""
     section = TrajectorySection.model_validate({**given, "file": path.name})
     try:
         return Drive((path,), section, read_sessions([SessionFile(path, None, section)]))
@@ -269,16 +269,16 @@ def _read_drive(path, given):
 def ambiguous(
     what: str, candidates: Mapping[Path, str], clouds: Sequence[Cloud] = ()
 ) -> OpenQuestion:
-    """The question which of several files is meant.
+    """Question on which of several files is meant.
 
     Parameters
     ----------
     what : str
-        The role.
+        Role of the file.
     candidates : mapping
-        Files to what is known of each.
+        Files with the information on each.
     clouds : sequence of Cloud
-        That they cover.
+        Clouds covered by them.
     """
     if clouds:
         fit = f", which cover the {len(clouds)} cloud files alike"
@@ -294,19 +294,19 @@ def ambiguous(
 
 
 def choose_accuracy(roles: Iterable[FileRole], drive: Drive, crs: str | None) -> dict[Path, Path]:
-    """The accuracy file of each SBET or POF that has one.
+    """Choose the accuracy file of each SBET or POF that has one.
 
     Parameters
     ----------
     roles : iterable of FileRole
-        Of files that may be one.
+        Roles of candidates.
     drive : Drive
     crs : str or None
 
     Raises
     ------
     ValueError
-        Where several fit.
+        If several fit.
     """
     roles = [*roles]
     chosen = {}

@@ -1,4 +1,4 @@
-"""From matched targets to the POS error, and what remains at them: stages of ``correct``."""
+"""From matched targets to the POS error and residuals: stages of ``correct``."""
 
 from __future__ import annotations
 
@@ -47,15 +47,15 @@ LEFT_OUT = (
 
 
 class PosErrorEstimate(Estimate):
-    """The POS error over time, as control points and ties tell it.
+    """POS error over time, from control points and ties.
 
-    ``correction`` moves points, ``left_out`` is what remains at each control observation once its
-    target takes no part, ``tests`` and ``outliers`` say which targets the others contradict,
-    ``parameters`` are those of the most probable covariance function, ``warnings`` what to mind.
+    ``correction`` moves points, ``left_out`` has the leave-one-out residuals of control, ``tests``
+    and ``outliers`` show targets that the others contradict, ``parameters`` are those of the most
+    probable covariance function, and ``warnings`` are sentences.
     """
 
     def to_frame(self) -> pandas.DataFrame:
-        """A row for each epoch: what is added to the pose, with sigmas; pandas is needed for it.
+        """Return a data frame with a row per epoch: pose corrections with sigmas; requires pandas.
 
         Positions in m, angles in degrees.
         """
@@ -73,21 +73,21 @@ class PosErrorEstimate(Estimate):
         )
 
     def plot(self) -> Figure:
-        """The correction of the position over time, with its sigma."""
+        """Plot the position correction over time, with its sigma."""
         from mlscorr.report import pos_error_figure
 
         return pos_error_figure(self)
 
     def to_open3d(self, origin: np.ndarray | None = None, color: str = "correction") -> Any:
-        """The corrected trajectory as lines, broken at its gaps.
+        """Convert the corrected trajectory to lines, broken at its gaps.
 
         Parameters
         ----------
         origin : (3,) array, optional
-            As of ``PointCloud.to_open3d``.
+            See ``PointCloud.to_open3d``.
         color : str
             ``correction`` by its 3D length, or ``sigma`` by the 3D sigma after the estimate. The
-            values are the attribute of that name of the lines, in m.
+            lines have an attribute of that name with the values, in m.
 
         Returns
         -------
@@ -96,14 +96,14 @@ class PosErrorEstimate(Estimate):
         Raises
         ------
         ValueError
-            For another color.
+            If the color is unknown.
         """
         from mlscorr.report import correction_lines
 
         return correction_lines(self.correction, origin, color)
 
     def _overview(self):
-        """The size of the correction, its sigma, what it rests on."""
+        """Return size and sigma of the correction, and the observations used."""
         corrected = self.correction.corrected
         length = np.linalg.norm(corrected.position - self.correction.recorded.position, axis=1)
         sigma = np.linalg.norm(corrected.position_sigma, axis=1)
@@ -136,13 +136,13 @@ def estimate_pos_error(
     ----------
     survey : Survey
     matches : MatchedTargets
-        Check points among them take no part.
+        Check points among them are not used.
     ties : TiedSurvey or TieFeatures, optional
-        What ``find_ties`` gives, or the ``features`` of ``find_targets(..., with_ties=True)``.
+        From ``find_ties``, or the ``features`` of ``find_targets(..., with_ties=True)``.
     order : int
-        Of the polynomial trend of the position error.
+        Order of the polynomial trend of the position error.
     progress : function, optional
-        ``progress(title)`` is called when a stage begins.
+        ``progress(title)`` is called at the start of a stage.
 
     Returns
     -------
@@ -151,7 +151,7 @@ def estimate_pos_error(
     Raises
     ------
     ValueError
-        Without a control point and without ties, and for an order that is none.
+        If there are neither control points nor ties, or the order is invalid.
 
     >>> import mlscorr, numpy as np, tempfile
     >>> from mlscorr.simulate import Scenario, simulate
@@ -182,7 +182,7 @@ def estimate_pos_error(
     return PosErrorEstimate(**vars(estimate))
 
 
-@threadpool_limits.wrap(limits=1, user_api="blas")  # more threads, other last digits
+@threadpool_limits.wrap(limits=1, user_api="blas")  # more threads change the last digits
 def estimate_together(
     survey: Survey,
     control: Matched,
@@ -190,19 +190,19 @@ def estimate_together(
     order: int,
     progress: Callable | None = None,
 ) -> Estimate:
-    """The POS error by matched control points, and by what two passes both saw.
+    """Estimate the POS error from matched control points and tie features.
 
     Parameters
     ----------
     survey : Survey
     control : Matched
-        Without any, ties alone bring passes together where the POS says that they are.
+        Without any, ties align the passes to the positions of the POS.
     features : TieFeatures or None
-        None where ties are left out.
+        None without ties.
     order : int
-        Of the trend.
+        Order of the trend.
     progress : function, optional
-        As of ``estimate_pos_error``.
+        See ``estimate_pos_error``.
     """
     stage = progress or silent
     stage("Estimating the POS error")
@@ -219,17 +219,17 @@ def estimate_together(
     stage("Tying passes")
     estimate = tie_passes(survey, estimate, features)
     _log_ties(estimate)
-    wrong = ()  # of mountings, where the ties tell of it
+    wrong = ()  # mountings that the ties contradict
     if estimate.adjustment.unknowns:
         wrong = tuple(scanner_warnings(estimate, list(survey.by_scanner)))
-    if not wrong and None not in survey.mountings:  # all of them may be wrong alike
+    if not wrong and None not in survey.mountings:  # all of them may have the same error
         error = find_mounting_error(estimate, control, survey.mountings)
         wrong = mounting_warnings(error, len(survey.mountings))
     return replace(estimate, notes=(*estimate.notes, *wrong))
 
 
 def _log_estimate(estimate):
-    """Log the parameters, what was used, and which control points the others contradict."""
+    """Log the parameters, the observations used, and contradicted control points."""
     LOG.info(
         "POS error estimated by %d of %d control observations, trend of order %d, sigma0 %.2f",
         int(estimate.used.sum()),
@@ -255,7 +255,7 @@ def _log_estimate(estimate):
 
 
 def _log_ties(estimate):
-    """Log how many ties there are, or why there are none."""
+    """Log the number of ties, or the reason why there are none."""
     if estimate.ties is None:
         LOG.info("no ties: %s", estimate.untied)
         return
@@ -264,12 +264,12 @@ def _log_ties(estimate):
 
 
 def control_score(estimate: Estimate, control: Matched) -> Score:
-    """What remains at the control points; one that the others contradict scores nowhere.
+    """Score the control points, without contradicted ones.
 
     Parameters
     ----------
     estimate : Estimate
-        By these.
+        Estimate from these points.
     control : Matched
     """
     used = estimate.used
@@ -278,7 +278,7 @@ def control_score(estimate: Estimate, control: Matched) -> Score:
 
 
 def check_score(estimate: Estimate, check: Matched) -> Score:
-    """What remains at the check points, with the sigma to be expected.
+    """Score the check points, with the expected sigma.
 
     Parameters
     ----------
@@ -289,7 +289,7 @@ def check_score(estimate: Estimate, check: Matched) -> Score:
 
 
 def check_sigmas(estimate: Estimate, check: Matched) -> CheckSigmas | None:
-    """Test of the stated sigmas by the check points; None without any.
+    """Test the stated sigmas with the check points; None without any.
 
     Parameters
     ----------
@@ -303,21 +303,21 @@ def check_sigmas(estimate: Estimate, check: Matched) -> CheckSigmas | None:
 
 
 def _check_sigma(estimate, check):
-    """One sigma (n, 3) of residuals of check points: target, survey and correction. Units: m."""
+    """One sigma (n, 3) of check point residuals: target, survey and correction. Units: m."""
     there = estimate.correction.corrected.at(check.gps_time).position_sigma
     return np.sqrt(check.variance + there**2)
 
 
 @dataclass(frozen=True, repr=False)
 class Scores(Summary):
-    """What remains at surveyed points: RMSE of misclosures before and after the correction.
+    """Scores at surveyed points: RMSE of misclosures before and after the correction.
 
     ``scores.check.after.rmse`` are the five numbers E, N, H, horizontal and 3D, in m.
 
     Parameters
     ----------
     control, check : Score
-        ``before``, ``after``, and of control points ``left_out`` (leave-one-out).
+        ``before``, ``after``, and for control points ``left_out`` (leave-one-out).
     by_kind : mapping
         Score by (role, kind of target).
     """
@@ -327,7 +327,7 @@ class Scores(Summary):
     by_kind: Mapping[tuple[str, str], Score]
 
     def _rows(self):
-        """Role, kind, state and Statistics of all that is known."""
+        """Yield role, kind, state and Statistics of all known scores."""
         scores = {("control", "all"): self.control, ("check", "all"): self.check, **self.by_kind}
         for (role, kind), score_of in scores.items():
             states = {
@@ -340,20 +340,20 @@ class Scores(Summary):
                     yield role, kind, state, statistics
 
     def to_frame(self) -> pandas.DataFrame:
-        """A row for each role, kind of target and state; pandas is needed for it. Units: m."""
+        """Return a data frame with a row per role, kind of target and state; requires pandas. m."""
         return rows_frame(
             {"role": role, "kind": kind, "state": state, "n": statistics.n, **statistics.document()}
             for role, kind, state, statistics in self._rows()
         )
 
     def plot(self) -> Figure:
-        """RMSE before, after and leave-one-out, axis by axis."""
+        """Plot RMSE before, after and leave-one-out, axis by axis."""
         from mlscorr.report import score_figure
 
         return score_figure({"Control points": self.control, "Check points": self.check})
 
     def _overview(self):
-        """RMSE of each role; kinds where there are several."""
+        """Return the RMSE of each role, and of kinds if there are several."""
         has_kinds = len({kind for _, kind in self.by_kind}) > 1
         rows = [("RMSE (m)", "kind", "state", "n", "east", "north", "height", "3D")]
         for role, kind, state, statistics in self._rows():
@@ -364,23 +364,23 @@ class Scores(Summary):
 
 
 def score(estimate: Estimate, matches: MatchedTargets) -> Scores:
-    """Compare observed targets with their surveyed places, before and after a correction.
+    """Compare observed targets with their surveyed positions, before and after a correction.
 
     Parameters
     ----------
     estimate : Estimate
-        As ``estimate_pos_error`` gives it for these matches.
+        From ``estimate_pos_error`` for these matches.
     matches : MatchedTargets
 
     Returns
     -------
     Scores
-        By role, kind of target and component.
+        Scores by role, kind of target and component.
 
     Raises
     ------
     ValueError
-        When the estimate is of other control observations.
+        If the estimate belongs to other control observations.
 
     >>> import mlscorr, numpy as np, tempfile
     >>> from mlscorr.simulate import Scenario, simulate

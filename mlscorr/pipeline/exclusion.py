@@ -1,4 +1,4 @@
-"""Control points that the user keeps out of an estimate, or in it, and what that does."""
+"""Control points that the user excludes from or includes in an estimate, and the effect."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ EXCLUDED = Statement("not matched", values={"why": "excluded by the user"})
 
 @dataclass(frozen=True)
 class Exclusion:
-    """What an excluded control point would do to the result if it took part.
+    """Effect of an excluded control point on the result if it were used.
 
     Parameters
     ----------
     name : str
     residual : float
-        Length of its misclosure after the correction by the other points, the largest of all
-        passes. Units: m.
+        Length of its residual after the correction by the other points, the largest of all passes.
+        Units: m.
     by : str
-        What judges: ``check points``, or ``leave-one-out`` of the control points without any.
+        Basis: ``check points``, or ``leave-one-out`` of the control points without any.
     with_point, without_point : float
-        3D RMSE of those with the point in the estimate, and as it is. Units: m.
+        3D RMSE at these with and without the point in the estimate. Units: m.
     """
 
     name: str
@@ -51,18 +51,18 @@ class Exclusion:
         return self.statement.sentence(CHOICES)
 
     def document(self) -> dict[str, str | float]:
-        """The row of ``exclusions[]`` in report.json."""
+        """Return the row of ``exclusions[]`` in report.json."""
         return {**vars(self), "sentence": self.sentence}
 
 
 def excluded_rows(excluded: Matched, correction: Correction) -> list[TargetRow]:
-    """Rows of control points that are kept out; what remains of them is left out by nature.
+    """Rows of excluded control points, whose residuals are leave-one-out by nature.
 
     Parameters
     ----------
     excluded : Matched
     correction : Correction
-        By the other control points.
+        Correction from the other control points.
     """
     if len(excluded) == 0:
         return []
@@ -72,7 +72,7 @@ def excluded_rows(excluded: Matched, correction: Correction) -> list[TargetRow]:
 
 
 def marked_excluded(rows: list[TargetRow], survey: Survey) -> list[TargetRow]:
-    """Rows of points without an observation; of those that are kept out nobody misses one.
+    """Mark rows without an observation as excluded, so that they do not count as missing.
 
     Parameters
     ----------
@@ -93,20 +93,20 @@ def weighed_exclusions(
     estimate: Estimate,
     progress: Callable | None = None,
 ) -> tuple[Exclusion, ...]:
-    """What each excluded point would do to the result: the estimate is made again with it.
+    """Compute the effect of each excluded point by repeating the estimate with it.
 
     Parameters
     ----------
     survey : Survey
     matches : MatchedTargets
     features : TieFeatures or None
-        That the estimate used.
+        Features used in the estimate.
     order : int
-        Of its trend.
+        Order of its trend.
     estimate : Estimate
-        Without the points.
+        Estimate without the points.
     progress : function, optional
-        ``progress(title)`` is called when a stage begins.
+        ``progress(title)`` is called at the start of a stage.
     """
     excluded = matches.kept_out
     rows = []
@@ -128,7 +128,7 @@ def weighed_exclusions(
 
 
 def _judged(estimate, control, check, name):
-    """What judges an estimate, and its 3D RMSE (m); the point itself is no judge."""
+    """Basis of an estimate's score, and its 3D RMSE (m), without the point itself."""
     if len(check):
         return "check points", float(check_score(estimate, check).after.rmse[4])
     is_other = np.array(control.name, dtype=object) != name
@@ -138,7 +138,7 @@ def _judged(estimate, control, check, name):
 
 
 def inclusion_warnings(survey: Survey, estimate: Estimate) -> tuple[str, ...]:
-    """Sentences on points that are used as the user asks, and that the others contradict.
+    """Sentences on points used at the user's request but contradicted by the others.
 
     Parameters
     ----------

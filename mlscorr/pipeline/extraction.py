@@ -1,4 +1,4 @@
-"""``extract``: from a survey to the list of all target-like objects in its cloud."""
+"""``extract``: from a survey to a list of all target-like objects in its cloud."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
-BRIGHT_KINDS = ("circle", "square", "checkerboard")  # kinds that stand out without a surveyed place
+BRIGHT_KINDS = ("circle", "square", "checkerboard")  # kinds found without a surveyed position
 NO_CONTROL = "No control point is known: every object was taken as it looks."
 
 
@@ -39,9 +39,9 @@ def extract(
 ) -> ExtractedSurvey:
     """List all target-like objects in the cloud of a survey, with and without control.
 
-    Objects of the control points' kinds and sizes are found everywhere, near control points
-    also those that intensity does not tell; without control, circles, squares and checkerboards
-    of 0.1 to 1.5 m, with their sizes estimated.
+    Objects with the kinds and sizes of control points are found everywhere, near control points
+    also by edges without intensity. Without control, circles, squares and checkerboards of 0.1 to
+    1.5 m are found, with estimated sizes.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def extract(
     Returns
     -------
     ExtractedSurvey
-        Warns when the intensity tells nothing, or no object was found.
+        Warns if the intensity carries no information, or no object was found.
 
     >>> import mlscorr, numpy as np, tempfile
     >>> from mlscorr.simulate import Scenario, simulate
@@ -84,7 +84,7 @@ def extract(
     objects = {}
 
     def searched(file):
-        """The chunks of a file, each searched as it passes."""
+        """Yield the chunks of a file, each searched while it is read."""
         of_file = objects.setdefault(len(objects), [])
         own = with_beam_origin(survey.of(file), file)
         for chunk, targets in search_targets(read_chunks(file), own, shapes, rng):
@@ -107,7 +107,7 @@ def extract(
     for sentence in sentences:
         warnings.warn(sentence, stacklevel=2)
     if result and len(surveyed):
-        everything = replace(  # what is excluded from an estimate is a target all the same
+        everything = replace(  # a target excluded from an estimate is still a target
             survey, control=survey.control + survey.excluded, excluded=survey.control[[]]
         )
         finding = match_fitted(everything, result, near_control.candidates)
@@ -117,7 +117,7 @@ def extract(
 
 
 def _without_doubles(near, everywhere):
-    """Both lists together, in order of pass and time; near control, the surveyed size is known."""
+    """Both lists together, sorted by pass and time; near control, the surveyed size is known."""
     others = [
         (number, target)
         for number, target in everywhere
@@ -127,7 +127,7 @@ def _without_doubles(near, everywhere):
 
 
 def _sentences(survey, intensities, targets):
-    """What a reader of the list must know."""
+    """Sentences for a reader of the list."""
     sentences = []
     if why_useless(intensities) is not None:
         values = ", ".join(f"{value}" for value in intensities)
@@ -147,7 +147,7 @@ def _sentences(survey, intensities, targets):
 
 @dataclass(frozen=True, repr=False)
 class ExtractedSurvey(KnownResult):
-    """What was found in a survey's cloud, and ``write``.
+    """Objects found in a survey's cloud, and ``write``.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ class ExtractedSurvey(KnownResult):
 
     @property
     def targets(self) -> list[dict]:
-        """Rows of every object and pass, as targets.json has them, in order of pass and time."""
+        """Rows of every object and pass, as in targets.json, sorted by pass and time."""
         matches = self.finding.matches
         rows = self._rows(matches.matched, [None] * len(matches.matched))
         rows += self._rows(matches.unmatched, matches.reasons)
@@ -178,22 +178,24 @@ class ExtractedSurvey(KnownResult):
         ]
 
     def to_frame(self) -> pandas.DataFrame:
-        """A row each object and pass, as targets.json has them; pandas is needed for it."""
+        """Return a data frame with a row per object and pass, as in targets.json; requires
+        pandas.
+        """
         return rows_frame(self.targets)
 
     def plot(self) -> Figure:
-        """The objects one by one, each with the points on it and the outline that was fitted."""
+        """Draw the objects one by one, with the points on each and the fitted outline."""
         from mlscorr.report import targets_figure
 
         return targets_figure(self._fitted)
 
     def to_open3d(self, origin: np.ndarray | None = None, enlarged: float = 100.0) -> Any:
-        """Outlines of the objects, and about each center the ellipsoid of one sigma.
+        """Outlines of the objects, with an ellipsoid of one sigma around each center.
 
         Parameters
         ----------
         origin, enlarged
-            As of ``FoundTargets.to_open3d``.
+            See ``FoundTargets.to_open3d``.
 
         Returns
         -------
@@ -205,11 +207,11 @@ class ExtractedSurvey(KnownResult):
 
     @property
     def _fitted(self):
-        """(pass number, FittedTarget) of all objects."""
+        """Pairs (pass number, FittedTarget) of all objects."""
         return [(number, target) for (number, _), target in self.finding.fitted.items()]
 
     def _overview(self):
-        """What a notebook shows."""
+        """Return the rows that a notebook shows."""
         kinds = Counter(row["kind"] for row in self.targets)
         objects = ", ".join(f"{kind}: {number}" for kind, number in kinds.items())
         rows = [("objects", objects or "none"), ("unseen", len(self.missing))]
@@ -251,7 +253,7 @@ class ExtractedSurvey(KnownResult):
         }
 
     def _files(self):
-        """targets.csv, targets.json and the contact sheet targets.png."""
+        """Files targets.csv, targets.json and the contact sheet targets.png."""
         from mlscorr.report import write_contact_sheet
 
         rows = self.targets

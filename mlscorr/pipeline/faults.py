@@ -1,4 +1,4 @@
-"""All that is wrong with the files of a survey at once, where reading them stops at the first."""
+"""All faults of a survey's files at once, where reading would stop at the first."""
 
 import warnings
 from collections.abc import Callable
@@ -32,15 +32,15 @@ Place = Literal["survey.toml", "data", "system"]
 
 @dataclass(frozen=True)
 class Fault:
-    """What stops a correction.
+    """Fault that stops a correction.
 
     Parameters
     ----------
     where : str
-        In survey.toml (or in the names of files), in the data, or in the system that gives them.
+        In survey.toml (or in file names), in the data, or in the system.
     sentence : str
     number : int
-        Of the faults that the sentence names.
+        Number of faults in the sentence.
     """
 
     where: Place
@@ -50,7 +50,7 @@ class Fault:
 
 @dataclass
 class Faults:
-    """Faults and warnings, in the order in which they were met, each once.
+    """Faults and warnings, in order of occurrence, each once.
 
     Parameters
     ----------
@@ -62,15 +62,15 @@ class Faults:
     warnings: list[str] = field(default_factory=list)
 
     def of(self, where: Place, function: Callable, *arguments: object) -> Any:
-        """The result of a function, None where it meets a fault, which is kept.
+        """Call a function; return its result, or None for a fault, which is recorded.
 
         Parameters
         ----------
         where : str
-            Where a ValueError of the function is.
+            Location of a ValueError of the function.
         function : function
         *arguments
-            Its own.
+            Arguments of the function.
         """
         with warnings.catch_warnings(record=True, action="always") as caught:
             try:
@@ -79,7 +79,7 @@ class Faults:
                 if isinstance(error, SurveyFileError):
                     where = "survey.toml"
                 self.add(where, str(error), error.number if isinstance(error, ListError) else 1)
-            except OSError as error:  # survey.toml names a file that is not there, or ...
+            except OSError as error:  # survey.toml names a missing file, or ...
                 is_named = isinstance(error, FileNotFoundError) and error.errno is None
                 self.add("survey.toml" if is_named else "system", str(error))
             finally:
@@ -87,18 +87,18 @@ class Faults:
         return None
 
     def add(self, where: Place, sentence: str, number: int = 1) -> None:
-        """Keep a fault.
+        """Record a fault.
 
         Parameters
         ----------
         where, sentence, number
-            As of Fault.
+            See Fault.
         """
         if not any(sentence in fault.sentence for fault in self.faults):
             self.faults.append(Fault(where, sentence, number))
 
     def warn(self, *sentences: str) -> None:
-        """Keep warnings.
+        """Record warnings.
 
         Parameters
         ----------
@@ -110,14 +110,14 @@ class Faults:
 
 
 def find_faults(path: str | Path, faults: Faults) -> None:
-    """Find what is wrong with a survey by reading its files one by one, clouds by their headers.
+    """Find faults of a survey by reading its files one by one, clouds by their headers.
 
     Parameters
     ----------
     path : path
-        survey.toml, or the folder that holds it.
+        survey.toml, or its folder.
     faults : Faults
-        Are added to.
+        Collects the faults.
     """
     toml = faults.of("survey.toml", survey_toml, path)
     settings = toml and faults.of("survey.toml", read_toml, toml, SurveyFile, "it")
@@ -152,7 +152,7 @@ def find_faults(path: str | Path, faults: Faults) -> None:
 
 
 def _sessions(toml, settings, sessions, faults):
-    """The trajectory of all files, None where one can't be read, or they don't belong together."""
+    """Trajectory of all files, None if one is unreadable, or they do not belong together."""
     known = [session for session in sessions if session is not None]
     if known:
         faults.of("survey.toml", check_sessions, toml, known)
@@ -165,10 +165,10 @@ def _sessions(toml, settings, sessions, faults):
 
 
 def _control(path, section, trajectory: Trajectory | None, faults):
-    """Look at the control, and at how it lies to the trajectory."""
+    """Check the control, and its distance from the trajectory."""
     if path is None or not faults.of("data", holds_points, path):
         return
-    if trajectory is None:  # which tells X from Y in a list that does not
+    if trajectory is None:  # which determines X and Y in a list without names
         faults.of("data", _read_alone, path, section)
         return
     points = faults.of("data", read_control, path, section, trajectory)
@@ -177,13 +177,15 @@ def _control(path, section, trajectory: Trajectory | None, faults):
 
 
 def _read_alone(path, section):
-    """Read the control without a trajectory, which would tell which of X and Y is easting."""
+    """Read the control without a trajectory, which would determine which of X and Y is easting."""
     with suppress(AxesError):
         read_control(path, section)
 
 
 def _cloud(path, trajectory, settings, crs, faults):
-    """CloudFile of a path; None where it has a fault, or no trajectory tells its time system."""
+    """CloudFile of a path; None if it has a fault, or its time system is unknown without a
+    trajectory.
+    """
     layout = faults.of("data", read_layout, path)
     if layout is None:
         return None

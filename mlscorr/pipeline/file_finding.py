@@ -1,4 +1,4 @@
-"""What one cloud file holds of targets and ties, and the findings of several files as one."""
+"""Targets and ties in one cloud file, and merging of several files."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -20,21 +20,21 @@ from mlscorr.targets import NO_POINTS, Candidates, PassTarget, number_passes
 
 @dataclass(frozen=True)
 class FileFinding:
-    """What a cloud file holds.
+    """Findings in a cloud file.
 
     Parameters
     ----------
     starts : dict
-        When its points begin in each segment of the trajectory. Units: s.
+        Start of its points in each segment of the trajectory. Units: s.
     targets : list of (segment, FittedTarget)
     unplaced : PointCloud
         Points near surveyed points without a pose.
     scanned : frozenset of str
-        Names of the surveyed points that have points of it about them.
+        Names of the surveyed points with surrounding points of it.
     warnings, uncovered : tuple of str
-        On beams that can't have been measured so, and on points outside the trajectory.
+        On impossible beams, and on points outside the trajectory.
     features : TieFeatures
-        Planes and poles; the number of the pass is that of the segment.
+        Planes and poles; the pass number is that of the segment.
     seconds : (k,) int array
         Whole seconds of gps_time with points of it.
     """
@@ -50,16 +50,16 @@ class FileFinding:
 
 
 def find_in_file(survey: Survey, origin: np.ndarray, with_ties: bool = True) -> FileFinding:
-    """What the one cloud file of a survey holds.
+    """Find targets and ties in the single cloud file of a survey.
 
     Parameters
     ----------
     survey : Survey
-        With the surveyed points near the file at least.
+        With at least the surveyed points near the file.
     origin : (3,) array
-        Of the cells of planes and poles, the same for all files. Units: m.
+        Origin of the cells of planes and poles, the same for all files. Units: m.
     with_ties : bool
-        Whether planes and poles are looked for.
+        True to search for planes and poles.
     """
     collector = FeatureCollector(survey, origin=origin)
     if with_ties:
@@ -87,13 +87,13 @@ def find_in_file(survey: Survey, origin: np.ndarray, with_ties: bool = True) -> 
 def join_findings(
     survey: Survey, files: Sequence[FileFinding]
 ) -> tuple[MatchedTargets, TieFeatures]:
-    """The finding of a survey by those of its files, and all planes and poles with its passes.
+    """Merge the findings of a survey's files, and all planes and poles with its passes.
 
     Parameters
     ----------
     survey : Survey
     files : sequence of FileFinding
-        Of each of its clouds, in their order.
+        Findings of its clouds, in order.
     """
     starts = {
         (number, segment): start

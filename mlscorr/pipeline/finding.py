@@ -1,6 +1,6 @@
 """From cloud files to matched targets: read, fit, match.
 
-``find_targets`` and ``match_targets`` are stages of ``correct`` that a script may call by itself.
+``find_targets`` and ``match_targets`` are stages of ``correct`` that a script may call separately.
 """
 
 from __future__ import annotations
@@ -61,18 +61,18 @@ READING = "Reading the cloud and finding targets"  # stages
 MATCHING = "Matching targets with surveyed points"
 COLLECTING = "Collecting planes, poles and paint"
 LOG = logging.getLogger(__name__)
-SHOWN = 5  # refusals that an overview names: it fits a screen
+SHOWN = 5  # refusals listed in an overview: it fits a screen
 
 
 class RefusedTarget(NamedTuple):
-    """A surveyed point without an observation.
+    """Surveyed point without an observation.
 
     Attributes
     ----------
     name : str
-        Of the surveyed point.
+        Name of the surveyed point.
     reason : str
-        Why no target in the cloud has its name, in a sentence.
+        Reason why no target in the cloud has its name, in a sentence.
     """
 
     name: str
@@ -81,24 +81,24 @@ class RefusedTarget(NamedTuple):
 
 @dataclass(frozen=True, repr=False)
 class MatchedTargets(Summary):
-    """Targets of a survey with the names of the surveyed points that they are.
+    """Targets of a survey with the names of their surveyed points.
 
     Parameters
     ----------
     survey : Survey
     matches : Matches
     candidates : Candidates
-        The points on all targets, with their passes, and those without a pose.
+        Points on all targets, with their passes, and those without a pose.
     fitted : dict
         Each FittedTarget by (pass number, gps_time), for its figure.
     scanned : frozenset of str
-        Names of the surveyed points that have points of the cloud about them.
+        Names of the surveyed points with surrounding points of the cloud.
     warnings : tuple of str
-        On cloud files whose beams can't have been measured so.
+        On cloud files with impossible beams.
     uncovered : tuple of str
         On cloud files with points outside the trajectory.
     excluded : TargetObservations, optional
-        Of control points that the user keeps out of the estimate.
+        Observations of control points that the user excluded.
     """
 
     survey: Survey
@@ -115,7 +115,7 @@ class MatchedTargets(Summary):
 
     @property
     def matched(self) -> Matched:
-        """Observations with the surveyed points that they are, control and check points."""
+        """Observations with their surveyed points, control and check points."""
         return Matched.by_name(self.matches.matched, self.survey.surveyed)
 
     @property
@@ -125,12 +125,12 @@ class MatchedTargets(Summary):
 
     @property
     def check(self) -> Matched:
-        """Observed check points, which take part in no estimate."""
+        """Observed check points, which are used in no estimate."""
         return self.matches.by_role(self.survey)[1]
 
     @property
     def kept_out(self) -> Matched:
-        """Observed control points that the user keeps out of the estimate."""
+        """Observed control points that the user excluded from the estimate."""
         if self.excluded is None:
             return Matched.none()
         return Matched.by_name(self.excluded, self.survey.excluded)
@@ -142,12 +142,12 @@ class MatchedTargets(Summary):
 
     @property
     def scanners(self) -> dict[int, int]:
-        """Number of the scanner of each pass."""
+        """Index of the scanner of each pass."""
         numbers = self.survey.scanner_numbers
         return {number: int(numbers[key[0]]) for key, number in self.candidates.passes.items()}
 
     def as_scanned(self, survey: Survey) -> Survey:
-        """The survey, with a trajectory that knows the seconds in which points lie.
+        """Return the survey with the seconds that contain points marked in its trajectory.
 
         Parameters
         ----------
@@ -157,7 +157,9 @@ class MatchedTargets(Summary):
         return replace(survey, trajectory=trajectory)
 
     def to_frame(self) -> pandas.DataFrame:
-        """A row for each matched observation, misclosures in m; pandas is needed for it."""
+        """Return a data frame with a row per matched observation, misclosures in m; requires
+        pandas.
+        """
         matched = self.matched
         observed = matched.observations
         is_check = np.isin(matched.name, self.survey.check.name)
@@ -177,18 +179,18 @@ class MatchedTargets(Summary):
         )
 
     def plot(self) -> Figure:
-        """Misclosures (surveyed - observed) over time, with one sigma."""
+        """Plot misclosures (surveyed - observed) over time, with one sigma."""
         from mlscorr.report import misclosure_figure
 
         return misclosure_figure(self.control, self.check, self.survey.trajectory)
 
     def to_open3d(self, origin: np.ndarray | None = None) -> Any:
-        """Lines from each observed center to its surveyed place.
+        """Lines from each observed center to its surveyed position.
 
         Parameters
         ----------
         origin : (3,) array, optional
-            As of ``PointCloud.to_open3d``.
+            See ``PointCloud.to_open3d``.
 
         Returns
         -------
@@ -200,7 +202,7 @@ class MatchedTargets(Summary):
         return misclosure_lines(self.control, self.check, origin)
 
     def _overview(self):
-        """Counts, the median misclosure, and the first refusals."""
+        """Return counts, the median misclosure, and the first refusals."""
         rows = [
             ("control points", f"{len(set(self.control.name))} of {len(self.survey.control)}"),
             ("check points", f"{len(set(self.check.name))} of {len(self.survey.check)}"),
@@ -220,18 +222,18 @@ class MatchedTargets(Summary):
 class FoundTargets(Summary):
     """Targets found in the clouds of a survey, near its surveyed points, without names.
 
-    ``targets[rows]`` are some of them, as a data frame's or an array's condition chooses.
+    ``targets[rows]`` selects some of them by a condition on a data frame or an array.
 
     Parameters
     ----------
     survey : Survey
     targets : tuple of (pass number, FittedTarget)
-        In order of pass and time.
+        Sorted by pass and time.
     candidates : Candidates
-        The passes of the clouds, and points without a pose.
+        Passes of the clouds, and points without a pose.
     near : NearPoints
     features : TieFeatures, optional
-        Planes, poles and paint that may tie passes, where these were collected.
+        Planes, poles and paint as possible ties, if these were collected.
     """
 
     survey: Survey
@@ -249,7 +251,7 @@ class FoundTargets(Summary):
 
     @cached_property
     def observations(self) -> TargetObservations:
-        """Centres with covariances, kinds and sizes, a row for each target and pass."""
+        """Centers with covariances, kinds and sizes, a row for each target and pass."""
         return as_observations(self.targets)
 
     @property
@@ -259,28 +261,28 @@ class FoundTargets(Summary):
 
     @property
     def score(self) -> np.ndarray:
-        """How target-like each is (n,), 0 to 1."""
+        """Likeness to a target (n,), 0 to 1."""
         return np.array([target.score for _, target in self.targets])
 
     def to_frame(self) -> pandas.DataFrame:
-        """A row for each target and pass; pandas is needed for it."""
+        """Return a data frame with a row for each target and pass; requires pandas."""
         return self.observations.to_frame().drop(columns="name").assign(score=self.score)
 
     def plot(self) -> Figure:
-        """The targets one by one, each with the points on it and the outline that was fitted."""
+        """Draw the targets one by one, with the points on each and the fitted outline."""
         from mlscorr.report import targets_figure
 
         return targets_figure(self.targets)
 
     def to_open3d(self, origin: np.ndarray | None = None, enlarged: float = 100.0) -> Any:
-        """Outlines of the targets, and about each center the ellipsoid of one sigma.
+        """Outlines of the targets, with an ellipsoid of one sigma around each center.
 
         Parameters
         ----------
         origin : (3,) array, optional
-            As of ``PointCloud.to_open3d``.
+            See ``PointCloud.to_open3d``.
         enlarged : float
-            Factor by which ellipsoids are drawn larger than they are.
+            Magnification of ellipsoids.
 
         Returns
         -------
@@ -291,7 +293,7 @@ class FoundTargets(Summary):
         return target_lines(self.observations, origin, enlarged)
 
     def _overview(self):
-        """Counts by kind and pass."""
+        """Return counts by kind and pass."""
         observed = self.observations
         kinds = ", ".join(f"{kind} {count}" for kind, count in Counter(observed.kind).items())
         rows = [
@@ -309,18 +311,18 @@ class FoundTargets(Summary):
 
 
 class NearPoints:
-    """Points near surveyed points that were looked at: their number and intensities.
+    """Points near surveyed points: their number and intensities.
 
     Attributes
     ----------
     beams : BeamCheck
     is_scanned : (b,) bool array
-        Which surveyed points have points about them.
+        True for surveyed points with surrounding points.
     is_present : (65536,) bool array
-        Which intensities they have.
+        True for intensities that occur.
     points : int
     of_file : dict
-        The survey of each CloudFile about which something was asked, with the place of its scanner.
+        Survey of each requested CloudFile, with the position of its scanner.
 
     Parameters
     ----------
@@ -337,18 +339,18 @@ class NearPoints:
 
     @property
     def intensity_range(self) -> str:
-        """The darkest and the brightest, in words."""
+        """Lowest and highest intensity, in words."""
         present = np.flatnonzero(self.is_present)
         return f"intensity {present[0]} to {present[-1]}"
 
     @property
     def scanned(self) -> frozenset[str]:
-        """Names of the surveyed points that have points about them."""
+        """Names of the surveyed points with surrounding points."""
         names = self.survey.surveyed.name
         return frozenset(names[i] for i in np.flatnonzero(self.is_scanned))
 
     def survey_of(self, file: CloudFile) -> Survey:
-        """The survey of the scanner that wrote a file, with the scanner's place.
+        """Return the survey of the scanner that wrote a file, with the scanner's position.
 
         Parameters
         ----------
@@ -359,7 +361,7 @@ class NearPoints:
         return self.of_file[file]
 
     def warnings(self) -> Iterator[str]:
-        """Sentences on files whose beams can't have been measured so, or come from nowhere."""
+        """Yield sentences on files with impossible beams, or with beams of unknown origin."""
         yield from self.beams.warnings()
         for file, survey in self.of_file.items():
             if survey.mounting is None and survey.beam_origin is None:
@@ -371,7 +373,7 @@ class NearPoints:
                 )
 
     def add(self, cloud: PointCloud) -> None:
-        """Count more of them.
+        """Count further points.
 
         Parameters
         ----------
@@ -381,12 +383,12 @@ class NearPoints:
         self.is_present[cloud.intensity.astype(np.uint16)] = True
 
     def add_ball(self, index: int, cloud: PointCloud) -> None:
-        """Look whether any of the points of a surveyed point, from there (m), lies about it."""
+        """Check whether any points of a surveyed point, relative to it (m), surround it."""
         some = cloud.xyz[:: SETTINGS.scanned_stride]
         self.is_scanned[index] |= (np.linalg.norm(some, axis=1) < SETTINGS.scanned_radius).any()
 
     def warn_of_intensity(self) -> None:
-        """Warn where bright targets are surveyed and the intensity can't tell them."""
+        """Warn if bright targets are surveyed and the intensity cannot show them."""
         if self.points:
             reason = why_useless(np.flatnonzero(self.is_present))
         else:
@@ -406,17 +408,17 @@ def find_control(
     progress: Callable | None = None,
     read: Callable = read_chunks,
 ) -> MatchedTargets:
-    """Find the targets of a survey that has control points, and some of these among them.
+    """Find the targets of a survey with control points, including some of these.
 
     Parameters
     ----------
     survey, rng, progress, read
-        As of ``fit_while_reading``, progress without a title.
+        See ``fit_while_reading``; progress without a title.
 
     Raises
     ------
     ValueError
-        As match_targets does, and when no control point was surveyed or found.
+        See match_targets; also if no control point was surveyed or found.
     """
     check_control(survey)
     stage = progress or silent
@@ -429,7 +431,7 @@ def find_control(
 
 
 def check_found_control(matches: MatchedTargets) -> None:
-    """Refuse matches without a control point, by which nothing is corrected.
+    """Refuse matches without a control point, which cannot correct anything.
 
     Parameters
     ----------
@@ -438,7 +440,7 @@ def check_found_control(matches: MatchedTargets) -> None:
     Raises
     ------
     ValueError
-        Where check points alone are matched.
+        If only check points are matched.
     """
     survey = matches.survey
     if len(matches.control) == 0:
@@ -457,7 +459,7 @@ def find_targets(
 ) -> FoundTargets:
     """Find targets in the clouds of a survey, near its surveyed points.
 
-    The clouds are read once, in chunks, whatever their size.
+    The clouds are read once, in chunks, regardless of their size.
 
     Parameters
     ----------
@@ -467,18 +469,18 @@ def find_targets(
     progress : function, optional
         ``progress(title, total)`` returns a function of the number of points just done.
     with_ties : bool
-        Whether the features that may tie passes are collected in the same reading; the result's
-        ``features`` go into ``find_ties`` or ``estimate_pos_error``.
+        True to collect possible tie features in the same pass over the files; the result's
+        ``features`` are input of ``find_ties`` or ``estimate_pos_error``.
 
     Returns
     -------
     FoundTargets
-        None where no target is there; ``match_targets`` says why.
+        Empty without targets; ``match_targets`` then gives the reason.
 
     Raises
     ------
     OSError
-        When reading fails.
+        If reading fails.
 
     >>> import mlscorr, numpy as np, tempfile
     >>> from mlscorr.simulate import Scenario, simulate
@@ -511,21 +513,21 @@ def find_or_compare_surfaces(
     progress: Callable | None = None,
     rng: np.random.Generator | None = None,
 ) -> tuple[MatchedTargets, tuple[str, ...]]:
-    """Find the targets where there are any: a diagnosis can do without.
+    """Find targets if there are any, because a diagnosis works without them.
 
     Parameters
     ----------
     survey, read, settle
-        As of ``fit_while_reading``; the clouds are read to their ends in any case.
+        See ``fit_while_reading``; the clouds are read to their ends in any case.
     progress, rng
-        As of ``find_targets``.
+        See ``find_targets``.
 
     Returns
     -------
     matches : MatchedTargets
-        Empty where nothing was surveyed or found.
+        Empty if nothing was surveyed or found.
     notes : tuple of str
-        The sentence that says so.
+        Sentence on missing targets.
     """
     stage = progress or silent
     reading = stage(READING, survey.points)
@@ -535,7 +537,7 @@ def find_or_compare_surfaces(
 
 
 def match_if_any(targets: FoundTargets, survey: Survey) -> tuple[MatchedTargets, tuple[str, ...]]:
-    """Match targets where there are any.
+    """Match targets if there are any.
 
     Parameters
     ----------
@@ -545,7 +547,7 @@ def match_if_any(targets: FoundTargets, survey: Survey) -> tuple[MatchedTargets,
     Returns
     -------
     matches, notes
-        As of find_or_compare_surfaces.
+        See find_or_compare_surfaces.
     """
     note = "No target was surveyed: only surfaces are compared."
     if len(survey.surveyed):
@@ -565,20 +567,20 @@ def fit_while_reading(
 ) -> FoundTargets:
     """Fit targets near surveyed points while the clouds are read.
 
-    Of fits that overlap the best is kept: the order of the surveyed points decides nothing.
+    The best of overlapping fits is kept, independent of the order of the surveyed points.
 
     Parameters
     ----------
     survey : Survey
     read : function of a CloudFile
-        Gives an iterator of PointCloud.
+        Returns an iterator of PointCloud.
     rng, progress
-        As of ``find_targets``, progress already with its title.
+        See ``find_targets``; progress already with its title.
     settle : function, optional
-        ``settle(fitted, since)`` is given the FittedTargets since its last call, and the time (s)
-        before which none to come will have points.
+        ``settle(fitted, since)`` receives the FittedTargets since its last call, and the time (s)
+        before which further ones have no points.
 
-    Warns where the intensity tells nothing.
+    Warns if the intensity carries no information.
     """
     if rng is None:
         rng = np.random.default_rng(SETTINGS.seed)
@@ -590,7 +592,7 @@ def fit_while_reading(
 
     def fit(file, index, cloud):
         near.add_ball(index, cloud)
-        generator = np.random.default_rng(seed)  # whatever was looked at before
+        generator = np.random.default_rng(seed)  # independent of earlier searches
         targets = fit_near_control(index, cloud, near.survey_of(survey.clouds[file]), generator)
         latest.extend(target for _, target in targets)
         fits.extend((index, (file, number), target) for number, target in targets)
@@ -621,16 +623,16 @@ def fit_while_reading(
 
 
 def match_targets(targets: FoundTargets, survey: Survey) -> MatchedTargets:
-    """Give targets the names of the surveyed points that they are.
+    """Give targets the names of their surveyed points.
 
-    All matches are decided together: misclosures change smoothly along the drive, and a target
-    that fits no point, or several, gets no name.
+    All matches are decided together: misclosures change smoothly along the drive, and a target that
+    matches no point, or several, gets no name.
 
     Parameters
     ----------
     targets : FoundTargets
     survey : Survey
-        With all of its surveyed points, also where only some were looked at.
+        With all of its surveyed points, even if only some were searched.
 
     Returns
     -------
@@ -639,7 +641,7 @@ def match_targets(targets: FoundTargets, survey: Survey) -> MatchedTargets:
     Raises
     ------
     ValueError
-        When no target is found, or none of those found matches.
+        If no target is found, or none of those found matches.
 
     >>> import mlscorr, numpy as np, tempfile
     >>> from mlscorr.simulate import Scenario, simulate
@@ -666,17 +668,17 @@ def match_targets(targets: FoundTargets, survey: Survey) -> MatchedTargets:
 
 
 def match_silently(targets: FoundTargets, survey: Survey) -> MatchedTargets:
-    """Match targets; this decides for ``check`` and ``correct`` alike.
+    """Match targets, in the same way for ``check`` and ``correct``.
 
     Parameters
     ----------
     targets, survey
-        As of match_targets.
+        See match_targets.
 
     Raises
     ------
     ValueError
-        As match_targets.
+        See match_targets.
     """
     near = targets.near
     if len(targets) == 0:
@@ -685,7 +687,7 @@ def match_silently(targets: FoundTargets, survey: Survey) -> MatchedTargets:
     if len(matches) == 0:
         reasons = " ".join(refusal.reason for refusal in matches.matches.refusals[:3])
         places = len(np.unique(survey.surveyed.position, axis=0))
-        is_twice = 2 * places <= len(survey.surveyed)  # and then the CRS isn't what is wrong
+        is_twice = 2 * places <= len(survey.surveyed)  # and then the CRS is not the cause
         questions = "Are control and cloud in the same CRS?", "Is each point named twice?"
         raise ValueError(
             f"None of the {len(survey.surveyed)} surveyed targets is among the {len(targets)} that "
@@ -700,7 +702,7 @@ def match_silently(targets: FoundTargets, survey: Survey) -> MatchedTargets:
 
 
 def nothing_found(survey: Survey, candidates: Candidates, near: NearPoints) -> str:
-    """The sentence for a cloud in which no surveyed target was found.
+    """Sentence on a cloud without any surveyed target.
 
     Parameters
     ----------
@@ -730,7 +732,7 @@ def nothing_found(survey: Survey, candidates: Candidates, near: NearPoints) -> s
 
 
 def _other_heights(survey, radius):
-    """A sentence where surveyed points lie farther above or below the drive than is searched."""
+    """Sentence on surveyed points farther above or below the drive than the search radius."""
     place = survey.surveyed.position
     path = survey.trajectory.position
     nearest = cKDTree(path[:, :2]).query(place[:, :2])[1]
@@ -754,7 +756,7 @@ def match_fitted(
     survey : Survey
     targets : sequence of (pass number, FittedTarget)
     candidates : Candidates
-        Their passes and the points without a pose are kept.
+        Passes and points without a pose are kept.
     """
     matches = match(
         as_observations(targets),
@@ -763,7 +765,7 @@ def match_fitted(
         survey.pos,
         survey.search_radius,
     )
-    # an excluded point has a residual, too, whatever matching says of it
+    # an excluded point also has a residual, whatever the matching
     matches, doubts = with_included(matches, (*survey.included, *survey.excluded.name))
     doubts = tuple(text for name, text in doubts if name in survey.included)
     matches, excluded = without_excluded(matches, survey)
@@ -778,19 +780,19 @@ def match_fitted(
 def with_included(
     matches: Matches, names: Sequence[str]
 ) -> tuple[Matches, tuple[tuple[str, str], ...]]:
-    """Matches in which some points have the observations that were refused as theirs.
+    """Restore refused observations of some points in matches.
 
     Parameters
     ----------
     matches : Matches
     names : sequence of str
-        Of the points that have an observation in any case.
+        Names of the points that must have an observation.
 
     Returns
     -------
     matches : Matches
     warnings : tuple of (str, str)
-        Name of each point that has one now, and a sentence on why it was refused.
+        Name of each restored point, and a sentence with the reason for its refusal.
     """
     left = matches.unmatched
     taken = {}
@@ -827,7 +829,7 @@ def with_included(
 
 
 def without_excluded(matches: Matches, survey: Survey) -> tuple[Matches, TargetObservations]:
-    """Matches without the points that are kept out of the estimate, and the observations of those.
+    """Matches without the excluded points, and the observations of these.
 
     Parameters
     ----------
@@ -841,7 +843,7 @@ def without_excluded(matches: Matches, survey: Survey) -> tuple[Matches, TargetO
 
 
 def _log_matches(matches, survey):
-    """Log which surveyed points were matched, and why others were not."""
+    """Log which surveyed points were matched, and reasons for others."""
     matched = Matched.by_name(matches.matched, survey.surveyed)
     names = set(matched.name)
     LOG.info(
@@ -870,7 +872,7 @@ def _log_matches(matches, survey):
 def unmatched(
     survey: Survey, targets: Sequence[PassTarget], candidates: Candidates, reason: str = ""
 ) -> MatchedTargets:
-    """Targets where there is nothing to match.
+    """Make targets without matches.
 
     Parameters
     ----------
@@ -878,7 +880,7 @@ def unmatched(
     targets : sequence of (pass number, FittedTarget)
     candidates : Candidates
     reason : str
-        Why none has a name.
+        Reason why none has a name.
     """
     observations = as_observations(targets)
     nothing = observations[np.zeros(len(targets), bool)]
@@ -893,7 +895,7 @@ def _by_pass_and_time(targets):
 
 
 def read_into(*adds: Callable) -> Callable:
-    """A ``read_chunks`` that also adds each chunk to collectors, so that a cloud is decoded once.
+    """Make a ``read_chunks`` that also passes each chunk to collectors, to decode a cloud once.
 
     Parameters
     ----------
@@ -910,5 +912,5 @@ def read_into(*adds: Callable) -> Callable:
 
 
 def silent(_title: str, _total: int | None = None) -> Callable:
-    """Progress that is shown nowhere."""
+    """Return progress that is not displayed."""
     return lambda _points: None

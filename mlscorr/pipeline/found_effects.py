@@ -1,4 +1,4 @@
-"""What a diagnosis or a calibration found, with the clouds in which it is, to be taken out."""
+"""Effects found by a diagnosis or calibration, with their clouds, for removal."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -27,11 +27,11 @@ class FoundEffects:
     ----------
     effects : tuple of Effect
     clouds : tuple of dict
-        Name, bytes and digest of the clouds in which they are, where that is known.
+        Name, bytes and digest of the clouds with the effects, if known.
     covariance : (6, 6) array, optional
-        Of the mounting without them. Units: m, rad.
+        Covariance of the mounting without them. Units: m, rad.
     note : str
-        What that rests on.
+        Origin of the covariance.
     """
 
     effects: tuple[Effect, ...]
@@ -41,7 +41,7 @@ class FoundEffects:
 
     @property
     def is_of_mounting(self) -> bool:
-        """Whether lever arm or boresight are among them."""
+        """True if lever arm or boresight are among them."""
         return any(effect.name in MOUNTING for effect in self.effects)
 
     def check_clouds(self, survey: Survey) -> None:
@@ -54,7 +54,7 @@ class FoundEffects:
         Raises
         ------
         ValueError
-            Where none of its clouds is one of those in which the effects were found.
+            If none of its clouds is one of those with the effects.
         """
         known = {(row["bytes"], row["digest"]) for row in self.clouds}
         here = cloud_rows(survey) if known else []
@@ -69,7 +69,7 @@ class FoundEffects:
 
 
 def cloud_rows(survey: Survey) -> list[dict[str, str | int]]:
-    """``clouds`` of a document: name, bytes and digest of each, by which it is known again.
+    """``clouds`` of a document: name, bytes and digest of each, for identification.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def cloud_rows(survey: Survey) -> list[dict[str, str | int]]:
 
 
 def read_effects(source: str | Path) -> FoundEffects:
-    """What was found, by a document of diagnose or calibrate; or one effect by name and size.
+    """Read effects from a document of diagnose or calibrate, or one effect by name and size.
 
     Parameters
     ----------
@@ -91,9 +91,9 @@ def read_effects(source: str | Path) -> FoundEffects:
     Raises
     ------
     ValueError
-        Where it is neither, or names nothing that was found.
+        If it is neither, or contains no effects.
     OSError
-        Where a document can't be read.
+        If a document cannot be read.
     """
     name, equals, size = str(source).partition("=")
     if equals and name in TAKEN_OUT:
@@ -120,7 +120,7 @@ def read_effects(source: str | Path) -> FoundEffects:
 
 
 def _of_gap(content):
-    """The effects of the most probable cause; a ValueError where there is none."""
+    """Effects of the most probable cause; raises ValueError without one."""
     label = content["verdict"]["label"]
     cause = content["causes"][0] if content["causes"] else None
     if label in ("none", "unknown") or cause is None or cause["effect"] != label:
@@ -136,7 +136,7 @@ def _of_gap(content):
 
 
 def _of_calibration(content):
-    """What the recorded mounting lacks, and how well the one without that is known."""
+    """Corrections of the recorded mounting, and the accuracy of the corrected one."""
     arm, turn = (content["lsc"][name] for name in MOUNTING)
     sigma = np.append(arm["sigma"], np.radians(turn["sigma"]))
     covariance = np.array(content["lsc"]["correlation"]) * np.outer(sigma, sigma)

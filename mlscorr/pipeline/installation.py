@@ -1,4 +1,4 @@
-"""What is installed, what is missing, and the line that installs it."""
+"""Installed and missing components, and the commands that install them."""
 
 import ctypes
 import platform
@@ -14,20 +14,20 @@ from mlscorr.survey import Summary
 SYSTEM = platform.system()  # Linux, Windows, Darwin
 OPEN3D = "open3d"
 if SYSTEM == "Linux" and platform.machine() == "x86_64":
-    OPEN3D = "open3d-cpu"  # the same import without CUDA
-PACKAGES = (  # of numbers and points, of maps and texts, of commands and pages
+    OPEN3D = "open3d-cpu"  # the same module without CUDA
+PACKAGES = (  # for numbers and points, maps and texts, commands and pages
     *("numpy", "scipy", "laspy", "lazrs", OPEN3D, "threadpoolctl", "numba"),
     *("pyproj", "tomlkit", "scikit-learn"),
     *("typer", "rich", "pydantic", "matplotlib", "pillow", "jinja2"),
 )
-EXTRAS = {  # package -> the extra that brings it
+EXTRAS = {  # package -> extra that installs it
     "pye57": "e57",
     "openpyxl": "excel",
     "pandas": "pandas",
     "distributed": "cluster",
     "s3fs": "remote",
 }
-# shared library -> Debian package: what importing Open3D and drawing without a screen need on Linux
+# shared library -> Debian package: required on Linux to import Open3D and to draw without a screen
 LIBRARIES = {
     "libusb-1.0.so.0": "libusb-1.0-0",
     "libGL.so.1": "libgl1",
@@ -43,22 +43,22 @@ renderer.scene.add_geometry("box", open3d.geometry.TriangleMesh.create_box(),
                             open3d.visualization.rendering.MaterialRecord())
 assert renderer.render_to_image() is not None
 """
-INSTALLERS = ("apt-get install -y ", "pip install ")  # that take several names in a line
-RENDER_SECONDS = 60  # a software driver takes two
+INSTALLERS = ("apt-get install -y ", "pip install ")  # that accept several names in a line
+RENDER_SECONDS = 60  # a software renderer takes two
 
 
 @dataclass(frozen=True)
 class InstalledPart:
-    """A package, library or file: whether it is there, what was found, and the way out.
+    """Package, library or file: availability, version, and remedy.
 
     Parameters
     ----------
     name : str
     ok : bool
     state : str
-        Version, or what is wrong.
+        Version, or the fault.
     remedy : str
-        The line that installs it.
+        Command that installs it.
     needed : bool
     """
 
@@ -70,7 +70,7 @@ class InstalledPart:
 
     @property
     def mark(self) -> str:
-        """Its state in a word."""
+        """State in a word."""
         if self.ok:
             return "ok"
         if self.needed:
@@ -80,7 +80,7 @@ class InstalledPart:
 
 @dataclass(frozen=True, repr=False)
 class Installation(Summary):
-    """What is installed, what is missing, and the lines that install it.
+    """Installed and missing components, and the commands that install them.
 
     Parameters
     ----------
@@ -91,31 +91,31 @@ class Installation(Summary):
 
     @property
     def remedies(self) -> list[str]:
-        """The lines that install all that is missing, one for each installer."""
+        """Commands that install all missing components, one for each installer."""
         return remedy(self.parts)
 
     @property
     def is_complete(self) -> bool:
-        """Whether all that is needed is there."""
+        """True if all required components are available."""
         return all(part.ok or not part.needed for part in self.parts)
 
     def _overview(self):
-        """What a notebook shows."""
+        """Return the rows that a notebook shows."""
         return [(part.name, part.mark, part.state) for part in self.parts] + [
             (line,) for line in self.remedies
         ]
 
 
 def doctor() -> Installation:
-    """Look at packages, extras, system libraries, the off-screen driver and geoid grids.
+    """Check packages, extras, system libraries, the off-screen driver and geoid grids.
 
-    System libraries and the driver are looked at on Linux alone: elsewhere they come with the
-    system, or with Open3D's wheel.
+    System libraries and the driver are checked only on Linux; elsewhere they come with the system,
+    or with Open3D's wheel.
 
     Returns
     -------
     Installation
-        It takes seconds, for a picture is drawn.
+        The check takes seconds, because a picture is drawn.
 
     >>> import mlscorr
     >>> "python" in [part.name for part in mlscorr.doctor().parts]
@@ -132,7 +132,7 @@ def doctor() -> Installation:
 
 
 def remedy(parts: Iterable[InstalledPart]) -> list[str]:
-    """The lines that install all that is missing, one for each installer.
+    """Commands that install all missing components, one for each installer.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ def remedy(parts: Iterable[InstalledPart]) -> list[str]:
 
 
 def installed_version(name: str) -> str | None:
-    """Version of a package, None where it is not installed; of Open3D either wheel will do.
+    """Version of a package, None if it is not installed; for Open3D of either wheel.
 
     Parameters
     ----------
@@ -179,7 +179,7 @@ def _package(name):
 
 
 def _extra(name, extra):
-    """A package that some inputs need: nothing is missing without it."""
+    """Package that only some inputs need, and thus never missing."""
     installed = installed_version(name)
     if installed is None:
         line = f"pip install 'mlscorr[{extra}]'"
@@ -214,7 +214,7 @@ def _rendering():
             state = "drawn"
     except subprocess.TimeoutExpired:
         state = f"no picture within {RENDER_SECONDS} s"
-    except OSError as error:  # where Python itself may not be started
+    except OSError as error:  # where Python itself cannot be started
         state = f"failed ({error})"
     return InstalledPart("off-screen picture", state == "drawn", state, needed=False)
 

@@ -1,4 +1,4 @@
-"""The log of a command, which stands as log.txt beside its result."""
+"""Log of a command, written as log.txt with its result."""
 
 import logging
 import platform
@@ -19,12 +19,12 @@ _lines: ContextVar[list[str] | None] = ContextVar("lines", default=None)
 
 
 class _Recorder(logging.Handler):
-    """Lines of the log at INFO and above.
+    """Recorder of the log at INFO and above.
 
     Parameters
     ----------
     lines : list of str
-        To which they are added.
+        Lines to extend.
     """
 
     def __init__(self, lines: list[str]) -> None:
@@ -41,7 +41,7 @@ class _Recorder(logging.Handler):
 
 
 def without_secrets(text: str) -> str:
-    """A text without the users, passwords and queries of the URLs in it.
+    """Remove users, passwords and queries of URLs from a text.
 
     Parameters
     ----------
@@ -55,9 +55,9 @@ def without_secrets(text: str) -> str:
 
 @contextmanager
 def recorded_log(command: Sequence[str]) -> Iterator[None]:
-    """Keep the log of a command until it ends, for the log.txt of its result.
+    """Record the log of a command until it ends, for the log.txt of its result.
 
-    Warnings that are shown meanwhile are logged, too.
+    Warnings shown meanwhile are logged, too.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def recorded_log(command: Sequence[str]) -> Iterator[None]:
 
 
 def write_log(folder: Path) -> None:
-    """Write log.txt into the folder of a result, where the log of its command is kept.
+    """Write log.txt into the folder of a result, if the log of its command is recorded.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The methods that ``compare`` compares, in the order of their freedom."""
+"""Methods compared by ``compare``, in order of their freedom."""
 
 import warnings
 from collections.abc import Callable
@@ -17,7 +17,7 @@ from mlscorr.targets import Candidates
 
 @dataclass(frozen=True)
 class Observed:
-    """What the methods are given beside the control points.
+    """Input of the methods besides the control points.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ class Observed:
     candidates : Candidates
         Points near the targets.
     features : TieFeatures or None
-        Planes, poles and paint that may tie passes; None where the survey leaves ties out.
+        Planes, poles and paint as possible ties; None if the survey excludes ties.
     """
 
     survey: Survey
@@ -35,15 +35,15 @@ class Observed:
 
 @dataclass(frozen=True)
 class Method:
-    """A way to correct a cloud.
+    """Method of correcting a cloud.
 
     Parameters
     ----------
     name, kind, about : str
-        As compare.json has them.
+        As in compare.json.
     fit : function
-        ``fit(observed, matched)`` gives what has ``apply(cloud)``, and details of it as a dict; it
-        raises Undetermined where the control points don't suffice.
+        ``fit(observed, matched)`` returns an object with ``apply(cloud)``, and its details as a
+        dict; it raises Undetermined if the control points are insufficient.
     """
 
     name: str
@@ -53,12 +53,12 @@ class Method:
 
 
 def _one_move(name, about, fit):
-    """A Method whose fit needs no more than pairs of places."""
+    """Method whose fit needs only pairs of positions."""
     return Method(name, "one move", about, lambda _, matched: (fit(matched), {}))
 
 
 def load_open3d() -> str | None:
-    """Why Open3D can't be loaded, or None."""
+    """Reason why Open3D cannot be loaded, or None."""
     try:
         import mlscorr.baselines.registration  # noqa: F401
     except (ImportError, OSError) as error:  # OSError: a system library of Open3D is missing
@@ -79,7 +79,7 @@ def _icp(observed, matched):
 
 
 def _over_time(name, about, fit):
-    """A Method whose fit needs the trajectory and the control points."""
+    """Method whose fit needs the trajectory and the control points."""
 
     def of_survey(observed, matched):
         return fit(observed.survey.trajectory, matched), {}
@@ -121,7 +121,7 @@ def _correct(observed, matched):
 
 
 def _with_details(estimate):
-    """The correction of an Estimate and its details; its warnings are given on."""
+    """Correction of an Estimate and its details; its warnings are passed on."""
     for sentence in estimate.warnings:
         warnings.warn(sentence, stacklevel=2)
     details = asdict(estimate.parameters) | {
@@ -174,12 +174,12 @@ METHODS = (
 
 
 def method_named(name: str) -> Method:
-    """The method of a name.
+    """Return the method with a name.
 
     Raises
     ------
     ValueError
-        For another one, with the nearest there is.
+        If the name is unknown; the message has the most similar one.
     """
     known = {method.name: method for method in METHODS}
     if name not in known:

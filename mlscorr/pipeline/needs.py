@@ -1,4 +1,4 @@
-"""What a correction will read and write, and the time and memory that it takes."""
+"""Inputs and outputs of a correction, and its time and memory."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,16 +15,16 @@ from mlscorr.wording import counted
 
 @dataclass(frozen=True)
 class Amount:
-    """How much of something, and how that is known.
+    """Amount of something, and its source.
 
     Parameters
     ----------
     what : str
     number : float
     unit : str
-        Of the number, empty for a count.
+        Unit of the number, empty for a count.
     source : str
-        Where the number is from.
+        Source of the number.
     """
 
     what: str
@@ -35,15 +35,15 @@ class Amount:
 
 @dataclass(frozen=True)
 class DecodedSample:
-    """A run of points from the middle of each cloud file.
+    """Run of points from the middle of each cloud file.
 
     Parameters
     ----------
     points : int
     seconds : float
-        That decoding them took. Units: s.
+        Decoding time. Units: s.
     warnings : tuple of str
-        On files whose beams can't have been measured so.
+        On files with impossible beams.
     """
 
     points: int
@@ -52,7 +52,7 @@ class DecodedSample:
 
 
 def sample_clouds(survey: Survey) -> DecodedSample:
-    """Decode a run of each file, of as many points together as are read at a time.
+    """Decode a run of each file, as many points in total as are read at a time.
 
     Parameters
     ----------
@@ -75,13 +75,13 @@ def _middle(file: CloudFile, run: int) -> Iterator[PointCloud]:
 
 
 def amounts_read(survey: Survey, sampled: int) -> tuple[Amount, ...]:
-    """Points, epochs and surveyed points of a survey.
+    """Numbers of points, epochs and surveyed points of a survey.
 
     Parameters
     ----------
     survey : Survey
     sampled : int
-        Number of passes that samples of the clouds lie in.
+        Number of passes that contain samples of the clouds.
 
     Returns
     -------
@@ -130,7 +130,7 @@ def amounts_written(survey: Survey) -> tuple[Amount, ...]:
 def amounts_needed(
     survey: Survey, sample: DecodedSample, probe: QuickLook | None
 ) -> tuple[Amount, ...]:
-    """Time and memory that a correction takes, by rates that were measured.
+    """Time and memory of a correction, from measured rates.
 
     Parameters
     ----------
@@ -183,5 +183,5 @@ def amounts_needed(
 
 
 def _files(survey):
-    """How many clouds it has."""
+    """Phrase on the number of clouds."""
     return counted(len(survey.cloud_paths), "cloud file")

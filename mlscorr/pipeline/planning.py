@@ -1,4 +1,4 @@
-"""``plan``: what a survey will be able to show, before anyone drives."""
+"""``plan``: expected results of a survey, before it is driven."""
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
-LARGE = 10.0  # times its usual size: an effect that must be larger to be seen is not seen
+LARGE = 10.0  # times its usual size: an effect that is visible only above it counts as invisible
 
 
 def plan(survey: Survey, library: Iterable[type[Effect]] | None = None) -> PlannedSurvey:
-    """What effects a survey can show and tell apart, from its geometry alone.
+    """Find the effects that a survey can show and separate, from its geometry only.
 
     Parameters
     ----------
     survey : Survey
-        With mounting, trajectory, control, and a reference surface where there is one; its cloud
-        is not read.
+        With mounting, trajectory, control, and a reference surface if there is one; its cloud is
+        not read.
     library : iterable of Effect classes, optional
         Effects to consider; all known ones by default.
 
     Raises
     ------
     ValueError
-        Without a mounting, or when nothing will be seen.
+        If there is no mounting, or nothing will be observed.
 
     >>> import mlscorr, numpy as np, tempfile
     >>> from mlscorr.simulate import Scenario, simulate
@@ -79,7 +79,7 @@ def plan(survey: Survey, library: Iterable[type[Effect]] | None = None) -> Plann
 
 
 def _accuracy(survey, rows):
-    """PlannedAccuracy by the control that will be seen; None where there is none."""
+    """PlannedAccuracy from the expected control; None without any."""
     first = _looks_at_control(survey, rows)
     if len(first) == 0:
         return None
@@ -99,7 +99,7 @@ def _accuracy(survey, rows):
 
 
 def _looks_at_control(survey, rows):
-    """The first row of each look at a control point."""
+    """First row of each view of a control point."""
     first = np.unique(rows.item[rows.channel == "target"], return_index=True)[1]
     first = np.flatnonzero(rows.channel == "target")[first]
     return first[rows.survey_item[first] < len(survey.control)]  # control comes before check
@@ -107,7 +107,7 @@ def _looks_at_control(survey, rows):
 
 @dataclass(frozen=True, repr=False)
 class PlannedSurvey(KnownResult):
-    """A survey before it is driven: the document of plan.json, and ``write``."""
+    """Planned survey: the document of plan.json, and ``write``."""
 
     _name = "plan"
     survey: Survey
@@ -189,14 +189,16 @@ class PlannedSurvey(KnownResult):
         return advice
 
     def to_frame(self) -> pandas.DataFrame:
-        """How small an effect shows, a row each parameter; pandas is needed for it."""
+        """Return a data frame of the smallest detectable sizes, a row per parameter; requires
+        pandas.
+        """
         detectable = self.document["detectable"]
         return rows_frame(
             {"effect": name, **row} for name, rows in detectable.items() for row in rows
         )
 
     def plot(self, name: str = "detectable") -> Figure:
-        """A figure of the page.
+        """Draw a figure of the page.
 
         Parameters
         ----------
@@ -206,7 +208,7 @@ class PlannedSurvey(KnownResult):
         Raises
         ------
         ValueError
-            Where there is no such figure, or nothing to show in it.
+            If there is no such figure, or it would be empty.
         """
         from mlscorr.report import draw
         from mlscorr.report.gap import plan_figures
@@ -214,11 +216,11 @@ class PlannedSurvey(KnownResult):
         return draw(plan_figures(self.document), name)
 
     def _overview(self):
-        """What a notebook shows."""
+        """Return the rows that a notebook shows."""
         return [(sentence,) for sentence in (self.survey.name, *self.document["advice"])]
 
     def _files(self):
-        """plan.json and plan.html."""
+        """Files plan.json and plan.html."""
         from mlscorr.report.gap import plan_page
 
         name = self.survey.name
@@ -234,7 +236,7 @@ class PlannedSurvey(KnownResult):
 def check_enough(
     survey: Survey, rows: Rows, library: Iterable[type[Effect]], notes: tuple[str, ...]
 ) -> None:
-    """Refuse a survey that shows too little: what is missing, and the plan.
+    """Refuse a survey with too few observations: missing data, and the plan.
 
     Parameters
     ----------
@@ -242,15 +244,15 @@ def check_enough(
     rows : Rows
     library : iterable of Effect classes
     notes : tuple of str
-        Sentences that come first.
+        Sentences to put first.
 
     Raises
     ------
     ValueError
-        Where fewer things have a residual in m than the pose has components.
+        If fewer items have a residual in m than the pose has components.
     """
     items = len(np.unique(rows.item[rows.metric]))
-    if items >= len(COMPONENTS):  # of the pose: with fewer, nothing is said
+    if items >= len(COMPONENTS):  # of the pose: fewer do not allow any conclusion
         return
     sentence = (
         f"{survey.path} shows {items} things with a residual in m, and the POS's error alone has 6 "

@@ -1,4 +1,4 @@
-"""Some surveyed targets looked for where the vehicle passed them, before the clouds are read."""
+"""Quick search for some surveyed targets along the drive, before the clouds are read."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -23,22 +23,22 @@ from mlscorr.targets import search_radius
 
 @dataclass(frozen=True)
 class QuickLook:
-    """What a look at some surveyed points showed.
+    """Result of a quick search near some surveyed points.
 
     Parameters
     ----------
     points : ControlPoints
-        Those that were looked at.
+        Searched points.
     matched : Matched
-        Those that were found.
+        Found points.
     fault : str
-        A sentence where another size or height finds them, empty otherwise.
+        Sentence if another size or height finds them, otherwise empty.
     refusal : str
-        The sentence with which a correction would end that saw no more than this; empty otherwise.
+        Error of a correction with only these points; otherwise empty.
     doubt : str
-        A sentence where few were found and nothing says why.
+        Sentence if few were found without a known reason.
     seconds : float
-        What fitting a target took. Units: s.
+        Time to fit a target. Units: s.
     """
 
     points: ControlPoints
@@ -50,11 +50,10 @@ class QuickLook:
 
 
 def look_near_control(survey: Survey) -> QuickLook:
-    """Look for some targets of a survey where the vehicle passed them.
+    """Search for some targets of a survey where the vehicle passed them.
 
-    What is found is matched with all surveyed points, as in a correction. Where targets are not
-    found they are looked for with sizes doubled (radii may stand for diameters) and with heights of
-    the cloud.
+    Targets found are matched with all surveyed points, as in a correction. Missing targets are
+    searched again with doubled sizes (radii given for diameters) and with heights of the cloud.
 
     Parameters
     ----------
@@ -64,7 +63,8 @@ def look_near_control(survey: Survey) -> QuickLook:
     Raises
     ------
     ValueError
-        Where the files are not in order of time, so that a look takes as long as reading them.
+        If the files are not in order of time, so that the search would take as long as reading
+        them.
     """
     whole = survey
     survey = replace(
@@ -90,7 +90,7 @@ def look_near_control(survey: Survey) -> QuickLook:
 
 
 def _decided(survey, near_control):
-    """What of all surveyed points is matched, and the sentence where a correction refuses that."""
+    """Matches of all surveyed points, and the error of a correction that refuses them."""
     try:
         matches = match_silently(near_control, survey)
     except ValueError as error:
@@ -103,7 +103,7 @@ def _decided(survey, near_control):
 
 
 def spread_points(survey: Survey) -> ControlPoints:
-    """Some surveyed points, spread over the drive.
+    """Select some surveyed points, spread over the drive.
 
     Parameters
     ----------
@@ -115,14 +115,14 @@ def spread_points(survey: Survey) -> ControlPoints:
 
 
 def _affordable(survey, windows):
-    """As many of the points, still spread, as can be fitted in the time for a look.
+    """Select points, still spread, that can be fitted in the available time.
 
-    Processor time counts, so that what else the machine does changes no result.
+    Processor time is used, so that other load on the machine does not change the result.
     """
     points = survey.control
     share = SETTINGS.looked_seconds / SETTINGS.looked_points
     single = replace(survey, control=points[len(points) // 2 :][:1])
-    for _ in range(2):  # the first fit may have to be compiled
+    for _ in range(2):  # the first fit may include compilation
         start = process_time()
         _fit(single, windows)
         seconds = process_time() - start
@@ -133,7 +133,7 @@ def _affordable(survey, windows):
 
 
 def _near(survey, file) -> Iterator[PointCloud]:
-    """Points of a file beside surveyed points, whatever their heights."""
+    """Yield points of a file near surveyed points, at any height."""
     place = survey.control.position
     radius = search_radius(survey, survey.control)
     for chunk in read_windows(file, _spans(survey)):
@@ -147,7 +147,7 @@ def _near(survey, file) -> Iterator[PointCloud]:
 
 
 def _spans(survey):
-    """Starts and ends (k, 2), in order, of the times when the points were passed. Units: s."""
+    """Sorted intervals (k, 2) in which the points were passed. Units: s."""
     trajectory = survey.trajectory
     inside = np.zeros(len(survey.trajectory), bool)
     for centre in survey.control.position[:, :2]:
@@ -161,18 +161,18 @@ def _spans(survey):
 
 
 def _fit(survey, windows) -> FoundTargets:
-    """Targets near surveyed points, fitted in what was read."""
+    """Targets near surveyed points, fitted in the points read."""
     return fit_while_reading(survey, lambda file: iter(windows[file]))
 
 
 def _find(survey, windows) -> Matched:
-    """Surveyed targets that are found in what was read."""
+    """Surveyed targets found in the points read."""
     near_control = _fit(survey, windows)
     return match_fitted(survey, near_control.targets, near_control.candidates).control
 
 
 def _with_sizes_doubled(survey, windows, matched):
-    """A sentence where sizes are radii."""
+    """Sentence if sizes are radii."""
     points = survey.control
     doubled = replace(points, size=2 * points.size)
     refit = _find(replace(survey, control=doubled), windows)
@@ -186,7 +186,7 @@ def _with_sizes_doubled(survey, windows, matched):
 
 
 def _with_other_heights(survey, windows, matched):
-    """A sentence where heights are of another system."""
+    """Sentence if heights belong to another system."""
     points = survey.control
     above = _above_cloud(points, [chunk for chunks in windows.values() for chunk in chunks])
     if not np.isfinite(above) or abs(above) < survey.search_radius / 2:
@@ -207,7 +207,7 @@ def _with_other_heights(survey, windows, matched):
 
 
 def _above_cloud(points, chunks):
-    """How far points lie above the middle height of the cloud about them, median. Units: m."""
+    """Median height of points above the middle of the cloud around them. Units: m."""
     cloud = np.concatenate([np.empty((0, 3)), *(chunk.xyz for chunk in chunks)])
     near = [
         np.hypot(*(cloud[:, :2] - place[:2]).T) < SETTINGS.scanned_radius
@@ -232,7 +232,7 @@ def _count(matched):
 
 
 def _doubt(survey, matched, near_control):
-    """A sentence on what a quick look does not find."""
+    """Sentence on targets that a quick search does not find."""
     near = near_control.near
     if not len(matched):
         return nothing_found(survey, near_control.candidates, near)

@@ -1,4 +1,4 @@
-"""From a survey to pictures of it before and after its correction."""
+"""Pictures of a survey before and after its correction."""
 
 import json
 from collections.abc import Callable
@@ -16,8 +16,8 @@ from mlscorr.pipeline.correction import correct
 from mlscorr.pipeline.logs import write_log
 from mlscorr.survey import Survey, check_survey
 
-PAGE = (1920, 1080)  # pixels, of a common screen
-TIME_DIGITS = 1e-6  # s, to which a corrected trajectory is written
+PAGE = (1920, 1080)  # pixels, a common screen
+TIME_DIGITS = 1e-6  # s, rounding of a written trajectory
 
 
 def render(
@@ -35,15 +35,16 @@ def render(
     ----------
     survey : Survey
     out : path
-        Folder for the pictures; it appears whole or not at all.
+        Folder for the pictures, written atomically.
     corrected : path, optional
-        Results of ``correct`` for this survey, whose correction is taken; else it is estimated.
+        Results of ``correct`` for this survey, whose correction is used; by default it is
+        estimated.
     size : (int, int)
         Width and height of each PNG in pixels.
     overwrite : bool
-        Whether files of the same name are replaced.
+        True to replace files of the same name.
     progress : function, optional
-        As in ``correct``.
+        See ``correct``.
     **options
         ``views`` and ``engine`` as in mlscorr.report.render.draw; ``colour``, ``azimuth``,
         ``elevation`` and ``view_angle`` as in its PictureOptions.
@@ -51,14 +52,14 @@ def render(
     Returns
     -------
     dict
-        The document of the JSON output.
+        Document of the JSON output.
 
     Raises
     ------
     ValueError
-        For bad input.
+        For invalid input.
     OSError
-        When reading or writing fails.
+        If reading or writing fails.
 
     >>> import mlscorr, numpy as np, tempfile
     >>> from mlscorr.simulate import Scenario, simulate
@@ -100,12 +101,12 @@ def render(
 
 
 def read_correction(survey: Survey, folder: str | Path) -> tuple[Correction, list[TargetRow]]:
-    """The Correction and the targets' rows from a folder that ``correct`` wrote.
+    """Read the Correction and the targets' rows from a folder written by ``correct``.
 
     Raises
     ------
     ValueError
-        When it holds no results, or those of another survey.
+        If it contains no results, or those of another survey.
     """
     folder = Path(folder)
     files = folder / "trajectory.csv", folder / "report.json"

@@ -14,7 +14,7 @@ from mlscorr.pipeline.logs import write_log
 def demo(out, seed=1, overwrite=False, progress=None):
     """Simulate a small survey and correct it: a folder with ``survey`` and ``corrected``.
 
-    Returns the corrected survey's document of report.json.
+    Returns the document of report.json.
     """
     from mlscorr.simulate import DEMO, simulate
 
@@ -30,9 +30,9 @@ def demo(out, seed=1, overwrite=False, progress=None):
 def simulate_survey(scenario_path, out, seed=1, overwrite=False, progress=None):
     """Simulate the survey of a scenario file: a survey folder, with truth.npz and truth.json.
 
-    The folder appears whole or not at all. Returns the document of the JSON output. Raises
-    ValueError for a scenario that no survey can have, or a folder that holds an input or, without
-    overwrite, anything; OSError when writing fails.
+    The folder is written atomically. Returns the document of the JSON output. Raises ValueError for
+    an impossible scenario, or a folder that contains an input or, without overwrite, anything;
+    OSError if writing fails.
     """
     from mlscorr.simulate import read_scenario, scenario_files, simulate
 
@@ -45,7 +45,7 @@ def simulate_survey(scenario_path, out, seed=1, overwrite=False, progress=None):
 
 
 def _simulated(survey, scenario, seed):
-    """The document of a simulated survey, as it is read again from its folder."""
+    """Document of a simulated survey, as read again from its folder."""
     return document(
         "simulate",
         {

@@ -1,7 +1,7 @@
-"""``init``: a survey.toml of what lies in a folder; what is ambiguous is named, never guessed.
+"""``init``: a survey.toml for the files in a folder; ambiguities are listed, never guessed.
 
-Each question is answered by an example for the time being, so that reading goes on to the next: all
-of them are asked at once, and their places in survey.toml are left open.
+Each question is answered by a temporary example, so that reading continues to the next: all of them
+are asked at once, and their values in survey.toml remain open.
 """
 
 import os
@@ -46,21 +46,21 @@ from mlscorr.wording import counted
 
 @dataclass(frozen=True)
 class StartedSurvey:
-    """A survey.toml that can be read once its open places are filled in, and the role of each file.
+    """survey.toml that is complete once its open values are filled in, and the role of each file.
 
     Parameters
     ----------
     path : Path
-        Of the survey.toml to write.
+        Path of the survey.toml to write.
     text : str
     roles : tuple of FileRole
         ``none`` and ``table`` are not used.
     notes : tuple of str
-        What reading it says.
+        Notes from reading it.
     questions : tuple of str
-        A sentence on all that only the user knows.
+        Sentences on values that only the user knows.
     places : tuple of OpenPlace
-        Where text is still open: what answers the questions.
+        Open values in text, which answer the questions.
     """
 
     path: Path
@@ -71,12 +71,12 @@ class StartedSurvey:
     places: tuple[OpenPlace, ...] = ()
 
     def write(self) -> Path:
-        """Write survey.toml, whole or not at all; returns its path.
+        """Write survey.toml atomically, and return its path.
 
         Raises
         ------
         ValueError
-            Where there is one.
+            If there is one already.
         OSError
         """
         _check_free(self.path)
@@ -88,16 +88,16 @@ class StartedSurvey:
 def init(
     folder: str | Path, out: str | Path | None = None, given: Mapping[str, Any] | None = None
 ) -> StartedSurvey:
-    """Say what lies in a folder, and make a survey.toml of it that runs.
+    """List the contents of a folder, and make a survey.toml of it that runs.
 
     Parameters
     ----------
     folder : path
-        With LAS or LAZ files, a trajectory, and control, if there is any.
+        With LAS or LAZ files, a trajectory, and control, if any.
     out : path, optional
-        Of the survey.toml, in the folder by default.
+        Path of the survey.toml, in the folder by default.
     given : mapping, optional
-        What survey.toml shall say, by sections: goes before what is found.
+        Contents of survey.toml, by section, with priority over findings.
 
     Returns
     -------
@@ -107,9 +107,9 @@ def init(
     Raises
     ------
     ValueError
-        Where survey.toml is there, where files are missing or do not fit, with what is to be added.
+        If survey.toml exists, or files are missing or do not match; with the remedy.
     OSError
-        Where the folder of out is not there.
+        If the folder of out does not exist.
 
     >>> import mlscorr, numpy as np, tempfile
     >>> from mlscorr.simulate import Scenario, simulate
@@ -149,7 +149,7 @@ def init(
 
 
 class _Answers:
-    """What the user says, and an example in place of all that only the user knows.
+    """User's answers, and examples for values that only the user knows.
 
     Parameters
     ----------
@@ -164,16 +164,16 @@ class _Answers:
 
     @property
     def places(self):
-        """Open places, in the order in which they were met."""
+        """Open values, in order of occurrence."""
         return tuple(self.open.values())
 
     @property
     def is_crs_open(self):
-        """Whether no example can be given of the CRS: what lies in it is not compared then."""
+        """True if there is no example of the CRS; its coordinates are then not compared."""
         return PLACE_OF_CRS.key in self.open
 
     def add(self, error):
-        """Take a question and its examples; raises ValueError where it can't be answered so."""
+        """Add a question and its examples; raises ValueError if it cannot be answered this way."""
         places = [self._in_folder(place) for place in places_of(error)]
         if not places or any(place.key in self.open for place in places):
             raise ValueError(self._refusal(error)) from None
@@ -184,7 +184,7 @@ class _Answers:
                 _put_nested(self.given, place.keys, place.examples[0])
 
     def _refusal(self, error):
-        """The sentence on a fault that nothing in survey.toml mends, after the questions."""
+        """Error for a fault that survey.toml cannot correct, after the questions."""
         if not self.questions:
             return f"{error} Nothing was written."
         options = " ".join(place.option for place in self.places)
@@ -192,7 +192,7 @@ class _Answers:
         return f"{error} To be said besides: {others} {options} Nothing was written."
 
     def _in_folder(self, place):
-        """A place whose examples are files, named from the folder."""
+        """Open value with example files, named relative to the folder."""
         if place.keys[-1] not in ("file", "accuracy"):
             return place
         names = [Path(os.path.relpath(name, self.folder)).as_posix() for name in place.examples]
@@ -200,7 +200,7 @@ class _Answers:
 
 
 def _copied(given):
-    """Nested tables that can be changed."""
+    """Copy nested tables for modification."""
     return {key: _copied(v) if isinstance(v, Mapping) else v for key, v in given.items()}
 
 
@@ -220,7 +220,7 @@ def _check_free(path):
 
 
 def _ask_of_control(folder, answers, roles):
-    """Meet the questions of the one list of control points, whatever the trajectory is."""
+    """Process the questions on the single list of control points, for any trajectory."""
     lists = _roles(folder, answers.given, "control", roles)
     lists = [role.path for role in lists if role.role == "control" and holds_points(role.path)]
     if len(lists) != 1:
@@ -232,14 +232,14 @@ def _ask_of_control(folder, answers, roles):
         with warnings.catch_warnings(action="ignore"):
             read_control(lists[0], section)
     except AxesError:
-        return  # the trajectory may tell
+        return  # the trajectory may determine it
     except OpenQuestion as question:
         if question.places:
             raise
 
 
 def _text(folder, path, answers, roles):
-    """The SurveyText, and the roles with those that are not taken."""
+    """SurveyText, and the roles with unused files."""
     given = answers.given
     clouds = _clouds(folder, given, roles)
     drive, late = choose_trajectory(
@@ -295,7 +295,7 @@ def _text(folder, path, answers, roles):
 
 
 def _validate(given):
-    """Refuse what no survey.toml can say."""
+    """Refuse contents that are impossible in survey.toml."""
     document: dict[str, Any] = {"trajectory": {"file": ""}, **given}
     for section, key in (("trajectory", "file"), ("control", "file"), ("cloud", "files")):
         if section in given and isinstance(given[section], list):
@@ -306,7 +306,7 @@ def _validate(given):
 
 
 def _roles(folder, given, key, roles):
-    """Files that may be of a role: the one that is given, else those that look like it."""
+    """Candidate files for a role: the given one, otherwise those that resemble it."""
     name = given.get(key, {}).get("file")
     if name is not None:
         if not (folder / name).is_file():
@@ -316,7 +316,7 @@ def _roles(folder, given, key, roles):
 
 
 def _clouds(folder, given, roles):
-    """Clouds of a folder. Raises ValueError where one is damaged, or there is none."""
+    """Clouds of a folder. Raises ValueError if one is damaged, or there are none."""
     names = given.get("cloud", {}).get("files")
     if names is not None:
         files = [path for name in names for path in files_like(folder, name)]
@@ -339,7 +339,7 @@ def _clouds(folder, given, roles):
 
 
 def _preference(cloud):
-    """Rank of a cloud among copies: a LAS or LAZ in order of time is read soonest."""
+    """Rank of a cloud among copies: a LAS or LAZ sorted by time is read fastest."""
     is_in_order = (np.diff(cloud.times) >= 0).all()
     return is_foreign(cloud.layout.cloud), not is_in_order, str(cloud.layout.cloud)
 
@@ -352,7 +352,7 @@ def _no_cloud(folder, reasons=()):
 
 
 def _put_clouds(text, path, clouds, trajectory):
-    """Files of the clouds, their time systems and passes."""
+    """Set files of the clouds, their time systems and passes."""
     names = [_name(path, cloud.layout.cloud) for cloud in clouds]
     patterns = {f"{os.path.dirname(name)}/*{Path(name).suffix}".lstrip("/") for name in names}
     if len(names) > SETTINGS.listed_files and len(patterns) == 1:
@@ -378,7 +378,7 @@ def _put_clouds(text, path, clouds, trajectory):
 
 
 def _note_sources(text, clouds):
-    """Say where the ids of points may be those of scanners."""
+    """Note if the IDs of points may be those of scanners."""
     mixed = [cloud.name for cloud in clouds if cloud.takes_turns]
     if mixed:
         text.note("cloud", f"Ids of points (point_source_id) take turns in {', '.join(mixed)}.")
@@ -386,7 +386,7 @@ def _note_sources(text, clouds):
 
 
 def _put_sessions(text, path, drive, accuracy):
-    """File and accuracy of the trajectory, or of each."""
+    """Set file and accuracy of the trajectory, or of each."""
     for number, (file, part) in enumerate(zip(drive.paths, drive.recorded.parts, strict=True)):
         if len(drive.paths) == 1:
             section = "trajectory"
@@ -399,7 +399,7 @@ def _put_sessions(text, path, drive, accuracy):
 
 
 def _targets(points):
-    """Words on control and check points, and their kinds and sizes."""
+    """Phrase on control and check points, and their kinds and sizes."""
     whole = points.control + points.check
     kinds = Counter(zip(whole.kind, whole.size.tolist(), strict=True))
     listed = ", ".join(f"{n} {kind} {size:g} m" for (kind, size), n in kinds.most_common(5))
@@ -407,7 +407,7 @@ def _targets(points):
 
 
 def _rate(cloud: Cloud, trajectory: Trajectory) -> float | None:
-    """Lines a second of a cloud, None where they are not seen."""
+    """Lines per second of a cloud, None if unknown."""
     file = cloud.file(cloud.match(trajectory))
     points = cloud.layout.points
     first = max(0, points - SETTINGS.rated_points) // 2
@@ -416,12 +416,12 @@ def _rate(cloud: Cloud, trajectory: Trajectory) -> float | None:
 
 
 def _name(path, file):
-    """A file as survey.toml names it."""
+    """Name of a file as in survey.toml."""
     return Path(os.path.relpath(file.resolve(), path.parent.resolve())).as_posix()
 
 
 def _read_notes(path, text):
-    """What reading a survey.toml of this text says. Raises ValueError as read_survey."""
+    """Notes from reading a survey.toml with this text. Raises ValueError like read_survey."""
     part = path.with_name(f".{path.name}.part")
     try:
         part.write_text(text, encoding="utf-8")

@@ -1,4 +1,4 @@
-"""The text of a survey.toml: what is known with why, what is not known as comments."""
+"""Text of a survey.toml: known values with reasons, unknown ones as comments."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ import tomlkit
 
 from mlscorr.io.store import MARK, OpenPlace
 
-COLUMN = 40  # characters, behind which comments start
+COLUMN = 40  # characters, after which comments start
 HEAD = "# Made by mlscorr init. Lines behind # are not known, or need not be: docs/survey.md."
 OPEN = f'# Replace each "{MARK}" with its value: until then check and correct refuse this file.'
 TABLES = ("control.words",)  # keys whose value is a table, not a section
@@ -41,7 +41,7 @@ OPTIONAL = {
 
 @dataclass(frozen=True)
 class _Line:
-    """A key with its value, why, and the open places in its value."""
+    """Key with its value, the reason, and the open values in it."""
 
     key: str
     value: Any
@@ -49,7 +49,7 @@ class _Line:
     places: tuple[OpenPlace, ...] = ()
 
     def text(self, is_marked):
-        """The line as survey.toml has it, its open places marked or with an example."""
+        """Line as in survey.toml, with open values marked or as examples."""
         value = self.value
         reason = self.reason
         if is_marked and self.places:
@@ -72,9 +72,9 @@ class SurveyText:
     Parameters
     ----------
     given : mapping
-        What the user says: goes before all that is put, and is written though nothing is put.
+        User's values, with priority over all others, and always written.
     places : sequence of OpenPlace
-        Those of given that the user has still to say: given holds an example of each.
+        Open values of given, which contains an example of each.
     """
 
     def __init__(self, given: Mapping[str, Any], places: Sequence[OpenPlace] = ()):
@@ -86,7 +86,7 @@ class SurveyText:
         self.entries: dict[str, int] = {}
 
     def listed(self, section: str, number: int) -> str:
-        """Name for put of an entry of a list of sections; what is given is said of each.
+        """Name for put of an entry in a list of sections; given values apply to each.
 
         Parameters
         ----------
@@ -102,15 +102,15 @@ class SurveyText:
         return name
 
     def put(self, section: str, key: str, value: object, reason: str) -> None:
-        """Write a key with its value and why, unless the user gave it.
+        """Write a key with its value and the reason, unless the user gave it.
 
         Parameters
         ----------
         section : str
-            Empty for the first.
+            Empty for the top level.
         key : str
         value : object
-            What TOML holds.
+            Any TOML value.
         reason : str
         """
         dotted = f"{section}.{key}" if section else key
@@ -138,14 +138,15 @@ class SurveyText:
         return self.render(is_marked=True)
 
     def render(self, is_marked: bool) -> str:
-        """The whole text.
+        """Return the whole text.
 
         Parameters
         ----------
         is_marked : bool
-            Whether open places are marked; else they hold their examples, so that it can be read.
+            True to mark open values; otherwise they contain their examples, so that the text is
+            readable.
         """
-        for section in self.entries:  # said of each entry
+        for section in self.entries:  # applies to each entry
             self.given = {k: v for k, v in self.given.items() if not k.startswith(f"{section}.")}
         for dotted in list(self.given):
             section, _, key = dotted.partition(".") if "." in dotted else ("", "", dotted)
@@ -180,5 +181,5 @@ def _flat(given, prefix=""):
 
 
 def _shown(sentence):
-    """A sentence as a comment may hold it: one line."""
+    """Sentence as a comment of one line."""
     return "".join(c if c.isprintable() else " " for c in sentence)

@@ -1,4 +1,4 @@
-"""``ties``: from a survey to what two of its passes both saw."""
+"""``ties``: from a survey to the tie features of its overlapping passes."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
-AXES = ("across", "along", "up")  # of the way of the earlier view
+AXES = ("across", "along", "up")  # of the path of the earlier view
 
 LOG = logging.getLogger(__name__)
 
@@ -39,7 +39,7 @@ LOG = logging.getLogger(__name__)
 def find_ties(
     survey: Survey, progress: Callable | None = None, features: TieFeatures | None = None
 ) -> TiedSurvey:
-    """Find planes, poles and paint that two passes both saw, without control.
+    """Find planes, poles and paint in overlaps of passes, without control.
 
     Parameters
     ----------
@@ -47,12 +47,12 @@ def find_ties(
     progress : function, optional
         ``progress(title, total)`` returns a function of the number of points just done.
     features : TieFeatures, optional
-        As ``find_targets(..., with_ties=True)`` has collected them; otherwise the clouds are read.
+        From ``find_targets(..., with_ties=True)``; otherwise the clouds are read.
 
     Returns
     -------
     TiedSurvey
-        Warns where passes don't meet, a direction is not held, or most pairs are refused.
+        Warns if passes do not overlap, a direction is unconstrained, or most pairs are refused.
 
     >>> import mlscorr, numpy as np, tempfile
     >>> from mlscorr.simulate import Scenario, simulate
@@ -79,7 +79,7 @@ def find_ties(
 
 
 def _read_features(survey, progress):
-    """Planes, poles and paint of all clouds."""
+    """Read planes, poles and paint of all clouds."""
     stage = progress or silent
     done = stage("Searching the cloud", survey.points)
     collector = FeatureCollector(survey)
@@ -93,7 +93,7 @@ def _read_features(survey, progress):
 
 @dataclass(frozen=True, repr=False)
 class TiedSurvey(KnownResult):
-    """What passes of a survey both saw, and ``write``.
+    """Ties between the passes of a survey, and ``write``.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ class TiedSurvey(KnownResult):
 
     @property
     def pairs(self) -> list[dict]:
-        """Rows of every pair of passes, as ties.json has them."""
+        """Rows of every pair of passes, as in ties.json."""
         ties = self.search.ties
         rows = []
         heading = self.survey.trajectory.at(ties.gps_time[:, 0]).attitude
@@ -134,11 +134,13 @@ class TiedSurvey(KnownResult):
         return rows
 
     def to_frame(self) -> pandas.DataFrame:
-        """A row each tie, with both its views, as a data frame; pandas is needed for it."""
+        """Return a data frame with a row per tie, with both its views; requires pandas."""
         return self.search.ties.to_frame()
 
     def plot(self) -> Figure:
-        """The ties from above, colored by how far apart both views lie, and the refused pairs."""
+        """Plot the ties from above, colored by the distance of both views, and the refused
+        pairs.
+        """
         from mlscorr.report import search_figure
 
         return search_figure(self.survey.trajectory, self.search.ties, self.search.refused)
@@ -149,9 +151,9 @@ class TiedSurvey(KnownResult):
         Parameters
         ----------
         origin : (3,) array, optional
-            As of ``PointCloud.to_open3d``.
+            See ``PointCloud.to_open3d``.
         enlarged : float
-            Factor by which lines are drawn longer than they are, about their middles.
+            Magnification of lines, about their middles.
 
         Returns
         -------
@@ -163,7 +165,7 @@ class TiedSurvey(KnownResult):
         return tie_lines(self.search.ties, origin, enlarged)
 
     def _overview(self):
-        """What a notebook shows."""
+        """Return the rows that a notebook shows."""
         kinds = ("planes", "poles", "lines", "dashes")
         rows = [("passes", *kinds, "apart across, along, up (m, RMS)")]
         for pair in self.pairs:
@@ -174,7 +176,9 @@ class TiedSurvey(KnownResult):
 
     @property
     def stretches(self) -> list[dict]:
-        """What the ties of each pair of passes hold least, in stretches of the earlier view."""
+        """Weakest directions of the ties of each pair of passes, by interval of the earlier
+        view.
+        """
         ties = self.search.ties
         group = group_by_time(ties, 0, SETTINGS.pause)
         rows = []
@@ -194,7 +198,7 @@ class TiedSurvey(KnownResult):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a reader of the ties must know."""
+        """Warnings for a reader of the ties."""
         ties = self.search.ties
         refused = self.search.refused
         if len(ties) == 0:
@@ -233,7 +237,7 @@ class TiedSurvey(KnownResult):
         }
 
     def _files(self):
-        """ties.csv and ties.json."""
+        """Files ties.csv and ties.json."""
         return ResultFiles.of(
             self._name,
             self.survey.inputs,
@@ -249,7 +253,7 @@ def _misfit(misclosure):
 
 
 def _weakest(ties):
-    """The direction that ties hold least, and one sigma of a shift along it. Units: m."""
+    """Weakest direction of ties, and one sigma of a shift along it. Units: m."""
     values, axes = np.linalg.eigh(information(ties, np.zeros(len(ties), int))[0])
     sigma = float(values[0] ** -0.5) if values[0] > 0 else None
     return {"direction": axes[:, 0].tolist(), "sigma": sigma}

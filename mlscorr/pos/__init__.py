@@ -1,10 +1,10 @@
-"""What is believed of the POS, once for everybody.
+"""Assumptions about the POS, defined once for all rooms.
 
-The POS states a sigma per epoch and component; where its file has none, survey.toml's ``[pos]`` or
-the default stands in. What is stated is a hypothesis: searches look farther than it says, and
-estimates scale it. The recorded path itself tells more: a filtered POS that regains GNSS falls back
-within moments, by a step that no vehicle drives. Across it drift starts anew, and the step is what
-the drift had grown to.
+The POS states a sigma per epoch and component; if its file has none, survey.toml's ``[pos]`` or the
+default replaces it. Stated sigmas are a hypothesis: searches allow for more, and estimates scale
+them. The recorded path gives further information: a filtered POS that regains GNSS is corrected
+within moments, by a step that no vehicle drives. At the step drift restarts, and its size is that
+of the drift before it.
 """
 
 from mlscorr.pos.errors import PosErrors

@@ -1,4 +1,4 @@
-"""What a POS errs by along a drive: stated sigma(t), open scales, and when drift grows."""
+"""Errors of a POS along a drive: stated sigma(t), unknown scales, and the start of drift."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from mlscorr.survey import Pos, Summary, Trajectory
 class PosErrors(Summary):
     """The errors of a POS along a recorded drive.
 
-    What the POS states is a hypothesis. Parameters (SignalParameters) scale it and say how fast
-    errors change; whoever has observations makes a posterior of them.
+    Stated sigmas are a hypothesis. Parameters (SignalParameters) scale them and define how fast
+    errors change; estimates with observations give their posterior.
 
     Parameters
     ----------
     trajectory : Trajectory
         As recorded, as a whole.
     pos : Pos
-        Beliefs, used where the trajectory has no sigmas.
+        Assumptions, used if the trajectory has no sigmas.
     starts : (k,) array
-        When each drift of the history begins to grow. Units: s.
+        Start of growth of each drift of the history. Units: s.
     """
 
     trajectory: Trajectory
@@ -38,7 +38,7 @@ class PosErrors(Summary):
 
     @classmethod
     def stated(cls, trajectory: Trajectory, pos: Pos | None = None) -> PosErrors:
-        """The errors as the POS states them.
+        """Return the errors as stated by the POS.
 
         Parameters
         ----------
@@ -49,11 +49,11 @@ class PosErrors(Summary):
 
     @property
     def history(self) -> DriftHistory:
-        """History of the drift: when it starts anew, and when it is said to grow."""
+        """History of the drift: its restarts, and the stated starts of its growth."""
         return drift_history(self.trajectory)
 
     def with_starts(self, starts: np.ndarray) -> PosErrors:
-        """The same with drift that grows from other times on.
+        """Return the same errors with other starts of drift.
 
         Parameters
         ----------
@@ -63,7 +63,7 @@ class PosErrors(Summary):
         return replace(self, starts=starts)
 
     def at(self, gps_time: np.ndarray) -> StatedSigma:
-        """Stated sigmas and their parts at some times.
+        """Return stated sigmas and their parts at some times.
 
         Parameters
         ----------
@@ -73,12 +73,12 @@ class PosErrors(Summary):
         Raises
         ------
         ValueError
-            Where a time lies outside the trajectory or in one of its gaps.
+            If a time is outside the trajectory or in one of its gaps.
         """
         return stated_sigma(self.trajectory, self.pos, gps_time, self.starts)
 
     def predictive(self, gps_time: np.ndarray) -> Predictive:
-        """Hypotheses on the position error at some times, before anything is observed.
+        """Return hypotheses on the position error at some times, before any observation.
 
         Parameters
         ----------
@@ -88,7 +88,7 @@ class PosErrors(Summary):
         return predictive(self.at(gps_time).position, self.pos.correlation_time)
 
     def point_sigma(self, gps_time: np.ndarray, distance: np.ndarray) -> np.ndarray:
-        """Largest stated sigma (n,) over all axes of points at a distance. Units: m.
+        """Return the largest stated sigma (n,) over all axes of points at a distance. Units: m.
 
         Parameters
         ----------
@@ -99,15 +99,15 @@ class PosErrors(Summary):
         return np.hypot(stated.position.max(axis=1), distance * stated.angles.max(axis=1))
 
     def motion_covariance(self, gps_time: np.ndarray, duration: np.ndarray) -> np.ndarray:
-        """Covariance (n, 3, 3) of how far the position error moves about some times. Units: m^2.
+        """Covariance (n, 3, 3) of the change of the position error about some times. Units: m^2.
 
         The rate of a smooth (Matern 3/2) process is sigma sqrt(3) over its correlation time. The
-        attitude's share is left out: an error of 0.1 mrad moves a target at 10 m by 1 mm in all.
+        attitude's share is neglected: an error of 0.1 mrad moves a target at 10 m by 1 mm in all.
 
         Parameters
         ----------
         gps_time, duration : (n,) array
-            Times, and the standard deviation of those of the points scanned then. Units: s.
+            Times, and the standard deviation of the times of points scanned then. Units: s.
         """
         rate = self.at(gps_time).position * np.sqrt(3) / self.pos.correlation_time
         moved = rate * np.asarray(duration)[:, None]
@@ -121,7 +121,7 @@ class PosErrors(Summary):
     def pose_signals(
         self, parameters: SignalParameters, rows: slice | np.ndarray = slice(None)
     ) -> tuple[Signal, ...]:
-        """Signals of position and rotation (six rows) at some epochs of the trajectory.
+        """Return signals of position and rotation (six rows) at some epochs of the trajectory.
 
         Parameters
         ----------

@@ -1,8 +1,8 @@
-"""When the drift of a trajectory starts anew, and when it is said to grow.
+"""Restarts of the drift of a trajectory, and the stated starts of its growth.
 
-The error of a position can't change at once where the recorded path doesn't. So the sigmas of its
-parts change at once at steps of the path alone, and elsewhere no quicker than GNSS can tell; what
-sigma(t) states is taken free of the noise of epochs.
+The error of a position can't change abruptly if the recorded path doesn't. So the sigmas of its
+parts change abruptly only at steps of the path, and elsewhere no faster than GNSS can show;
+sigma(t) is used without the noise of single epochs.
 """
 
 from dataclasses import dataclass
@@ -20,32 +20,32 @@ from mlscorr.survey import Trajectory
 
 @dataclass(frozen=True)
 class DriftHistory:
-    """What a recorded trajectory tells of its drift.
+    """History of the drift, as shown by a recorded trajectory.
 
     Parameters
     ----------
     trajectory : Trajectory
     steps : Steps
-        Fall-backs that stand in the recorded path.
+        Steps of the recorded path at re-acquisitions.
     restarts : (k,) array
-        When drift starts anew: at steps and starts of passes; at falls of sigma(t) where the path
-        has too few epochs to show a step. Units: s.
+        Restarts of drift: at steps and starts of passes; at falls of sigma(t) if the path has too
+        few epochs to show a step. Units: s.
     returns : (r,) array
-        When drift is back without a step of the path: sigma(t) has sunk gently from the middle of
-        an outage, as of a smoother, or has fallen at once. Units: s.
+        Returns of drift to zero without a step of the path: sigma(t) has decreased gradually from
+        the middle of an outage, as for a smoother, or has fallen abruptly. Units: s.
     smoothed : (j,) array
         The former of these. Units: s.
     starts : (k + r + 1,) array
-        When it begins to grow after the start, each restart and each return: where sigma(t) says
-        so, never (infinite) where it says that it doesn't, else at once. Units: s.
+        Start of growth after the start, each restart and each return: as stated by sigma(t), never
+        (infinite) if it states no growth, else at once. Units: s.
     sigma : (n, 3) array
-        What is stated of E, N, H, in time with the path; zero where nothing is. Units: m.
+        Stated sigmas of E, N, H, synchronized with the path; zero if missing. Units: m.
     held : (3,) array
-        The sigma of E, N, H that stays while GNSS holds the POS; zero where sigma(t) doesn't tell
-        it from the part that grows. Units: m.
+        The sigma of E, N, H that remains with GNSS; zero if sigma(t) doesn't separate it from the
+        growing part. Units: m.
     level : (n, 3) array
-        The same at each epoch of the trajectory, larger where sigma(t) is raised at once, as by a
-        solution that is not fixed: the smallest since it was raised, until it is raised again.
+        The same at each epoch of the trajectory, larger after an abrupt increase of sigma(t), as by
+        a solution that is not fixed: the smallest value since the increase, until the next one.
         Units: m.
     """
 
@@ -61,7 +61,7 @@ class DriftHistory:
 
     @property
     def is_stated(self) -> bool:
-        """Whether sigma(t) tells when drift grows."""
+        """True if sigma(t) shows the growth of drift."""
         return bool(self.held.any())
 
     @cached_property
@@ -72,7 +72,7 @@ class DriftHistory:
 
     @cached_property
     def ends(self) -> np.ndarray:
-        """Until when each drift that grows is back without a restart (k + r + 1,); infinite: never.
+        """End of each growing drift without a restart (k + r + 1,); infinite means never.
 
         Units: s.
         """
@@ -99,7 +99,7 @@ class DriftHistory:
         return np.searchsorted(self.edges[1:-1], gps_time, side="right")
 
     def raised(self, gps_time: np.ndarray) -> np.ndarray:
-        """Number of the stretch in which sigma(t) is raised, from 0; -1 where it isn't: (n,).
+        """Number of the interval of elevated sigma(t), from 0; -1 outside: (n,).
 
         Parameters
         ----------
@@ -117,13 +117,13 @@ class DriftHistory:
 
     @cached_property
     def turns(self) -> np.ndarray:
-        """Times (j,) at which the level changes at once: another solution, of other errors. s.
+        """Times (j,) of abrupt changes of the level: another solution, of other errors. s.
 
-        At a step of the path, or where one of the two solutions is GNSS at its best.
+        At a step of the path, or if one of the two solutions is GNSS at its best.
         """
         time = self.trajectory.gps_time
         size = np.linalg.norm(self.level, axis=1)
-        # where the change is over: what is on the way is no larger than what was before
+        # end of the change: values in between are no larger than the earlier one
         rows = quick_changes(time, size)[:, 1]
         beside = np.linalg.norm([self.added[rows - 1], self.added[rows]], axis=2).min(axis=0)
         is_turn = np.isin(rows, self.steps.rows(time)) | (beside < np.linalg.norm(self.held))
@@ -131,9 +131,9 @@ class DriftHistory:
 
     @cached_property
     def least(self) -> np.ndarray:
-        """Sigma (n, 3) to which GNSS holds the POS at its best: changes at steps alone. Units: m.
+        """Sigma (n, 3) of the POS with best GNSS, changing only at steps. Units: m.
 
-        Zero where nothing is stated.
+        Zero if nothing is stated.
         """
         if self.is_stated:
             return np.tile(self.held, (len(self.sigma), 1))
@@ -141,22 +141,22 @@ class DriftHistory:
 
     @cached_property
     def added(self) -> np.ndarray:
-        """The level's part (n, 3) beyond what GNSS holds the POS to at its best. Units: m.
+        """Part (n, 3) of the level in excess of that with best GNSS. Units: m.
 
-        It changes at once at steps alone, as drift does.
+        It changes abruptly only at steps, like drift.
         """
         return self._continuous(np.sqrt(np.maximum(self.level**2 - self.held**2, 0.0)))
 
     @cached_property
     def drift(self) -> np.ndarray:
-        """The part (n, 3) of the stated sigma that grows where GNSS is missing. Units: m."""
+        """The part (n, 3) of the stated sigma that grows without GNSS. Units: m."""
         return self._continuous(np.sqrt(np.maximum(self.sigma**2 - self.level**2, 0.0)))
 
     @cached_property
     def folds(self) -> np.ndarray:
-        """E-folds (n,) by which sigma(t) has risen and sunk so far in outages of a smoother.
+        """E-folds (n,) of the total rise and decrease of sigma(t) in outages of a smoother.
 
-        Of the size of all axes; noise of single epochs counts for nothing.
+        Of the size of all axes, without the noise of single epochs.
         """
         time = self.trajectory.gps_time
         if len(self.smoothed) == 0:  # sigma may be zero then
@@ -182,7 +182,7 @@ class DriftHistory:
 
 
 def drift_history(trajectory: Trajectory) -> DriftHistory:
-    """The history of a trajectory, worked out once.
+    """Return the history of a trajectory, computed once.
 
     Parameters
     ----------
@@ -229,7 +229,7 @@ def _history(trajectory):
             lowest = np.minimum.accumulate(steady[settled:following], axis=0)
             level[settled:following] = np.maximum(lowest, held)
             level[first:settled] = level[settled]
-        # what is raised at once and goes back is no drift, but what GNSS holds the POS to
+        # a temporary abrupt increase is no drift, but a worse solution of GNSS
         if np.any((steady[settled:last] ** 2 - 2 * level[settled:last] ** 2).sum(axis=1) > 0):
             grown.append(time[first])
         following = first
@@ -239,18 +239,18 @@ def _history(trajectory):
 
 
 def _shows_steps(trajectory):
-    """Whether braking moves a path by less in an epoch than a step that counts."""
+    """True if braking moves a path by less in an epoch than the smallest step."""
     epoch = float(np.median(np.diff(trajectory.gps_time)))
     return SETTINGS.largest_jerk / 2 * epoch**3 < SETTINGS.smallest_step
 
 
 def _returns(time, size, raised, restarts):
-    """Ends of outages in the middle of which sigma(t) is largest, as a smoother states it. s."""
+    """Ends of outages with the largest sigma(t) in the middle, as stated by a smoother. s."""
     returns = []
     for first, last in raised:
         if last == len(time):
             continue
-        # sigma of a filter grows until GNSS is back, that of a smoother until the middle
+        # sigma of a filter grows until GNSS returns, that of a smoother until the middle
         peak = time[first + np.argmax(size[first:last])]
         is_tied = first > 0 and peak < (time[first] + 3 * time[last]) / 4
         is_cut = (restarts > time[first]) & (restarts < time[last] + SETTINGS.reacquisition_time)
@@ -260,18 +260,18 @@ def _returns(time, size, raised, restarts):
 
 
 def _falls(time, size, changes, held, restarts):
-    """Times at which sigma(t) falls back, without those of known restarts. Units: s."""
+    """Times at which sigma(t) falls, except those of known restarts. Units: s."""
     first, last = changes.T
     limit = SETTINGS.steady_ratio * np.linalg.norm(held)
     is_fall = (size[last] < size[first]) & (size[first] > limit)
     falls = (time[last - 1] + time[last])[is_fall] / 2
-    # a sigma that falls while the path steps a little later or sooner tells of the same return
+    # a fall of sigma a little before or after a step of the path is the same return
     away = np.abs(falls[:, None] - restarts).min(axis=1, initial=np.inf)
     return falls[away > SETTINGS.reacquisition_time]
 
 
 def _held(sigma):
-    """Sigma (3,) to which GNSS holds the POS, of (n, 3); zero where it is constant."""
+    """Sigma (3,) with GNSS, from (n, 3) stated ones; zero if constant."""
     held = np.percentile(sigma, SETTINGS.held_percentile, axis=0)
     is_steady = (sigma.max(axis=0) <= SETTINGS.steady_ratio * held).all()
     if is_steady:
@@ -280,10 +280,10 @@ def _held(sigma):
 
 
 def quick_changes(gps_time: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Rows (k, 2) before and after each change of a size, at once or as filters spread it.
+    """Rows (k, 2) before and after each abrupt change of a size, or one spread by filters.
 
-    Before and after it the size stays, or changes by less than half as much in as long a time:
-    what grows from nothing, and sinks to it, is no such change, though it doubles in no time.
+    Before and after it the size is constant, or changes by less than half as much in an equal time:
+    growth from zero, and decrease to it, is no such change, although it doubles quickly.
 
     Parameters
     ----------
@@ -309,14 +309,14 @@ def quick_changes(gps_time: np.ndarray, size: np.ndarray) -> np.ndarray:
 
 
 def _beside(gps_time, rows, duration):
-    """Rows a duration after rows, or before where it is negative; one row at least."""
+    """Rows a duration after rows, or before if it is negative; at least one row away."""
     away = np.searchsorted(gps_time, gps_time[rows] + duration, side="right") - 1
     away = np.where(duration > 0, np.maximum(away, rows + 1), np.minimum(away, rows - 1))
     return away.clip(0, len(gps_time) - 1)
 
 
 def runs(flags: np.ndarray, cuts: np.ndarray | tuple = ()) -> list[tuple[int, int]]:
-    """First row of each run of flags, and the row after its last one; parted at cuts.
+    """First row of each run of flags, and the row after its last one; split at cuts.
 
     Parameters
     ----------
@@ -350,11 +350,11 @@ def steady_sigma(trajectory: Trajectory) -> np.ndarray:
 
 
 def timely_sigma(trajectory: Trajectory, steps: Steps) -> tuple[np.ndarray, np.ndarray]:
-    """Sigma (n, 3) of the position as stated, and by the median about each epoch, with the path.
+    """Sigma (n, 3) of the position as stated, and by a running median, timed by the path.
 
-    What a trajectory states is often of another rate, or of another filter, than its path: a step
-    of the path near a change is the same event, seen better, since the error can't change at once
-    where the path doesn't. There both change. Units: m.
+    Sigmas often have another rate, or come from another filter, than the path: a step of the path
+    near a change is the same event, with a better time, because the error can't change abruptly if
+    the path doesn't. Both change at the step. Units: m.
 
     Parameters
     ----------
@@ -377,7 +377,7 @@ def timely_sigma(trajectory: Trajectory, steps: Steps) -> tuple[np.ndarray, np.n
 
 
 def _whole_change(gps_time, values, first, last):
-    """Rows of a change from where values (n, 3) are largest: a filter's variance falls slowly."""
+    """Rows of a change from the largest values (n, 3) on: a filter's variance falls slowly."""
     size = np.linalg.norm(values, axis=1)
     sooner, later = _beside(
         gps_time, np.array([first, last]), np.array([-1, 1]) * SETTINGS.step_duration
@@ -392,10 +392,10 @@ def _whole_change(gps_time, values, first, last):
 def continuous(
     gps_time: np.ndarray, amplitude: np.ndarray, least: np.ndarray, breaks: np.ndarray
 ) -> np.ndarray:
-    """The largest amplitude (n, 3) below a given one that changes at once at breaks alone.
+    """Largest amplitude (n, 3) below a given one that changes abruptly only at breaks.
 
-    Elsewhere it changes by no more than a factor of e in SETTINGS.change_interval, but for the
-    part below ``least``: so drift that grows by a power of time is left as it is.
+    Elsewhere it changes by no more than a factor of e in SETTINGS.change_interval, except for the
+    part below ``least``: so drift that grows by a power of time is unchanged.
 
     Parameters
     ----------
@@ -404,7 +404,7 @@ def continuous(
     amplitude : (n, 3) array
         Units: m.
     least : (3,) array
-        What GNSS holds the POS to. Units: m.
+        Sigma of the POS with GNSS. Units: m.
     breaks : (k,) int array
         First rows after breaks.
     """
@@ -419,7 +419,7 @@ def continuous(
 
 
 def _pairs(times, others):
-    """Numbers (k, 2) of times and others that can be the same, twice as near as to any third."""
+    """Index pairs (k, 2) of matching times, twice as close as to any third one."""
     back, _ = cKDTree(times[:, None]).query(others[:, None], 2)
     away, number = cKDTree(others[:, None]).query(times[:, None], 2)
     limit = np.minimum(away[:, 1], np.append(back[:, 1], 0.0)[number[:, 0]]) / 2  # 0: no others

@@ -1,8 +1,8 @@
-"""What is believed of a POS's open scales before anything is observed.
+"""Prior of a POS's unknown scales, before any observation.
 
-Nobody multiplies stated sigmas by a constant of its own. Whoever has observations makes a posterior
-of scales and times; the diagnosis averages over processes with a prior of their scale, and where
-time presses, a few hypotheses (``Predictive``) stand for all that a drive may bring.
+No room multiplies stated sigmas by its own constant. Estimates with observations give a posterior
+of scales and times; the diagnosis averages over processes with a prior of their scale, and fast
+computations use a few hypotheses (``Predictive``) for all possible drives.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Process(NamedTuple):
     family : str
         Of the covariance function.
     time : float
-        On the believed correlation time.
+        On the assumed correlation time.
     weight : float
         Prior probability.
     """
@@ -40,7 +40,7 @@ class Process(NamedTuple):
 
 
 def stated_processes() -> Iterator[Process]:
-    """Processes of a POS whose sigmas are about right; their weights add up to one."""
+    """Yield processes of a POS with roughly correct sigmas; their weights add up to one."""
     scales = np.asarray(SETTINGS.process_scales)
     share = np.exp(-0.5 * (np.log(scales) / SETTINGS.process_scale_spread) ** 2)
     for family, time, weight in SETTINGS.process_shapes:
@@ -56,7 +56,7 @@ class Predictive(NamedTuple):
     sigma : (m, n, 3) array
         Of an error that changes smoothly (Matern 3/2). Units: m.
     rough_variance : (m, n, 3) array
-        Of an error that each epoch has alone. Units: m^2.
+        Of an error that is independent at each epoch. Units: m^2.
     correlation_time : (m,) array
         Of the former. Units: s.
     """
@@ -67,14 +67,14 @@ class Predictive(NamedTuple):
 
 
 def predictive(sigma: np.ndarray, correlation_time: float) -> Predictive:
-    """Hypotheses about what a POS states: other scales, biases and errors that it doesn't know of.
+    """Return hypotheses about stated sigmas: other scales, biases and unstated errors.
 
     Parameters
     ----------
     sigma : (n, 3) array
         As stated. Units: m.
     correlation_time : float
-        As believed. Units: s.
+        As assumed. Units: s.
     """
     drifts = [(scale, 0.0) for scale in SETTINGS.sigma_scales]
     drifts += [(1.0, bias) for bias in SETTINGS.slow_biases]
@@ -87,7 +87,7 @@ def predictive(sigma: np.ndarray, correlation_time: float) -> Predictive:
 
 
 def excursion_profile(gps_time: np.ndarray, start: float, end: float, shape: str) -> np.ndarray:
-    """Profile (n,) from 0 to 1 of an error that comes between two times, and is zero elsewhere.
+    """Profile (n,) from 0 to 1 of a temporary error, zero outside of its two times.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def excursion_profile(gps_time: np.ndarray, start: float, end: float, shape: str
     start, end : float
         Units: s.
     shape : str
-        RISE, as in real time until GNSS is back; HUMP, as a smoother ties it down at both ends.
+        RISE, as in real time until GNSS is back; HUMP, as a smoother constrains it at both ends.
     """
     share = (gps_time - start) / (end - start)
     is_inside = (share >= 0) & (share < 1)

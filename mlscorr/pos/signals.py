@@ -1,4 +1,4 @@
-"""The POS error as random signals, each on a clock and with a sigma of its own."""
+"""The POS error as random signals, each with its own clock and sigma."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from mlscorr.pos.stated import StatedSigma
 
 @dataclass(frozen=True)
 class SignalParameters:
-    """What is chosen by likelihood: factors on stated sigmas, correlation times in s, and a sigma.
+    """Parameters chosen by likelihood: factors on stated sigmas, correlation times in s, a sigma.
 
     Parameters
     ----------
     family : str
-        Covariance family of drift, of bias and of attitude (Matern 3/2 beside integrated drift).
+        Covariance family of drift, of bias and of attitude (Matern 3/2 with integrated drift).
     drift_scale, drift_time : float
     walk_scale : float
         Of the random walk in an integrated drift.
     jitter_scale, jitter_time : float
     bias_scale, bias_time : float
     level_scale : float
-        Of what sigma(t) is raised by at once, as by a solution that is not fixed.
+        Of abrupt increases of sigma(t), as by a solution that is not fixed.
     attitude_scale, attitude_time : float
     trend_sigma : float
         Of each coefficient of the trend. Units: m.
@@ -47,10 +47,10 @@ class SignalParameters:
 def pose_signals(
     stated: StatedSigma, parameters: SignalParameters, partials: np.ndarray
 ) -> tuple[Signal, ...]:
-    """Signals as they enter three axes of n points: drift first, GNSS and attitude last.
+    """Return signals as they affect three axes of n points: drift first, GNSS and attitude last.
 
-    The errors of GNSS at its best run on all along, so that their sigma never changes at once.
-    What another solution adds to them comes and goes with it.
+    The errors of GNSS at its best continue throughout, so that their sigma never changes abruptly.
+    Additional errors of another solution come and go with it.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def pose_signals(
 
 
 def drift_signals(parameters: SignalParameters) -> int:
-    """Number of the signals, the first of pose_signals, that are drift.
+    """Number of drift signals, the first ones of pose_signals.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def drift_signals(parameters: SignalParameters) -> int:
 
 
 def _drift(stated, parameters, position):
-    """Drift with the stated sigma(t), or velocity and position random walk since GNSS went."""
+    """Drift with the stated sigma(t), or velocity and position random walk without GNSS."""
     if parameters.family != INTEGRATED:
         drift = parameters.drift_scale * position * stated.drift[:, None]
         clock = stated.clock + parameters.drift_time * stated.folds_clock

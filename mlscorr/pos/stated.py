@@ -1,4 +1,4 @@
-"""Stated sigmas of the POS, their fallback, and how its drift may have grown."""
+"""Stated sigmas of the POS, defaults for missing ones, and possible growth of its drift."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from mlscorr.survey import Pos, Trajectory
 
 LEAP = 1e7  # s: on a clock, more than any correlation time
 LOG_LEAP = 2e3  # the same on a logarithmic clock
-ONWARD = 1e-6  # 1/s: a clock that stood still would leave no room between two states
-SOONEST = 0.05  # s after its start drift is no different from none
+ONWARD = 1e-6  # 1/s: a clock that does not advance would leave no room between two states
+SOONEST = 0.05  # s after its start drift is still negligible
 
 
 @dataclass(frozen=True)
 class StatedSigma:
-    """What is believed of the POS at n epochs.
+    """Assumptions about the POS at n epochs.
 
     Parameters
     ----------
@@ -36,12 +36,12 @@ class StatedSigma:
     largest : (3,) array
         The position's largest sigma on the whole trajectory. Units: m.
     least, added, drift : (n, 3) array
-        Parts of the position's sigma: to which GNSS holds the POS at its best, by which another
-        solution is worse, and what grows where GNSS is missing. Units: m.
+        Parts of the position's sigma: with GNSS at its best, the excess of another solution, and
+        the part that grows without GNSS. Units: m.
     history : DriftHistory
         Of the whole trajectory.
     starts : (k,) array
-        When each drift of the history begins to grow. Units: s.
+        Start of growth of each drift of the history. Units: s.
     """
 
     gps_time: np.ndarray
@@ -62,14 +62,14 @@ class StatedSigma:
 
     @property
     def held(self) -> np.ndarray:
-        """The part (n, 3) of the position's sigma that stays; zero where none is told. Units: m."""
+        """Part (n, 3) of the position's sigma that remains with GNSS; zero if unknown. Units: m."""
         if self.history.is_stated:
             return self.gnss
         return np.zeros_like(self.gnss)
 
     @property
     def gnss(self) -> np.ndarray:
-        """Sigma (n, 3) of a POS that GNSS holds: the stated one, else that of RTK. Units: m."""
+        """Sigma (n, 3) of a POS with GNSS: the stated one, else that of RTK. Units: m."""
         return np.hypot(self.least, self.added)
 
     @cached_property
@@ -79,7 +79,7 @@ class StatedSigma:
 
     @cached_property
     def ahead(self) -> np.ndarray:
-        """Share (n,) of a drift's time that lies ahead, as a smoother ties it down; else 1.
+        """Remaining fraction (n,) of a drift's time, if a smoother constrains its end; else 1.
 
         A (integrated) random walk w(t) that is back at zero at T, with its velocity, is a free
         one of another time, (1 - t / T)^p w(t / (1 - t / T)), with p = 1 (3).
@@ -104,15 +104,16 @@ class StatedSigma:
 
     @cached_property
     def clock(self) -> np.ndarray:
-        """Time (n,) that leaps where drift starts anew. Units: s."""
+        """Time (n,) that leaps at restarts of drift. Units: s."""
         first = self.history.trajectory.gps_time[0]
         return self.gps_time - first + LEAP * self.history.segment(self.gps_time)
 
     @cached_property
     def folds_clock(self) -> np.ndarray:
-        """Correlation times (n,) that pass as the sigma(t) of a smoother rises and sinks.
+        """Correlation times (n,) elapsed with the rise and decrease of a smoother's sigma(t).
 
-        It rises within seconds of an outage's ends and stays long in its middle, and so does drift.
+        It rises within seconds of an outage's ends and stays constant long in its middle, like
+        drift.
         """
         history = self.history
         passed = history.folds / SETTINGS.correlated_folds
@@ -120,7 +121,7 @@ class StatedSigma:
 
     @cached_property
     def gnss_clock(self) -> np.ndarray | None:
-        """Time (n,) that leaps where another solution holds the POS; None where none does. s."""
+        """Time (n,) that leaps at changes of the GNSS solution; None without any. s."""
         turns = self.history.turns
         if len(turns) == 0:
             return None
@@ -129,14 +130,14 @@ class StatedSigma:
 
     @cached_property
     def growth_clock(self) -> np.ndarray:
-        """Logarithm (n,) of the time since drift began to grow, with leaps where it does."""
+        """Logarithm (n,) of the time since drift began to grow, with leaps at these starts."""
         number = 2 * self.history.growth(self.gps_time) + (self.since > 0)
         onward = ONWARD * (self.gps_time - self.history.trajectory.gps_time[0])
         time = np.maximum(self.since, SOONEST) / (SOONEST * self.ahead)
         return np.log(time) + onward + LOG_LEAP * number
 
     def at(self, rows: slice | np.ndarray) -> StatedSigma:
-        """That of some epochs.
+        """Return the stated sigmas of some epochs.
 
         Parameters
         ----------
@@ -160,23 +161,23 @@ def stated_sigma(
     gps_time: np.ndarray | None = None,
     starts: np.ndarray | None = None,
 ) -> StatedSigma:
-    """What the POS states, filled in from beliefs where the trajectory has no sigmas.
+    """Return the sigmas stated by the POS, or assumed ones if the trajectory has none.
 
     Parameters
     ----------
     trajectory : Trajectory
-        As recorded, as a whole: it says how small sigma gets.
+        As recorded, as a whole: it gives the smallest sigma.
     pos : Pos
-        Stands in for sigmas that the trajectory doesn't have.
+        Replaces sigmas that the trajectory doesn't have.
     gps_time : (n,) array, optional
         The trajectory's own epochs by default. Units: s.
     starts : (k,) array, optional
-        When each drift begins to grow; what sigma(t) says by default. Units: s.
+        Start of growth of each drift; as stated by sigma(t) by default. Units: s.
 
     Raises
     ------
     ValueError
-        Where a time lies outside the trajectory or in one of its gaps.
+        If a time is outside the trajectory or in one of its gaps.
     """
     if gps_time is None:
         pose = trajectory
@@ -216,5 +217,5 @@ def stated_sigma(
 
 
 def _at(times, gps_time, values):
-    """Values (n, 3) of epochs, linear in time between them."""
+    """Interpolate values (n, 3) of epochs linearly in time."""
     return np.column_stack([np.interp(times, gps_time, column) for column in values.T])

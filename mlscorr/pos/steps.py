@@ -12,16 +12,16 @@ NOWHERE = np.empty(0)  # s
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Steps(Columns):
-    """Where GNSS came back and the POS with it.
+    """Steps of the position at re-acquisitions of GNSS.
 
     Parameters
     ----------
     before, after : (k,) array
         Last epoch before and first one after each step. Units: s.
     size : (k, 3) array
-        What the position moves beyond the vehicle's motion, after - before. Units: m.
+        Motion of the position in excess of the vehicle's, after - before. Units: m.
     sigma : (k,) array
-        One sigma of it per axis: what the vehicle's motion leaves open. Units: m.
+        One sigma of it per axis, from the uncertainty of the vehicle's motion. Units: m.
     """
 
     before: np.ndarray
@@ -35,7 +35,7 @@ class Steps(Columns):
         return (self.before + self.after) / 2
 
     def rows(self, gps_time: np.ndarray) -> np.ndarray:
-        """Rows of the epochs inside steps and at their ends, each the first after a change.
+        """Return rows of the epochs inside steps and at their ends, each the first after a change.
 
         Parameters
         ----------
@@ -49,17 +49,17 @@ class Steps(Columns):
 
 
 def find_steps(trajectory: Trajectory, changes: np.ndarray = NOWHERE) -> Steps:
-    """Steps of the recorded position against the speed before and after them.
+    """Find steps of the recorded position relative to the speed before and after them.
 
-    Over three equal spans the middle one's way is half of both others', straight on or turned with
-    the vehicle, but for half the jerk times the span cubed. What is more than that, and far above
-    the largest differences of all other seconds, is a step.
+    Over three equal spans the middle one's distance is half of both others', straight on or turned
+    with the vehicle, except for half the jerk times the span cubed. A larger difference, far above
+    the largest ones of all other seconds, is a step.
 
     Parameters
     ----------
     trajectory : Trajectory
     changes : (t,) array, optional
-        When sigma(t) changes at once: there a step counts that is smaller than any by chance.
+        Times of abrupt changes of sigma(t), at which smaller steps are accepted than elsewhere.
         Units: s.
 
     Examples
@@ -106,7 +106,7 @@ def _length(row):
 
 
 def _is_near(row, other):
-    """Whether two rows are within a second of each other."""
+    """True if two rows are within a second of each other."""
     return row[0] < other[1] + 1.0 and row[1] > other[0] - 1.0
 
 
@@ -118,7 +118,7 @@ def _differences(driven, span, changes):
     ways, times = (values[span:] - values[:-span] for values in (driven.position, gps_time))
     speed = ways / times[:, None]
     frames = driven.attitude[span // 2 : span // 2 + len(ways)]
-    turned = frames.inv().apply(speed)  # a car turns with its way, a drone may not
+    turned = frames.inv().apply(speed)  # a car turns with its path, a drone may not
     about = [(v[: -2 * span] + v[2 * span :]) / 2 for v in (speed, turned)]
     about[1] = frames[span:-span].apply(about[1])
     sizes = ways[span:-span] - times[span:-span, None] * np.array(about)
@@ -135,16 +135,16 @@ def _differences(driven, span, changes):
     jerk = SETTINGS.largest_jerk / 2 * times[span : span + len(size)] ** 3
     limit = np.maximum(jerk, max(SETTINGS.smallest_step, SETTINGS.step_ratio * usual))
     is_step = (length > limit) & (length == largest[second])
-    for time in changes:  # one place to look at, not a whole drive
+    for time in changes:  # one place to search, not a whole drive
         rows = np.flatnonzero(
             np.abs(start + times[span : span + len(size)] / 2 - time) < SETTINGS.change_interval
         )
         if len(rows):
             row = rows[np.argmax(length[rows])]
             is_step[row] |= length[row] > max(jerk[row], SETTINGS.steady_ratio * usual)
-    is_step[:span] = is_step[-span:] = False  # half of what a step in the outer span would be
+    is_step[:span] = is_step[-span:] = False  # half of a step in the outer span
     rows = np.flatnonzero(is_step)
-    # what the spans wholly before and after show is no step: filters and resampling ring beside one
+    # a step shown by both adjacent spans is none: filters and resampling ring near one
     beside = np.pad(length, 2 * span, constant_values=usual)
     sigma = beside[[rows, rows + 4 * span]].max(axis=0).clip(usual)
     return [

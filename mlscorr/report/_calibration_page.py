@@ -1,4 +1,4 @@
-"""The page of a calibration, and what it says first."""
+"""Page of a calibration, and its first screen."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -33,7 +33,7 @@ def calibration_screen(content: dict[str, Any], rows: list[TargetRow]) -> dict[s
     Parameters
     ----------
     content : dict
-        The other content of calibration.json, of one scanner.
+        Rest of calibration.json, for one scanner.
     rows : list of TargetRow
         One for each surveyed point and pass.
     """
@@ -41,12 +41,12 @@ def calibration_screen(content: dict[str, Any], rows: list[TargetRow]) -> dict[s
 
 
 def calibration_statements(content: dict[str, Any], rows: list[TargetRow]) -> list[StatementRow]:
-    """All that stands on the first screen of a calibration, in its order.
+    """Rows of the first screen of a calibration, in order.
 
     Parameters
     ----------
     content : dict
-        The other content of calibration.json, of one scanner.
+        Rest of calibration.json, for one scanner.
     rows : list of TargetRow
         One for each surveyed point and pass.
     """
@@ -68,29 +68,29 @@ def calibration_statements(content: dict[str, Any], rows: list[TargetRow]) -> li
 
 
 def scanners_screen(content: dict[str, Any]) -> dict[str, object]:
-    """``rating`` and ``statements`` on what the scanners share.
+    """``rating`` and ``statements`` common to several scanners.
 
     Parameters
     ----------
     content : dict
-        The other content of calibration.json, of scanners that were calibrated together.
+        Rest of calibration.json, for scanners calibrated together.
     """
     return statements_section(scanners_statements(content))
 
 
 def scanners_statements(content: dict[str, Any]) -> list[StatementRow]:
-    """What is said of scanners that were calibrated together, in its order.
+    """Rows on scanners that were calibrated together, in order.
 
     Parameters
     ----------
     content : dict
-        The other content of calibration.json.
+        Rest of calibration.json.
     """
     return [*_relative(content), *_ties(content), *warning_statements(content["warnings"])]
 
 
 def _relative(content) -> Iterator[StatementRow]:
-    """How well it is known how each further scanner stands beside the first."""
+    """Yield the accuracy of each further scanner's mounting relative to the first."""
     for name, row in content["relative"].items():
         fit = row["fit_sigma"]
         sigmas = {part: row[part]["sigma"] for part in PARTS}
@@ -102,7 +102,7 @@ def _relative(content) -> Iterator[StatementRow]:
 
 
 def component_rows(content: dict[str, Any]) -> list[dict[str, Any]]:
-    """A row for each part of the mounting: recorded, what it lacks, sigma, by both methods.
+    """Rows of the mounting's components: recorded value, correction, sigma, by both methods.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def component_rows(content: dict[str, Any]) -> list[dict[str, Any]]:
     """
     names = iter(MOUNTING_COMPONENTS)
     known = iter(content["determined"])
-    known_by = {"lsc": True, "ls": content["ls"]["control"]["n"] > 0}  # LS takes control alone
+    known_by = {"lsc": True, "ls": content["ls"]["control"]["n"] > 0}  # LS uses control only
     return [
         {
             "name": next(names),
@@ -131,7 +131,7 @@ def component_rows(content: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def _lacking(content):
-    """Parts of the recorded mounting that lack more than their sigma."""
+    """Components whose correction exceeds its sigma."""
     return [
         row
         for row in component_rows(content)
@@ -140,7 +140,7 @@ def _lacking(content):
 
 
 def _lack(content):
-    """Whether the recorded mounting holds."""
+    """Statement on whether the recorded mounting is correct."""
     lacking = _lacking(content)
     if lacking:
         return Statement("mounting lacks", "warning", {"components": lacking})
@@ -153,7 +153,7 @@ def _lack(content):
 
 
 def _determined(content):
-    """Which parts this geometry tells."""
+    """Statement on the components determined by this geometry."""
     undetermined = [row for row in component_rows(content) if not row["determined"]]
     count = len(MOUNTING_COMPONENTS)
     if not undetermined:
@@ -163,7 +163,7 @@ def _determined(content):
 
 
 def _remainder(content):
-    """How far targets were and are off, by check points where there are any."""
+    """Statement on the residuals of targets before and after, at check points if there are any."""
     role = "control"
     if content["lsc"]["check"]["n"]:
         role = "check"
@@ -184,12 +184,12 @@ def _remainder(content):
 
 
 def _is_off(errors):
-    """Whether the scanner itself is; it is not where nobody looked."""
+    """True if the scanner itself is wrong; False without a test."""
     return any(row["significant"] for row in (errors or {}).values())
 
 
 def _scanner(content) -> Iterator[StatementRow]:
-    """What the scanner's own ranges and encoder lack."""
+    """Yield statements on errors of the scanner's ranges and encoder."""
     errors = content["scanner_errors"]
     if errors is None:
         return
@@ -204,7 +204,7 @@ def _scanner(content) -> Iterator[StatementRow]:
 
 
 def _ties(content) -> Iterator[StatementRow]:
-    """How far apart the passes lie where both saw the same."""
+    """Yield statements on the differences between passes in overlaps."""
     ties = content["ties"]
     if ties is None or not ties["used"]:
         return
@@ -223,12 +223,12 @@ def _ties(content) -> Iterator[StatementRow]:
 
 
 def calibration_page(content: dict[str, Any]) -> Page:
-    """The page of calibration.json.
+    """Make the page of calibration.json.
 
     Parameters
     ----------
     content : dict
-        The whole document, of one scanner or of several.
+        Complete document, of one scanner or of several.
     """
     scanners = content.get("scanners") or {"": content}
     shared = content if "scanners" in content else None
@@ -250,7 +250,7 @@ def calibration_page(content: dict[str, Any]) -> Page:
 
 
 def _norm(values):
-    """Length of a vector of a document; NaN without one."""
+    """Length of a vector in a document; NaN without one."""
     if values and None not in values:
         return float(np.linalg.norm(values))
     return np.nan

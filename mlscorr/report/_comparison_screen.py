@@ -1,4 +1,4 @@
-"""What a comparison of methods says first: in the terminal, in compare.json and on its page."""
+"""First screen of a comparison of methods: in the terminal, in compare.json and on its page."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -16,9 +16,9 @@ from mlscorr.report.wording import in_words
 from mlscorr.survey import Severity, Statement
 from mlscorr.wording import joined
 
-OWN = "correct"  # the method that the command of this name uses
-UNTIED = "lsc"  # the same by control points alone
-KINDS = ("one move", "over time")  # of methods whose best are named beside the best of all
+OWN = "correct"  # method used by the command of this name
+UNTIED = "lsc"  # the same from control points only
+KINDS = ("one move", "over time")  # of methods whose best are named besides the best of all
 
 
 def comparison_screen(document: dict[str, Any], rows: list[TargetRow]) -> dict[str, object]:
@@ -27,7 +27,7 @@ def comparison_screen(document: dict[str, Any], rows: list[TargetRow]) -> dict[s
     Parameters
     ----------
     document : dict
-        Its other content.
+        Rest of the document.
     rows : list of TargetRow
         One for each surveyed point and pass.
     """
@@ -35,12 +35,12 @@ def comparison_screen(document: dict[str, Any], rows: list[TargetRow]) -> dict[s
 
 
 def comparison_statements(document: dict[str, Any], rows: list[TargetRow]) -> list[StatementRow]:
-    """All that stands on the first screen of a comparison, in its order.
+    """Rows of the first screen of a comparison, in order.
 
     Parameters
     ----------
     document : dict
-        The other content of compare.json.
+        Rest of compare.json.
     rows : list of TargetRow
         One for each surveyed point and pass.
     """
@@ -57,12 +57,12 @@ def comparison_statements(document: dict[str, Any], rows: list[TargetRow]) -> li
 
 
 def verdict(document: dict[str, Any]) -> list[Statement]:
-    """Which method corrects best, and what others of each kind and our own do.
+    """Statements on the best method, and on the best of each kind and our own.
 
     Parameters
     ----------
     document : dict
-        The content of compare.json.
+        Contents of compare.json.
     """
     ranked = ranking(document)
     by = document["scored_by"]
@@ -96,7 +96,7 @@ def verdict(document: dict[str, Any]) -> list[Statement]:
 
 
 def _basis(document):
-    """What the scores rest on."""
+    """Basis of the scores."""
     control = document["control_points"]
     check = document["check_points"]
     if document["scored_by"] == "check":
@@ -109,7 +109,7 @@ def _basis(document):
 
 
 def _ties(document) -> Iterator[StatementRow]:
-    """Which methods use ties between passes, where there are any."""
+    """Yield statements on methods that use ties between passes, if there are any."""
     own = next((row for row in document["methods"] if row["name"] == OWN), None)
     if own is None or own["status"] != "determined":
         return
@@ -123,7 +123,7 @@ def _ties(document) -> Iterator[StatementRow]:
 
 
 def method_warnings(rows: list[dict]) -> list[str]:
-    """Warnings of all methods, each once, after the names of the methods that gave it.
+    """Warnings of all methods, each once, after the names of the methods with it.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def method_warnings(rows: list[dict]) -> list[str]:
 
 
 def _undetermined(document) -> Iterator[StatementRow]:
-    """Methods without a score."""
+    """Yield statements on methods without a score."""
     absent = undetermined(document)
     if absent:
         values = {"count": len(absent), "methods": len(document["methods"])}
@@ -152,7 +152,7 @@ def undetermined(document: dict) -> list[tuple[str, str]]:
     Parameters
     ----------
     document : dict
-        The content of compare.json.
+        Contents of compare.json.
     """
     ranked = ranking(document)
     by = document["scored_by"]
@@ -164,12 +164,12 @@ def undetermined(document: dict) -> list[tuple[str, str]]:
 
 
 def ranking(document: dict) -> list[dict]:
-    """Rows of the methods that have a score, by their 3D RMSE, the best first.
+    """Rows of the methods with a score, sorted by 3D RMSE.
 
     Parameters
     ----------
     document : dict
-        The content of compare.json.
+        Contents of compare.json.
     """
     by = document["scored_by"]
     scored = [row for row in document["methods"] if row[by]["rmse_3d"] is not None]

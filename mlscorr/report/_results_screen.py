@@ -22,18 +22,18 @@ def results_screen(document: dict[str, Any]) -> dict[str, object]:
     Parameters
     ----------
     document : dict
-        Its other content.
+        Rest of the document.
     """
     return statements_section(results_statements(document))
 
 
 def results_statements(document: dict[str, Any]) -> list[StatementRow]:
-    """First screen of a comparison of two results, in its order.
+    """First screen of a comparison of two results, in order.
 
     Parameters
     ----------
     document : dict
-        The other content of compare_results.json.
+        Rest of compare_results.json.
     """
     return [
         StatementRow.of("Trajectory", _trajectory(document["trajectory"])),
@@ -48,14 +48,14 @@ def results_statements(document: dict[str, Any]) -> list[StatementRow]:
 
 
 def _severity(is_small: bool) -> Severity:
-    """What is larger than the smallest difference that counts is to be minded."""
+    """Severity of a difference: a warning unless it is below the smallest relevant one."""
     if is_small:
         return "note"
     return "warning"
 
 
 def _trajectory(section):
-    """By how much the corrected positions differ."""
+    """Statement on the difference of the corrected positions."""
     space = section["difference"]["3d"]
     largest = space["largest"]
     values = {
@@ -70,7 +70,7 @@ def _trajectory(section):
 
 
 def _epochs(section) -> Iterator[StatementRow]:
-    """Epochs that do not agree."""
+    """Yield statements on epochs that do not agree."""
     only = section["epochs_only_in"]
     if not section["interpolated"] and not any(only.values()):
         return
@@ -80,7 +80,7 @@ def _epochs(section) -> Iterator[StatementRow]:
 
 
 def _scores(scores) -> Iterator[StatementRow]:
-    """3D RMSE of both results, by the points that judge best."""
+    """Yield statements on the 3D RMSE of both results, at the most independent points."""
     for key, name in SCORES.items():
         row = scores[key]
         if row["difference_3d"] is None:
@@ -97,12 +97,12 @@ def _scores(scores) -> Iterator[StatementRow]:
 
 
 def _is_no_worse(row):
-    """Return True unless the second RMSE exceeds the first by what counts."""
+    """True unless the second RMSE is larger by a relevant amount."""
     return row["difference_3d"] <= SETTINGS.difference
 
 
 def _targets(rows) -> Iterator[StatementRow]:
-    """The targets whose residuals differ most, and surveyed points that were changed."""
+    """Yield statements on targets with the largest differences, and on changed surveyed points."""
     changed = [row for row in rows if row["change_3d"] is not None]
     if changed:
         above = [row for row in changed if row["change_3d"] > SETTINGS.difference]
@@ -124,20 +124,20 @@ def _targets(rows) -> Iterator[StatementRow]:
 
 
 def _name(row):
-    """Name of a target, and the pass in which it was seen."""
+    """Name of a target, and the pass of its observation."""
     if row["pass"] is None:
         return str(row["name"])
     return f"{row['name']} (pass {row['pass']})"
 
 
 def _axes(vector):
-    """A vector of E, N, H in words, to a tenth of a millimeter."""
+    """Format a vector of E, N, H in words, to a tenth of a millimeter."""
     parts = [round(value, 4) + 0.0 for value in vector]  # no negative zero
     return "E {:+.4f}, N {:+.4f}, H {:+.4f} m".format(*parts)
 
 
 def _change_in_words(row):
-    """A change of a residual, in space and by axis."""
+    """Change of a residual, in space and by axis, in words."""
     return f"{length_in_words(row['change_3d'])}: {_axes(row['after']['difference'])}"
 
 
@@ -147,7 +147,7 @@ def _points(rows):
 
 
 def _use(rows):
-    """Targets that one result uses and the other does not, with the reason."""
+    """Statement on targets used in only one result, with the reason."""
     differing = [row for row in rows if bool(row["used"]["first"]) != bool(row["used"]["second"])]
     if not differing:
         used = [row for row in rows if row["used"]["first"]]
@@ -163,7 +163,7 @@ def _use(rows):
 
 
 def _settings(document):
-    """Order, covariance and coverage that differ."""
+    """Statement on different order, covariance and coverage."""
     rows = [row for part in ("model", "coverage") for row in document[part] if row["differs"]]
     count = len(document["model"]) + len(document["coverage"])
     values = {"count": len(rows), "all": count}
@@ -172,7 +172,7 @@ def _settings(document):
 
 
 def _both(row):
-    """Two values beside each other."""
+    """Format two values side by side."""
     words = []
     for side in SIDES:
         value = row[side]
@@ -184,7 +184,7 @@ def _both(row):
 
 
 def _inputs(files):
-    """Inputs whose contents differ."""
+    """Statement on inputs with different contents."""
     inputs = [row for row in files if row["is_input"]]
     other = [row for row in inputs if row["differs"]]
     values = {"count": len(other), "all": len(inputs)}
@@ -198,7 +198,7 @@ def _inputs(files):
 
 
 def _warnings(warnings) -> Iterator[StatementRow]:
-    """Warnings of one result alone."""
+    """Yield statements on warnings of only one result."""
     items = [(f"{side} only", text) for side in SIDES for text in warnings[side]]
     if items:
         statement = Statement("warnings of one", "warning", {"count": len(items)})

@@ -1,4 +1,4 @@
-"""Clouds and results in one 3D view: Open3D's window, or a page where there is no display."""
+"""Clouds and results in one 3D view: Open3D's window, or a page without a display."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from mlscorr.report.style import BLACK, BLUE, GREEN, ORANGE, SKY, VERMILLION
 from mlscorr.survey import PointCloud, chosen_origin, geometry_columns, is_geometry, map_places
 from mlscorr.wording import counted, thousands
 
-PALETTE = (BLUE, VERMILLION, GREEN, ORANGE, SKY, BLACK)  # of what has no colors of its own
-DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")  # variables that name one on Linux
+PALETTE = (BLUE, VERMILLION, GREEN, ORANGE, SKY, BLACK)  # of items without their own colors
+DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")  # variables that name a display on Linux
 
 
 @dataclass(frozen=True)
 class Layer:
-    """Points or lines in the map, with their colors.
+    """Points or lines in the map, with colors.
 
     Parameters
     ----------
@@ -38,9 +38,9 @@ class Layer:
     xyz : (n, 3) array
         Units: m.
     pairs : (k, 2) int array or None
-        Numbers of the points that a line joins; None of a cloud.
+        Indices of the points that a line joins; None for a cloud.
     colors : (n, 3) or (k, 3) array or None
-        Of the points or lines: uint8, uint16, or from 0 to 1.
+        Colors of the points or lines: uint8, uint16, or from 0 to 1.
     intensity : (n,) array or None
     gps_time : (n,) array or None
         Units: s.
@@ -54,14 +54,14 @@ class Layer:
     gps_time: np.ndarray | None = None
 
     def __len__(self) -> int:
-        """Number of its points or lines."""
+        """Number of points or lines."""
         if self.pairs is None:
             return len(self.xyz)
         return len(self.pairs)
 
     @cached_property
     def intensity_limits(self) -> np.ndarray | None:
-        """Ends of the scale of intensities; None where these tell nothing."""
+        """Ends of the scale of intensities; None if these carry no information."""
         if self.intensity is None or len(self.intensity) == 0:
             return None
         low, high = percentiles(self.intensity)
@@ -70,13 +70,13 @@ class Layer:
         return None
 
     def painted(self, rows: np.ndarray | slice, color: str) -> np.ndarray:
-        """Colors (k, 3) uint8 of some points or lines.
+        """Return colors (k, 3) uint8 of some points or lines.
 
         Parameters
         ----------
         rows : (k,) int array or slice
         color : str
-            Of all, where neither colors nor intensities are known.
+            Color of all, if neither colors nor intensities are known.
         """
         if self.colors is not None:
             chosen = self.colors[rows]
@@ -93,12 +93,12 @@ class Layer:
         return np.tile(shade, (len(np.arange(len(self))[rows]), 1))
 
     def key(self, color: str) -> tuple[str, str]:
-        """The color of a legend's mark, and what colors mean.
+        """Return the color of a legend's mark, and the meaning of colors.
 
         Parameters
         ----------
         color : str
-            As of ``painted``.
+            See ``painted``.
         """
         if self.colors is not None:
             meaning = "own colors"
@@ -120,24 +120,24 @@ def show(
 ) -> Path | None:
     """Show clouds, targets, trajectories and results together in 3D.
 
-    Where there is a display, Open3D's window opens and shows all points. Elsewhere, and where a
-    page is asked for, one HTML file is written that needs neither a network nor a server.
+    With a display, Open3D's window opens and shows all points. Without one, or if a page is
+    requested, one HTML file is written that needs neither a network nor a server.
 
     Parameters
     ----------
     *what : object
-        PointCloud, Open3D clouds and line sets (their positions count from their attribute
-        ``origin``), all that has ``to_open3d``, and dicts of these by name.
+        PointCloud, Open3D clouds and line sets (with positions relative to their attribute
+        ``origin``), any object with ``to_open3d``, and dicts of these by name.
     page : path, optional
         The HTML file; without a display, a new one among the temporary files by default.
     title : str
-        Of the window or page.
+        Title of the window or page.
     points : int
-        Of all clouds together on a page, thinned evenly in space; lines are whole.
+        Total number of points on a page, thinned evenly in space; lines are complete.
     overwrite : bool
-        Whether a page of the same name is replaced.
+        True to replace a page of the same name.
     **named : object
-        Further things, by the names under which they are listed.
+        Further objects, by the names for the list.
 
     Returns
     -------
@@ -147,10 +147,10 @@ def show(
     Raises
     ------
     ValueError
-        When there is nothing to show, places are not finite or too far apart for one view, or the
+        If there is nothing to show, positions are not finite or too distant for one view, or the
         page exists without ``overwrite``.
     TypeError
-        For what can't be shown.
+        If an object cannot be shown.
 
     >>> import mlscorr, numpy as np, tempfile
     >>> from mlscorr.survey import PointCloud
@@ -189,7 +189,7 @@ def show(
 
 
 def _layers(what, named) -> Iterator[Layer]:
-    """Layers of values without a name, and of those with one."""
+    """Yield layers of unnamed and of named values."""
     for value in what:
         if isinstance(value, Mapping):
             yield from _layers((), value)
@@ -203,7 +203,7 @@ def _layers(what, named) -> Iterator[Layer]:
 
 
 def _layers_of(value, name) -> Iterator[Layer]:
-    """Layers of one value; results of several geometries have several."""
+    """Yield layers of one value; results with several geometries have several."""
     if isinstance(value, PointCloud):
         colors = value.attributes.get("colors")
         yield Layer(name, value.xyz, None, colors, value.intensity, value.gps_time)
@@ -223,7 +223,7 @@ def _layers_of(value, name) -> Iterator[Layer]:
 
 
 def _geometry_layer(geometry, name):
-    """The layer of a geometry of Open3D, a legacy one included."""
+    """Layer of an Open3D geometry, including legacy ones."""
     import open3d
 
     if isinstance(geometry, open3d.geometry.PointCloud):
@@ -250,13 +250,13 @@ def _geometry_layer(geometry, name):
 
 
 def _spoken(value):
-    """The name of a value's class in words: FoundTargets as Found targets."""
+    """Name of a value's class in words: FoundTargets as Found targets."""
     words = re.findall(r"[A-Z]+[a-z0-9]*|[a-z0-9]+", type(value).__name__)
     return " ".join(words).capitalize()
 
 
 def _distinct(layers):
-    """Layers with distinct names: the second of a name gets a number."""
+    """Give layers distinct names: the second of a name gets a number."""
     known: dict[str, int] = {}
     distinct = []
     for layer in layers:
@@ -269,7 +269,7 @@ def _distinct(layers):
 
 
 def _common_origin(layers):
-    """A whole meter near the middle of all layers (3,), which must fit one view. Units: m."""
+    """Whole meter near the middle of all layers (3,), which must fit one view. Units: m."""
     if not layers:
         raise ValueError(
             "Nothing was given to show: give a PointCloud, geometries of Open3D, or results."
@@ -302,7 +302,7 @@ def _common_origin(layers):
 
 
 def _has_display():
-    """Return True if a window can be opened."""
+    """True if a window can be opened."""
     return sys.platform in ("win32", "darwin") or any(map(os.environ.get, DISPLAYS))
 
 
@@ -333,7 +333,7 @@ def _open_window(layers, origin, title):
 
 
 def viewer_geometry(layer: Layer, origin: np.ndarray, color: str) -> Any:
-    """A layer as Open3D's viewer draws it: float32 about an origin near it.
+    """Convert a layer for Open3D's viewer: float32 about a nearby origin.
 
     Parameters
     ----------
@@ -341,7 +341,7 @@ def viewer_geometry(layer: Layer, origin: np.ndarray, color: str) -> Any:
     origin : (3,) array
         Units: m.
     color : str
-        As of ``Layer.painted``.
+        See ``Layer.painted``.
 
     Returns
     -------
@@ -364,7 +364,7 @@ def viewer_geometry(layer: Layer, origin: np.ndarray, color: str) -> Any:
 
 
 def _page_content(layers, origin, title, points):
-    """What the templates show."""
+    """Content of the templates."""
     rows = _thinned(layers, points)
     scene = []
     entries = []
@@ -407,7 +407,9 @@ def _page_content(layers, origin, title, points):
 
 
 def _thinned(layers, points):
-    """(rows, spacing in m) of each cloud by its number; two states of a cloud keep the same."""
+    """Pairs (rows, spacing in m) of each cloud by index; two states of a cloud keep the same
+    rows.
+    """
     clouds = [number for number, layer in enumerate(layers) if layer.pairs is None]
     chosen: dict[int, tuple[np.ndarray, float]] = {}
     limit = max(1, points // max(1, len(clouds)))
@@ -429,7 +431,7 @@ def _thinned(layers, points):
 
 
 def _are_states(first, second):
-    """Return True for two clouds of the same points, before and after something."""
+    """True for two states of the same points, such as before and after."""
     if first.gps_time is None or second.gps_time is None:
         return False
     return np.array_equal(first.gps_time, second.gps_time)

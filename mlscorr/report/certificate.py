@@ -1,4 +1,4 @@
-"""Certificate of a correction: two A4 pages to sign, made of report.json alone."""
+"""Certificate of a correction: two A4 pages to sign, made only from report.json."""
 
 import textwrap
 from collections.abc import Mapping, Sequence
@@ -16,32 +16,32 @@ from mlscorr.survey import Statement
 from mlscorr.wording import number, thousands
 
 A4 = (8.27, 11.69)  # inch, ISO 216
-POINTS = 72.0  # of an inch
+POINTS = 72.0  # per inch
 MARGIN = 57.0  # pt, 20 mm
 LETTERS = 8.5  # pt
 LEADING = 1.45  # of the letters, from line to line
-MONOSPACE = 5.9  # pt: 64 digits of a SHA-256 beside the name of a file
+MONOSPACE = 5.9  # pt: 64 digits of a SHA-256 next to the name of a file
 SOFT = "#555555"
 LINE = "#9a9a9a"
 FILES = 12  # rows of files; more would fill the page, and report.json has all
-INTERVALS = 10  # rows of poorly constrained intervals, so too
-WARNINGS = 3  # that fit; the report has all
-NAME = 38  # letters of a file's name beside its digits
-NUMBERS = (0.52, 0.64, 0.76, 0.88, 1.0)  # right ends of columns, over the width between margins
+INTERVALS = 10  # rows of poorly constrained intervals, for the same reason
+WARNINGS = 3  # maximum; the report has all
+NAME = 38  # letters of a file's name next to its digits
+NUMBERS = (0.52, 0.64, 0.76, 0.88, 1.0)  # right ends of columns, as shares of the width
 ROLES = ("control", "check")
 TESTED = ("verdict", "statistic", "degrees_of_freedom", "limits", "significance")
 
 
 def write_certificate(path: str | Path, report: Mapping[str, Any]) -> None:
-    """Write the certificate of a correction as a PDF of two A4 pages, whose text is text.
+    """Write the certificate of a correction as a PDF of two A4 pages with searchable text.
 
     Parameters
     ----------
     path : path
     report : mapping
-        The document of report.json.
+        Document of report.json.
     """
-    fonts: Any = {"pdf.fonttype": 42}  # TrueType: letters stay letters
+    fonts: Any = {"pdf.fonttype": 42}  # TrueType: text remains text
     title = f"Certificate of correction: {_title(report)}"
     written = now()
     with (
@@ -57,7 +57,7 @@ def write_certificate(path: str | Path, report: Mapping[str, Any]) -> None:
 
 
 class _Sheet:
-    """An A4 page that is written from top to bottom."""
+    """A4 page written from top to bottom."""
 
     def __init__(self):
         self.figure = Figure(A4)
@@ -65,13 +65,13 @@ class _Sheet:
         self._at = MARGIN  # pt below the upper edge
 
     def text(self, words, share=0.0, size=LETTERS, **style):
-        """Write words at a share of the width between margins, on the present line."""
+        """Write words at a share of the width between margins, on the current line."""
         x = (MARGIN + share * (self._width - 2 * MARGIN)) / self._width
         y = 1 - self._at / self._height
         self.figure.text(x, y, words, fontsize=size, va="top", **style)
 
     def down(self, lines=1.0, size=LETTERS):
-        """Go down by lines of letters of a size."""
+        """Move down by lines of a font size."""
         self._at += lines * LEADING * size
 
     def rule(self, start=0.0, end=1.0):
@@ -88,13 +88,13 @@ class _Sheet:
         self.down(1.25, 11)
 
     def paragraph(self, words, letters=104, **style):
-        """Write words that are broken into lines."""
+        """Write words wrapped into lines."""
         for line in textwrap.wrap(words, letters):
             self.text(line, **style)
             self.down()
 
     def pairs(self, items, start=0.27):
-        """Write names with their values beside them, broken into lines."""
+        """Write names with their values next to them, wrapped into lines."""
         for name, value in items:
             self.text(name, color=SOFT)
             for line in textwrap.wrap(str(value), 80) or [""]:
@@ -115,7 +115,7 @@ class _Sheet:
 
 
 def _first_page(sheet, report):
-    """Names, what was corrected, by which control, and how accurate it is."""
+    """Names, corrected data, control, and accuracy."""
     sheet.text("Certificate of correction", size=9, color=SOFT)
     sheet.down(1.3, 9)
     for line in textwrap.wrap(_title(report), 42, max_lines=2, placeholder=" …"):
@@ -177,7 +177,7 @@ def _first_page(sheet, report):
 
 
 def _accuracy(accuracy):
-    """Sentences on the class of the standard, and whether the test conforms to it."""
+    """Sentences on the accuracy class of the standard, and on conformance of the test."""
     if not accuracy or accuracy["based_on"] is None:
         return [_words("no accuracy")]
     values = {axis: accuracy[f"class_{axis}_cm"] for axis in ("horizontal", "vertical")}
@@ -228,7 +228,7 @@ def _second_page(sheet, report):
 
 
 def _intervals(sheet, weak):
-    """A table of the poorly constrained intervals, those with the largest sigma first."""
+    """Table of the poorly constrained intervals, sorted by decreasing sigma."""
     ends = (0.16, 0.32, 0.46, 0.6)
     sheet.row("", ("From (s)", "To (s)", "Length (m)", "Sigma (m)"), ends, color=SOFT)
     sheet.rule()
@@ -242,11 +242,11 @@ def _intervals(sheet, weak):
         sheet.down()
 
 
-COLUMNS = {"from": 1, "to": 1, "length_m": 0, "sigma": 3}  # of an interval, with their decimals
+COLUMNS = {"from": 1, "to": 1, "length_m": 0, "sigma": 3}  # of an interval, with number of decimals
 
 
 def _file(sheet, row):
-    """A line of a file: name, size and digits."""
+    """Write the line of a file: name, size and digits."""
     name = row["name"]
     if len(name) > NAME:
         name = f"{name[: NAME - 1]}…"

@@ -1,6 +1,6 @@
-"""Pictures of the cloud and a view that can be turned, as a page and a viewer have them.
+"""Pictures of the cloud, and an interactive 3D view for a page or a viewer.
 
-The view holds a thinned cloud, with trajectory and targets.
+The view contains a thinned cloud, with trajectory and targets.
 """
 
 import base64
@@ -41,17 +41,17 @@ Progress = Callable[[str, int], Callable[[int], None]]
 
 @dataclass(frozen=True)
 class CloudViews:
-    """Pictures of a cloud, the data of the 3D view as JSON content, and what was left out.
+    """Pictures of a cloud, data of the 3D view as JSON content, and thinning.
 
     Parameters
     ----------
     pictures : tuple of Picture
     scene : dict
-        As viewer_data has it.
+        Result of viewer_data.
     step : int
-        Every step-th point was drawn, near the targets more.
+        Every step-th point was drawn, and more near the targets.
     walls_whole : bool
-        Whether all points were drawn near the walls that ties found far apart.
+        True if all points were drawn near walls with large misclosures of ties.
     """
 
     pictures: tuple[Picture, ...]
@@ -78,9 +78,9 @@ def view_cloud(
     progress : function
         ``progress(title, total)`` returns a function of the number of points just done.
     ties : TieResiduals, optional
-        Near the facades of which all points are drawn, where passes lay the farthest apart.
+        All points are drawn near the facades with the largest misclosures.
     sample : CloudSample, optional
-        That of the ``cloud_sampler``, where the cloud was read already.
+        Sample from the ``cloud_sampler``, if the cloud has already been read.
     """
     rows = _in_time(targets)
     near = _close_up_rows(rows)
@@ -111,7 +111,7 @@ def view_cloud(
 
 
 def cloud_sampler(targets: list[TargetRow], ties: TieResiduals | None = None) -> CloudSampler:
-    """Gatherer of what ``view_cloud`` needs of a cloud, while that is read for something else.
+    """Make a collector of the data for ``view_cloud``, for use while the cloud is read.
 
     Parameters
     ----------
@@ -122,18 +122,18 @@ def cloud_sampler(targets: list[TargetRow], ties: TieResiduals | None = None) ->
 
 
 def _in_time(targets):
-    """The observed ones of rows of targets, in time."""
+    """Observed ones of rows of targets, sorted by time."""
     return sorted((row for row in targets if row.is_observed), key=lambda row: row.gps_time)
 
 
 def _close_up_rows(rows):
-    """Rows of the targets that are drawn close up."""
+    """Rows of the targets with close-ups."""
     names = close_ups(rows)
     return [row for row in rows if row.name in names]
 
 
 def _facades(ties):
-    """Places (k, 3) of the facades where passes lay the farthest apart. Units: m."""
+    """Positions (k, 3) of the facades with the largest misclosures between passes. Units: m."""
     if ties is None:
         return np.empty((0, 3))
     return worst_facades(ties).place.reshape(-1, 3)
@@ -146,18 +146,18 @@ def _watched(chunks, done):
 
 
 def close_ups(rows: list[TargetRow], limit: int = SETTINGS.close_ups) -> list[str]:
-    """Names of the targets to draw close up: all, or the worst third and others evenly over time.
+    """Names of targets for close-ups: all, or the worst third and others evenly over time.
 
     Parameters
     ----------
     rows : list of TargetRow
-        Of the observed targets, in time.
+        Rows of the observed targets, sorted by time.
     limit : int
     """
     names = list(dict.fromkeys(row.name for row in rows))
     if len(names) <= limit:
         return names
-    left = dict.fromkeys(names, 0.0)  # m, what remains without the point's own help
+    left = dict.fromkeys(names, 0.0)  # m, leave-one-out residual
     for row in rows:
         left[row.name] = max(left[row.name], tables.norm(independent_residual(row)))
     first = worst_target(rows)
@@ -209,7 +209,7 @@ def _pair(picture):
 
 
 def _legend(colour, scale=None, visits=()):
-    """A colour's scale (words, low, high, gradient) or its swatches (colour, words)."""
+    """Scale of a color (words, low, high, gradient) or its swatches (color, words)."""
     if pairs := swatches(colour, visits):
         return {"swatches": pairs}
     words, unit = LABELS[colour]
@@ -230,7 +230,7 @@ def viewer_data(
     near: list[TargetRow],
     rows_near: np.ndarray | None = None,
 ) -> dict:
-    """What the 3D view shows before and after a correction: content of a JSON document.
+    """Data of the 3D view before and after a correction, as content of a JSON document.
 
     Arrays are base64 of little-endian float32 (x, y, z in m about origin) or uint8.
 
@@ -238,9 +238,9 @@ def viewer_data(
     ----------
     correction : Correction
     cloud : PointCloud
-        A sample of the cloud as recorded.
+        Sample of the recorded cloud.
     targets : list of TargetRow
-        All of them are drawn.
+        Targets, all of which are drawn.
     near : list of TargetRow
         Those near which the cloud is shown more densely.
     rows_near : (k,) array, optional
@@ -269,9 +269,9 @@ def viewer_data(
 def thin_evenly(
     xyz: np.ndarray, limit: int = SETTINGS.viewer_points[0]
 ) -> tuple[np.ndarray, float]:
-    """Rows of at most so many points (n, 3), one in each occupied cell of a grid, and its spacing.
+    """Thin points (n, 3) to one per occupied grid cell, up to a limit; return rows and spacing.
 
-    No random numbers: the first point of a cell stands for it.
+    Without random numbers: the first point of each cell is used.
 
     Parameters
     ----------
@@ -315,7 +315,7 @@ def _dense_rows(xyz, targets, candidates):
 
 
 def _lines(correction):
-    """The recorded and the corrected trajectory, broken at its gaps."""
+    """Recorded and corrected trajectory, broken at gaps."""
     old = correction.recorded
     new = correction.corrected
     rows = thin(new.position, new.gps_time, new.gaps)
@@ -323,7 +323,7 @@ def _lines(correction):
 
 
 def _target(row, origin):
-    """Name, role and places of a target; no scanned place where it was not seen."""
+    """Name, role and positions of a target; no scanned position if it was not observed."""
     surveyed = row.surveyed - origin
     target = {"name": row.name, "role": row.group, "surveyed": np.round(surveyed, 4).tolist()}
     if row.is_observed:
@@ -333,17 +333,17 @@ def _target(row, origin):
 
 
 def _shares(colour, values):
-    """Places of values (n,) on the scale of a colour as base64 of uint8."""
+    """Positions of values (n,) on the scale of a color, as base64 of uint8."""
     return packed(np.round(255 * colour_scale(colour, values).share(values)), "u1")
 
 
 def packed(values: np.ndarray, kind: str = "<f4") -> str:
-    """An array as base64.
+    """Encode an array as base64.
 
     Parameters
     ----------
     values : array
     kind : str
-        Of its little-endian numbers.
+        Type of its little-endian numbers.
     """
     return base64.b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode()

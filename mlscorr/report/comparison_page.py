@@ -1,4 +1,4 @@
-"""The page of a comparison: which method corrects how well, in a sentence, a table, a figure."""
+"""Page of a comparison of methods: a sentence, a table, a figure."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from mlscorr.report import style
 from mlscorr.report._comparison_screen import ranking, undetermined
 from mlscorr.report.pages import Page, data_uri
 
-SECTIONS = {  # in their order; one without anything to show is left out
+SECTIONS = {  # in order; empty ones are omitted
     "scores": "What remains",
     "check": "Check points alone",
     "absent": "Not determined",
@@ -18,7 +18,7 @@ SECTIONS = {  # in their order; one without anything to show is left out
     "methods": "The methods",
     "unseen": "Not seen",
 }
-KINDS = {  # colour, mark and words
+KINDS = {  # color, mark and words
     "none": (style.GREY, "x", "as recorded"),
     "one move": (style.VERMILLION, "s", "one move of the whole cloud, blind to time"),
     "over time": (style.GREEN, "^", "polynomials and interpolation over time"),
@@ -32,9 +32,9 @@ def write_comparison(path: str | Path, document: dict) -> None:
     Parameters
     ----------
     path : path
-        The HTML file.
+        HTML file.
     document : dict
-        The content of compare.json.
+        Contents of compare.json.
     """
     ranked = ranking(document)
     by = document["scored_by"]
@@ -65,18 +65,18 @@ def write_comparison(path: str | Path, document: dict) -> None:
 
 @style.styled
 def comparison_figure(document: dict) -> Figure:
-    """RMSE of every method on each axis, the best at the top; a logarithmic scale in m.
+    """Draw the RMSE of every method on each axis, the best at the top; logarithmic scale in m.
 
     Parameters
     ----------
     document : dict
-        The content of compare.json.
+        Contents of compare.json.
     """
     ranked = ranking(document)
     by = document["scored_by"]
     figure = style.new_figure(1.6 + 0.27 * len(ranked))
     panels = figure.subplots(1, 3, sharey=True, sharex=True)
-    values = np.maximum([row[by]["rmse"] for row in ranked], 1e-4)  # m, the left end at least
+    values = np.maximum([row[by]["rmse"] for row in ranked], 1e-4)  # m, left end at least
     places = np.arange(len(ranked))
     for axis, panel in enumerate(panels):
         column = values[:, axis]
@@ -101,7 +101,7 @@ def comparison_figure(document: dict) -> Figure:
 
 
 def _ticks_in_words(panel):
-    """A logarithmic axis with ticks in words: 1 mm, 1 cm, 10 cm, 1 m."""
+    """Label a logarithmic axis in words: 1 mm, 1 cm, 10 cm, 1 m."""
 
     def words(value, _):
         for unit, size in (("m", 1.0), ("cm", 0.01), ("mm", 0.001)):

@@ -1,6 +1,6 @@
-"""The page of a correction: figures, tables, and what it was made of.
+"""Page of a correction: figures, tables, and inputs.
 
-Sections on files, coordinate and time systems, beliefs and coverage stand at its end.
+Sections on files, coordinate and time systems, assumptions and coverage are at the end.
 """
 
 from pathlib import Path
@@ -27,7 +27,7 @@ from mlscorr.survey import WEEK, Survey
 from mlscorr.targets import FittedTarget
 from mlscorr.wording import number, percent, thousands
 
-SECTIONS = {  # in their order; one without anything to show is left out
+SECTIONS = {  # in order; empty ones are omitted
     "statistics": "How far off",
     "sigmas": "Stated sigmas",
     "accuracy": "Accuracy",
@@ -42,7 +42,7 @@ SECTIONS = {  # in their order; one without anything to show is left out
     "used": "What was used",
     "conventions": "Conventions",
 }
-TABLES = {  # of the model: its title, and what its columns are
+TABLES = {  # of the model: title, and meaning of columns
     "alternatives": (
         "Covariance functions compared",
         "The correction averages over them by their probability. Correlation times in s; scales "
@@ -76,19 +76,19 @@ def write_report(
     Parameters
     ----------
     path : path
-        The HTML file.
+        HTML file.
     survey : Survey
     correction : Correction
-        Its corrected trajectory may hold the sigmas after the estimate.
+        Its corrected trajectory may have sigmas from the estimate.
     report : CorrectionReport
     views : CloudViews, optional
-        Pictures of the cloud and the data of the 3D view; without them both are left out.
+        Pictures of the cloud and data of the 3D view, both omitted by default.
     fitted : dict, optional
         FittedTarget by (pass number, gps_time), each of which gets a figure.
     ties : TieResiduals, optional
-        What two passes both saw; without any the section is left out.
+        Residuals of tie features; without any, the section is omitted.
     drawings : dict of functions, optional
-        Those of ``correction_figures``, where files of them are written, too.
+        From ``correction_figures``, if files of them are also written.
     """
     figures = target_drawings(report.targets, fitted or {})
     there = {"pictures": views is not None, "turn": views is not None, "targets": bool(figures)}
@@ -119,7 +119,7 @@ def write_report(
 
 
 def _content(survey, correction, report, drawings):
-    """Everything that the templates show, except of cloud and model."""
+    """Content of the templates, except cloud and model."""
     return {
         "survey": survey,
         "report": report,
@@ -172,7 +172,7 @@ def weak_places(correction: Correction, report: CorrectionReport) -> list[list[f
 
 
 def next_places(correction: Correction, report: CorrectionReport) -> list[list[float]]:
-    """Places of the drive beside which another control point helps: E, N, H in m.
+    """Positions along the drive for further control points: E, N, H in m.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ def _largest(ties):
 
 
 def _model(model):
-    """What the templates show of the model: pairs, tables and outliers."""
+    """Template content of the model: pairs, tables and outliers."""
     rest = {key: value for key, value in model.items() if key not in ("outliers", "warnings")}
     if rest["order"] < 0:
         rest["order"] = "none"
@@ -213,7 +213,7 @@ def _is_table(value):
 
 
 def key_figures(correction: Correction, report: CorrectionReport) -> list[tuple[str, str]]:
-    """Pairs (number, what it is) that follow the three on top.
+    """Pairs (number, meaning) that follow the three on top.
 
     Parameters
     ----------
@@ -254,7 +254,7 @@ TIMES = {"week": "GPS seconds of week", "standard": "adjusted standard GPS time"
 
 
 def systems(survey: Survey) -> list[tuple[str, str]]:
-    """Pairs (what, value) on systems, frames, and what was believed of the instruments."""
+    """Pairs (name, value) on systems, frames, and assumed accuracies of the instruments."""
     trajectory = survey.trajectory
     time = survey.trajectory.gps_time
     crs = survey.crs or "not stated in survey.toml; coordinates are taken as E, N, H in m"
@@ -298,7 +298,7 @@ def _time(cloud):
 
 
 def files(report: CorrectionReport) -> dict[str, list[tuple[str, str, str, str]]]:
-    """Rows (what, name, size in words, SHA-256) of what went in and what came out.
+    """Rows (role, name, size in words, SHA-256) of inputs and outputs.
 
     Parameters
     ----------
@@ -321,7 +321,7 @@ def _size(row: FileRow):
 
 
 def coverage(correction: Correction, report: CorrectionReport) -> list[tuple[str, object]]:
-    """Pairs (what, value) on what the control points and the trajectory cover.
+    """Pairs (name, value) on the coverage by control points and trajectory.
 
     Parameters
     ----------

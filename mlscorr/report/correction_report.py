@@ -1,4 +1,4 @@
-"""The report of a correction: what report.json holds, and pages and figures show."""
+"""Report of a correction: contents of report.json, pages and figures."""
 
 from dataclasses import asdict, dataclass, field, replace
 
@@ -13,7 +13,7 @@ GROUPS = ("control", "check", "unused")
 
 @dataclass(frozen=True)
 class FileRow:
-    """A file that was read or written.
+    """File that was read or written.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ class FileRow:
     what : str or None
         None for a corrected cloud.
     points, bytes : int or None
-        A cloud's size is told in points, that of other files in bytes.
+        A cloud's size is given in points, that of other files in bytes.
     """
 
     name: str
@@ -32,7 +32,7 @@ class FileRow:
     bytes: int | None = None
 
     def document(self) -> dict:
-        """The row of ``files[]``, ``inputs[]`` or ``outputs[]`` in report.json."""
+        """Return the row of ``files[]``, ``inputs[]`` or ``outputs[]`` in report.json."""
         row = {"what": self.what, "name": self.name, "points": self.points, "bytes": self.bytes}
         known = {key: value for key, value in row.items() if value is not None}
         return {**known, "sha256": self.sha256}
@@ -40,21 +40,20 @@ class FileRow:
 
 @dataclass(frozen=True)
 class Coverage:
-    """What the control points and the trajectory cover.
+    """Coverage by control points and trajectory.
 
     Parameters
     ----------
     control_span : (float, float)
         First and last control epoch. Units: s.
     longest_gap_s : float
-        Longest time without control inside a pass, its ends included. Units: s.
+        Longest time without control within a pass, including its ends. Units: s.
     points_outside_trajectory, points_outside_control : int
-        Points that were left as they were, and points before the first or past the last control
-        point of the survey.
+        Unchanged points, and points before the first or past the last control point of the survey.
     points_extrapolated, points_corrected : int
-        Points in the weak stretches, and all that were moved.
+        Points in poorly constrained intervals, and all moved points.
     points_noise : int
-        Points flagged as noise, which took no part in the measurement.
+        Points flagged as noise, which were not used in the measurement.
     """
 
     control_span: tuple[float, float]
@@ -67,11 +66,11 @@ class Coverage:
 
     @property
     def share_extrapolated(self) -> float:
-        """Of the corrected points, 0 to 1."""
+        """Extrapolated share of the corrected points, 0 to 1."""
         return self.points_extrapolated / max(self.points_corrected, 1)
 
     def document(self) -> dict:
-        """The section ``coverage`` of report.json."""
+        """Return the section ``coverage`` of report.json."""
         return asdict(self) | {
             "control_span": list(self.control_span),
             "points_untouched": self.points_outside_trajectory,
@@ -81,48 +80,48 @@ class Coverage:
 
 @dataclass(frozen=True)
 class CorrectionReport:
-    """All that is told of a correction.
+    """Complete report of a correction.
 
     Parameters
     ----------
     name : str
-        Of the survey.
+        Name of the survey.
     crs : str or None
     notes : tuple of str
-        On what was done when the survey was read.
+        Notes on the reading of the survey.
     targets : list of TargetRow
         One for each surveyed point and pass.
     control, check : Score
     accuracy : dict or None
-        As mlscorr.evaluate._accuracy has it.
+        See mlscorr.evaluate._accuracy.
     model : dict
-        As mlscorr.evaluate.model.model_section has it.
+        See mlscorr.evaluate.model.model_section.
     coverage : Coverage
     files, inputs, outputs : tuple of FileRow
-        The corrected clouds, what was read, and what else was written.
+        Corrected clouds, inputs, and other outputs.
     support : Support
-        What holds the correction along the drive.
+        Constraints of the correction along the drive.
     jumps : tuple of Jump
-        Of the correction, in time.
+        Jumps of the correction, sorted by time.
     next_control : tuple of NextControl
-        Where more control points would help most, the best first.
+        Best positions for further control points, sorted by benefit.
     ties : dict or None
-        As mlscorr.evaluate.model.tie_section has it.
+        See mlscorr.evaluate.model.tie_section.
     position_sigma : dict or None
         3D sigma of the corrected position, in m: ``median``, ``largest``, and the ``time`` (s) of
         the latter.
     datum : tuple of DatumDifference
-        By what the control that was used differs from the cloud as a whole.
+        Overall differences of the used control from the cloud.
     assumed : tuple of Assumption
         Accuracies of the POS that nobody stated.
     project : ProjectNames
-        Names that survey.toml gives.
+        Names from survey.toml.
     recorded : dict or None
-        As mlscorr.report.first_look.recorded_time has it.
+        See mlscorr.report.first_look.recorded_time.
     check_sigmas : CheckSigmas or None
         Test of the stated sigmas; None without check points.
     well_determined : float or None
-        Share of the driven distance that lies in no poorly constrained interval, 0 to 1.
+        Share of the driven distance outside poorly constrained intervals, 0 to 1.
     """
 
     name: str
@@ -150,7 +149,7 @@ class CorrectionReport:
     well_determined: float | None = None
 
     def document(self) -> dict:
-        """The content of report.json."""
+        """Return the contents of report.json."""
         rows = ("targets", "files", "inputs", "outputs")
         return {
             "name": self.name,
@@ -183,7 +182,7 @@ class CorrectionReport:
         }
 
     def points(self, role: str) -> PointCounts:
-        """How many surveyed points of a role took part.
+        """Count the surveyed points of a role.
 
         Parameters
         ----------
@@ -194,27 +193,26 @@ class CorrectionReport:
 
     @property
     def seconds_extrapolated(self) -> float:
-        """How long the weak stretches take together. Units: s."""
+        """Total duration of the poorly constrained intervals. Units: s."""
         return sum(stretch.seconds for stretch in self.support.weak)
 
     @property
     def metres_extrapolated(self) -> float:
-        """How long the weak stretches are together, along the path. Units: m."""
+        """Total length of the poorly constrained intervals along the path. Units: m."""
         return sum(stretch.length_m for stretch in self.support.weak)
 
     @property
     def holds_everywhere(self) -> bool:
-        """Whether what the check points say is true of the whole cloud.
+        """True if the result at the check points applies to the whole cloud.
 
-        Control points hold all of it, no point of it was left as it was, and no check point is
-        missing where there should be one.
+        Control constrains all of it, no point is unchanged, and no expected check point is missing.
         """
         is_whole = not self.support.weak and self.coverage.points_outside_trajectory == 0
         return is_whole and not self.points("check").missing
 
     @property
     def is_held_by_others(self) -> bool:
-        """Whether control of other drives holds it, without its own: no part lacks it all."""
+        """True if only control of other drives constrains it, without any unconstrained part."""
         whys = {stretch.why for stretch in self.support.weak}
         return self.points("control").scored == 0 and whys <= {REASONS[DRIFT]}
 
@@ -225,7 +223,7 @@ class CorrectionReport:
 
     @property
     def judgement(self) -> tuple[Statistics | None, Statistics | None, str]:
-        """Statistics before and after that a verdict rests on, and what they are.
+        """Statistics before and after that a verdict uses, and their kind.
 
         ``check``, ``leave-one-out`` or ``fit``; (None, None, ``nothing``) without any residual.
         """
@@ -240,7 +238,7 @@ class CorrectionReport:
         return None, None, "nothing"
 
     def count(self, role: str) -> tuple[int, int]:
-        """How many points of a role, and how many observations (one for each pass) of them.
+        """Number of points of a role, and of their observations (one for each pass).
 
         Parameters
         ----------
@@ -253,13 +251,13 @@ class CorrectionReport:
 
 
 def ordered(rows: list[TargetRow], *groups: str) -> list[TargetRow]:
-    """Rows by group, each group in time.
+    """Sort rows by group, and each group by time.
 
     Parameters
     ----------
     rows : list of TargetRow
     *groups : str
-        Of GROUPS; all when none is named.
+        Of GROUPS; all by default.
     """
 
     def key(row):
@@ -270,19 +268,19 @@ def ordered(rows: list[TargetRow], *groups: str) -> list[TargetRow]:
 
 
 def array(rows: list[TargetRow], name: str) -> np.ndarray:
-    """A vector of the rows as an (n, 3) array, NaN where it is not known.
+    """Vector of the rows as an (n, 3) array, NaN if unknown.
 
     Parameters
     ----------
     rows : list of TargetRow
     name : str
-        The vector's, such as ``before``.
+        Name of the vector, such as ``before``.
     """
     return np.array([getattr(row, name) for row in rows], dtype=float).reshape(-1, 3)
 
 
 def recomputed(rows: list[TargetRow], correction) -> list[TargetRow]:
-    """Rows with their misclosures as recorded and by this correction, those observed first.
+    """Recompute misclosures of rows as recorded and after this correction, observed ones first.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
-"""The figures of a correction, by name: over time, residuals of each target, and the maps.
+"""Figures of a correction, by name: curves over time, residuals of targets, and maps.
 
-They are SVG for the page and PNG files beside it.
+They are SVG in the page, and PNG files.
 """
 
 from functools import cache, partial
@@ -37,7 +37,7 @@ from mlscorr.report.style import (
     thin,
 )
 
-PICTURES = ("correction", "map", "residuals", "ties")  # of the figures; the page shows them all
+PICTURES = ("correction", "map", "residuals", "ties")  # all figures; the page shows all
 LEGEND = {
     "control": "Control point: misclosure before, 1 sigma",
     "check": "Check point: misclosure before, 1 sigma",
@@ -48,14 +48,14 @@ LEGEND = {
 def correction_figures(
     correction: Correction, report: CorrectionReport, ties: TieResiduals | None = None
 ) -> Figures:
-    """Functions that draw the figures of a correction, by name, each once.
+    """Make functions that draw the figures of a correction, by name, each once.
 
-    ``correction``, ``attitude``, ``map``, and ``residuals`` and ``ties`` where there are some.
+    ``correction``, ``attitude``, ``map``, and ``residuals`` and ``ties`` if there are any.
 
     Parameters
     ----------
     correction : Correction
-        Its corrected trajectory may hold the sigmas after the estimate.
+        Its corrected trajectory may have sigmas from the estimate.
     report : CorrectionReport
     ties : TieResiduals, optional
     """
@@ -78,18 +78,18 @@ def write_pictures(
     ties: TieResiduals | None = None,
     figures: Figures | None = None,
 ) -> list[Path]:
-    """Write correction.png, map.png and, where there are some, residuals.png and ties.png.
+    """Write correction.png, map.png and, if available, residuals.png and ties.png.
 
     Parameters
     ----------
     folder : path
-        Which exists.
+        Existing folder.
     correction : Correction
-        Its corrected trajectory may hold the sigmas after the estimate.
+        Its corrected trajectory may have sigmas from the estimate.
     report : CorrectionReport
     ties : TieResiduals, optional
     figures : dict of functions, optional
-        Those of ``correction_figures``, where a page shows them, too.
+        From ``correction_figures``, if a page also shows them.
 
     Returns
     -------
@@ -108,7 +108,7 @@ def write_pictures(
 
 @styled
 def correction_figure(correction: Correction, report: CorrectionReport) -> Figure:
-    """Correction of the position in three panels, with misclosures before as marks.
+    """Draw the position correction in three panels, with misclosures before as marks.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def correction_figure(correction: Correction, report: CorrectionReport) -> Figur
 
 @styled
 def attitude_figure(correction: Correction, report: CorrectionReport) -> Figure:
-    """Correction of roll, pitch and heading in three panels.
+    """Draw the correction of roll, pitch and heading in three panels.
 
     Parameters
     ----------
@@ -138,9 +138,9 @@ def attitude_figure(correction: Correction, report: CorrectionReport) -> Figure:
 
 
 def _figure(height, correction, report, change, sigma, rows, words):
-    """Curves (n, 3) with sigma (n, 3), over them the marks of rows of targets.
+    """Draw curves (n, 3) with sigma (n, 3), and the marks of rows of targets over them.
 
-    Words name what is corrected, and its three parts.
+    Words name the corrected quantity, and its three components.
     """
     figure = new_figure(height)
     new = correction.corrected
@@ -166,7 +166,7 @@ def _start(trajectory):
 
 
 def _curve(panel, trajectory, change, sigma, span):
-    """Draw a curve with its 1-sigma band; returns the values that the axis must show."""
+    """Draw a curve with its 1-sigma band; return the values that the axis must show."""
     time = trajectory.gps_time
     gaps = trajectory.gaps
     curves = np.column_stack([change - sigma, change, change + sigma])
@@ -182,7 +182,7 @@ def _curve(panel, trajectory, change, sigma, span):
 
 
 def _marks(panel, trajectory, rows, axis, group):
-    """Draw misclosures of a group with sigma; returns the values to show."""
+    """Draw misclosures of a group with sigma; return the values to show."""
     time = np.array([row.gps_time for row in rows]) - _start(trajectory)
     value = array(rows, "before")[:, axis]
     sigma = np.nan_to_num(array(rows, "sigma")[:, axis])
@@ -192,7 +192,7 @@ def _marks(panel, trajectory, rows, axis, group):
 
 
 def _unused(panel, trajectory, rows, axis):
-    """Draw what was not used; on the panel's edge, as a triangle, where it lies beyond."""
+    """Draw unused targets; as a triangle on the panel's edge if they are outside."""
     low, high = panel.get_ylim()
     for row in rows:
         value = row.before[axis]
@@ -205,7 +205,7 @@ def _unused(panel, trajectory, rows, axis):
 
 
 def _set_range(panel, values, change):
-    """Limits that hold the values asked for; beyond the control span only as much again."""
+    """Set limits that contain given values; outside the control span, up to twice as much."""
     low = np.nanmin(values)
     high = np.nanmax(values)
     room = max(high - low, SETTINGS.difference)  # of an axis in m or in deg
@@ -215,7 +215,7 @@ def _set_range(panel, values, change):
 
 
 def _shade(panels, trajectory, span, support):
-    """Shade gaps, outages and what is extrapolated, mark steps and span; name the time axis."""
+    """Shade gaps, outages and extrapolated parts, mark steps and span; label the time axis."""
     start = _start(trajectory)
     first = trajectory.gps_time[0]
     last = trajectory.gps_time[-1]
@@ -226,7 +226,7 @@ def _shade(panels, trajectory, span, support):
         for stretch in support.weak:
             panel.axvspan(stretch.start - start, stretch.end - start, zorder=0.5, **OUTSIDE)
         low = panel.get_xaxis_transform()
-        for begin, end in support.outages:  # a strip, as an outage may be extrapolated as well
+        for begin, end in support.outages:  # a strip, as an outage may also be extrapolated
             outage = np.array([begin, end]) - start
             panel.fill_between(outage, 0.0, 0.06, transform=low, zorder=0.55, **OUTAGE)
         for step in support.steps:
@@ -237,7 +237,7 @@ def _shade(panels, trajectory, span, support):
 
 
 def _legend(trajectory, groups, report):
-    """Legend entries of what is really drawn."""
+    """Legend entries of drawn items."""
     support = report.support
     handles = [Line2D([], [], color=BLUE, label="Correction")]
     handles.append(Patch(**BAND, label="1 sigma of the corrected value"))
@@ -264,7 +264,7 @@ WORDS = {
 
 @styled
 def residual_figure(report: CorrectionReport) -> Figure:
-    """Misclosures of control and check points, before on the left, after on the right.
+    """Draw misclosures of control and check points, before on the left, after on the right.
 
     Parameters
     ----------
@@ -288,7 +288,7 @@ def residual_figure(report: CorrectionReport) -> Figure:
 
 
 def _scale(ratio):
-    """How the right scale differs from the left one, in words.
+    """Ratio of the right scale to the left one, in words.
 
     >>> _scale(18.24), _scale(1.0), _scale(0.5)
     ('scale 18 times finer', 'same scale', 'scale 2.0 times coarser')
@@ -300,7 +300,7 @@ def _scale(ratio):
 
 
 def _column(panels, rows, name):
-    """Draw one state of all axes with one range; returns half of that range. Units: m."""
+    """Draw one state of all axes with a common range; return half of that range. Units: m."""
     groups = np.array([row.group for row in rows])
     values = array(rows, name)
     sigma = np.nan_to_num(array(rows, "sigma"))
@@ -316,7 +316,7 @@ def _column(panels, rows, name):
 
 
 def _name_targets(panel, rows):
-    """Names under the axis, in the order of time."""
+    """Write names under the axis, in order of time."""
     panel.set_xlim(-0.7, max(len(rows), 1) - 0.3)
     if len(rows) > SETTINGS.axis_names:
         panel.set_xlabel("Targets in the order of time")

@@ -1,4 +1,4 @@
-"""Figures of a correction's first screen and of its check points, without a name of their own."""
+"""Figures of a correction's first screen and of its check points, for internal use."""
 
 from typing import Any
 
@@ -20,14 +20,14 @@ WEAK: dict[str, Any] = {"color": "#c99700", "linewidth": 4.0, "solid_capstyle": 
 def locator_map(
     correction: Correction, report: CorrectionReport, marked: TargetRow | None = None
 ) -> Figure:
-    """Small map of the drive, control and check points, without axes.
+    """Draw a small map of the drive, control and check points, without axes.
 
     Parameters
     ----------
     correction : Correction
     report : CorrectionReport
     marked : TargetRow, optional
-        That of the picture beside the map, which gets a ring and its name.
+        Target of the picture next to the map, marked by a ring and its name.
     """
     plan = track(correction.corrected)
     rows = [row for row in ordered(report.targets) if row.is_observed]
@@ -92,7 +92,7 @@ def weak_lines(correction: Correction, report: CorrectionReport) -> list[np.ndar
 
 @styled
 def sigma_figure(z: np.ndarray) -> Figure:
-    """Histogram of residuals over their stated sigmas, and the normal density beside it.
+    """Draw a histogram of residuals over their stated sigmas, and the normal density.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def sigma_figure(z: np.ndarray) -> Figure:
     axes = figure.add_subplot()
     values = z.ravel()
     largest = max(3.5, float(np.ceil(np.abs(values).max())))
-    count = int(np.clip(2 * np.sqrt(len(values)), 7, 41)) | 1  # odd, so that one bin has zero in it
+    count = int(np.clip(2 * np.sqrt(len(values)), 7, 41)) | 1  # odd, so that one bin contains zero
     width = 2 * largest / count
     axes.hist(
         values,

@@ -1,4 +1,4 @@
-"""What the first screen of a correction's page shows: three numbers, what, when, which target."""
+"""First screen of a correction's page: three numbers, names, date, and worst target."""
 
 from datetime import timedelta
 
@@ -17,7 +17,7 @@ DAYS = ("Sunday", "Monday", "Tuesday", "Wednesday", "Thursday", "Friday", "Satur
 
 
 def recorded_time(survey: Survey) -> dict[str, str | None]:
-    """When a drive was recorded, as report.json has it: ``start``, ``end`` and ``text``.
+    """Recording time of a drive, as in report.json: ``start``, ``end`` and ``text``.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def recorded_time(survey: Survey) -> dict[str, str | None]:
     Returns
     -------
     dict
-        Start and end in GPS time (ISO 8601), None where no file states the date.
+        Start and end in GPS time (ISO 8601), None if no file states the date.
     """
     first, last = survey.trajectory.gps_time[[0, -1]].tolist()
     epoch = gps_epoch(survey.trajectory, survey.clouds)
@@ -45,16 +45,16 @@ def _words(key, **values):
 
 
 def _clock(seconds):
-    """Time of the day, 00:00:00 to 23:59:59."""
+    """Time of day, 00:00:00 to 23:59:59."""
     minutes, second = divmod(int(seconds), 60)
     hour, minute = divmod(minutes, 60)
     return f"{hour:02d}:{minute:02d}:{second:02d}"
 
 
 def worst_target(rows: list[TargetRow]) -> TargetRow | None:
-    """The observed check point with the largest residual, else such a control point.
+    """Observed check point with the largest residual, or such a control point if there are none.
 
-    A control point is judged by its residual when left out, where that is known.
+    Control points are judged by their leave-one-out residuals, if known.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def worst_target(rows: list[TargetRow]) -> TargetRow | None:
 
 
 def independent_residual(row: TargetRow) -> np.ndarray:
-    """Residual of a target without its own help, where it is known. Units: m.
+    """Leave-one-out residual of a target, if known. Units: m.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def independent_residual(row: TargetRow) -> np.ndarray:
 
 
 def three_numbers(correction: Correction, report: CorrectionReport) -> list[tuple[str, str]]:
-    """Pairs (number, what it is): accuracy, control used, share that is well determined.
+    """Pairs (number, meaning): accuracy, used control, well determined share.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def three_numbers(correction: Correction, report: CorrectionReport) -> list[tupl
 
 
 def well_determined(correction: Correction, report: CorrectionReport) -> float:
-    """Share of the driven distance that lies in no poorly constrained interval, 0 to 1.
+    """Share of the driven distance outside poorly constrained intervals, 0 to 1.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def well_determined(correction: Correction, report: CorrectionReport) -> float:
 
 
 def facts(survey: Survey, report: CorrectionReport) -> list[tuple[str, str]]:
-    """Pairs (what, value) that head the page: names, reference system, date, files.
+    """Pairs (name, value) at the head of the page: names, reference system, date, files.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def facts(survey: Survey, report: CorrectionReport) -> list[tuple[str, str]]:
 
 
 def listed(names: list[str], limit: int = 4) -> str:
-    """Names with commas; of many the first ones and the number of the others.
+    """Join names with commas; of many, the first ones and the number of the others.
 
     >>> listed(["a.laz", "b.laz", "c.laz"], 2)
     'a.laz, b.laz and 1 more'

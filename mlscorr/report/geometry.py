@@ -1,4 +1,4 @@
-"""Targets, trajectories, misclosures and ties as lines of Open3D, in the colours of the report."""
+"""Targets, trajectories, misclosures and ties as Open3D lines, in the colors of the report."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from mlscorr.report.render import colour_table, percentiles
 from mlscorr.report.style import BLUE, MARKS, VERMILLION
 from mlscorr.survey import Matched, TargetObservations, Ties, Trajectory, line_geometry
 
-CORNERS = 48  # of a circle as a polygon: no corner is seen
+CORNERS = 48  # of a circle as a polygon that looks smooth
 ROUND = ("circle", "hole")  # kinds with a circular outline
 
 
 def target_lines(
     observations: TargetObservations, origin: np.ndarray | None, enlarged: float
 ) -> Any:
-    """Outlines of targets, and about each center the ellipsoid of one sigma.
+    """Outlines of targets, with an ellipsoid of one sigma around each center.
 
     Parameters
     ----------
     observations : TargetObservations
     origin : (3,) array or None
-        As of ``PointCloud.to_open3d``.
+        See ``PointCloud.to_open3d``.
     enlarged : float
-        Factor by which ellipsoids are drawn larger than they are.
+        Magnification of ellipsoids.
 
     Returns
     -------
@@ -49,13 +49,13 @@ def target_lines(
 
 
 def misclosure_lines(control: Matched, check: Matched, origin: np.ndarray | None) -> Any:
-    """Lines from observed centers to surveyed places, control black and check points red.
+    """Lines from observed centers to surveyed positions, control black and check points red.
 
     Parameters
     ----------
     control, check : Matched
     origin : (3,) array or None
-        As of ``PointCloud.to_open3d``.
+        See ``PointCloud.to_open3d``.
     """
     roles = control, check
     observed = [matched.observations.position for matched in roles]
@@ -70,15 +70,15 @@ def misclosure_lines(control: Matched, check: Matched, origin: np.ndarray | None
 
 
 def tie_lines(ties: Ties, origin: np.ndarray | None, enlarged: float) -> Any:
-    """Lines between both views of each tie, colored by how far apart they lie.
+    """Lines between both views of each tie, colored by their distance.
 
     Parameters
     ----------
     ties : Ties
     origin : (3,) array or None
-        As of ``PointCloud.to_open3d``.
+        See ``PointCloud.to_open3d``.
     enlarged : float
-        Factor by which lines are drawn longer than they are, about their middles.
+        Magnification of lines, about their middles.
 
     Returns
     -------
@@ -95,20 +95,20 @@ def tie_lines(ties: Ties, origin: np.ndarray | None, enlarged: float) -> Any:
 
 
 def correction_lines(correction: Correction, origin: np.ndarray | None, color: str) -> Any:
-    """The corrected trajectory, coloured by how far it was moved or by its sigma.
+    """Corrected trajectory, colored by the size of the correction or by its sigma.
 
     Parameters
     ----------
     correction : Correction
     origin : (3,) array or None
-        As of ``PointCloud.to_open3d``.
+        See ``PointCloud.to_open3d``.
     color : str
         ``correction`` or ``sigma``.
 
     Raises
     ------
     ValueError
-        For another colour, and for the sigma of a correction that has none.
+        If the color is unknown, or the correction has no sigma.
     """
     corrected = correction.corrected
     if color == "correction":
@@ -132,15 +132,15 @@ def _scale_colors(values):
 def path_lines(
     trajectory: Trajectory, origin: np.ndarray | None, values: dict[str, np.ndarray]
 ) -> Any:
-    """A trajectory as lines between epochs, broken at its gaps.
+    """Trajectory as lines between epochs, broken at its gaps.
 
     Parameters
     ----------
     trajectory : Trajectory
     origin : (3,) array or None
-        As of ``PointCloud.to_open3d``.
+        See ``PointCloud.to_open3d``.
     values : dict
-        One array (n,) of the epochs by its name, which colours the lines and is their attribute.
+        One array (n,) of the epochs by name, which colors the lines and is their attribute.
     """
     pairs = trajectory.line_pairs
     attributes = {}
@@ -152,7 +152,7 @@ def path_lines(
 
 
 def _outline(observations, row):
-    """Corners (k, 3) of a target's outline, from its centre. Units: m."""
+    """Corners (k, 3) of a target's outline, relative to its center. Units: m."""
     normal = observations.normal[row]
     up = np.array([0.0, 0.0, 1.0])
     if abs(normal @ up) > np.sqrt(0.5):

@@ -1,7 +1,7 @@
-"""What a correction says first, wherever it is read: terminal, report.json and page.
+"""First screen of a correction for terminal, report.json and page.
 
-Each row of that screen rests on statements, whose severity is its rating. Rows that a calibration,
-a comparison and a diagnosis have too are made here as well.
+Each row of that screen is made from statements, whose severity is its rating. Rows shared with a
+calibration, a comparison and a diagnosis are also made here.
 """
 
 from __future__ import annotations
@@ -21,26 +21,26 @@ from mlscorr.report.tables import AXES
 from mlscorr.report.wording import NAMED, assumed_in_words, in_words, stretch_in_words
 from mlscorr.survey import Severity, Statement
 
-RATINGS = ("green", "amber", "red")  # as it should be; mind it; not whole, or worse than before
+RATINGS = ("green", "amber", "red")  # good; warning; incomplete, or worse than before
 SEVERITIES: tuple[Severity, ...] = ("note", "warning", "fault")  # of statements, in this order
 SIGMAS = ("pos.position_sigma", "pos.attitude_sigma")
 
 
 @dataclass(frozen=True)
 class StatementRow:
-    """A fact on the first screen.
+    """Fact on the first screen.
 
     Parameters
     ----------
     what : str
-        What it is about.
+        Subject.
     rating : str
-        Of RATINGS.
+        One of RATINGS.
     sentence : str
     items : tuple of (str, str)
-        What it names one by one, and what is said of each.
+        Names of single items, each with a remark.
     statements : tuple of Statement
-        What rating and sentence were made of, if they were.
+        Statements behind rating and sentence, if any.
     """
 
     what: str
@@ -53,12 +53,12 @@ class StatementRow:
     def of(
         cls, what: str, *statements: Statement, items: Iterable[tuple[str, str]] = ()
     ) -> StatementRow:
-        """The row of some statements, rated as the worst of them.
+        """Make the row of some statements, rated as the worst of them.
 
         Parameters
         ----------
         what : str
-            What they are about.
+            Subject.
         *statements : Statement
             With sentences in mlscorr.report.wording.
         items : iterable of (str, str)
@@ -68,7 +68,7 @@ class StatementRow:
         return cls(what, RATINGS[worst], sentence, tuple(items), statements)
 
     def document(self) -> dict[str, object]:
-        """The row of ``statements[]`` in report.json."""
+        """Return the row of ``statements[]`` in report.json."""
         items = [{"name": name, "text": text} for name, text in self.items]
         return {
             "what": self.what,
@@ -79,7 +79,7 @@ class StatementRow:
 
 
 def first_screen(report: CorrectionReport) -> dict[str, object]:
-    """What report.json begins with: ``headline``, ``rating`` and ``statements``.
+    """First part of report.json: ``headline``, ``rating`` and ``statements``.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def first_screen(report: CorrectionReport) -> dict[str, object]:
 
 
 def statements_section(facts: list[StatementRow]) -> dict[str, object]:
-    """``statements`` of a document, and ``rating``: the worst of them.
+    """``statements`` of a document, and ``rating``, the worst of them.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def statements_section(facts: list[StatementRow]) -> dict[str, object]:
 
 
 def statements(report: CorrectionReport) -> list[StatementRow]:
-    """All that stands on the first screen, in its order.
+    """Rows of the first screen, in order.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def sigmas_statement(sigmas: CheckSigmas) -> Statement:
 def headline(report: CorrectionReport) -> str:
     """Check points, control points and extrapolated parts in one line.
 
-    Where no control takes part this comes first: the result may then lie elsewhere as a whole.
+    Without control this is mentioned first, because the result may then be shifted as a whole.
 
     Parameters
     ----------
@@ -152,17 +152,17 @@ def headline(report: CorrectionReport) -> str:
 
 
 def _result(report):
-    """How far off the cloud was and is: its first sentence, and the others as items."""
+    """First sentence on the accuracy of the cloud before and after, with the others as items."""
     first, *more = verdict(report)
     return StatementRow.of("Result", first, items=[("", text) for text in in_words(more)])
 
 
 def verdict(report: CorrectionReport) -> list[Statement]:
-    """The result, and whether something speaks against it by the severity of the first.
+    """Statements on the result; the severity of the first one shows objections.
 
-    That is a fault where it became worse on an axis, by more than the sigmas of targets and
-    correction allow, or where check points are missing that should have been seen. It is a note
-    where check points show that it became better, and nothing is said that they can't see.
+    It is a fault if an axis became worse by more than the sigmas of targets and correction allow,
+    or if expected check points are missing. It is a note if check points show an improvement, and
+    there are no other objections.
 
     Parameters
     ----------
@@ -199,18 +199,17 @@ def verdict(report: CorrectionReport) -> list[Statement]:
 
 
 def _rises(before, after, n, sigma):
-    """By how much the RMSE of each axis rose, where that is beyond chance. Units: m."""
+    """Increase of the RMSE of each axis, if it exceeds chance. Units: m."""
     limit = np.inf
     if sigma is not None:
-        # as large as this the RMS of n is by chance, as it is known no better there than by its
-        # sigma
+        # the RMS of n may be as large as this by chance, because its uncertainty is its sigma
         limit = sigma * np.sqrt(chdtri(n, ESTIMATE.significance) / n)
     rise = np.where(after[:3] > limit, (after - before)[:3], 0.0)
     return {axis: by for axis, by in zip(AXES, rise, strict=True) if by > SETTINGS.difference}
 
 
 def _change(report, before, after, kind, is_worse, severity):
-    """What the correction did, by 3D RMSE in m."""
+    """Statement on the effect of the correction, by 3D RMSE in m."""
     values = {"before": before, "after": after, "kind": kind}
     if kind != "fit" and abs(before - after) <= SETTINGS.difference:
         return Statement("hardly changed", severity, values)
@@ -226,7 +225,7 @@ def _change(report, before, after, kind, is_worse, severity):
 
 
 def _points_moved(report):
-    """Which share of the points was corrected, and on which grounds."""
+    """Statement on the share of corrected points, and the basis."""
     coverage = report.coverage
     values = {
         "held": coverage.points_corrected - coverage.points_extrapolated,
@@ -240,12 +239,12 @@ def _points_moved(report):
 
 
 def check_statement(points: PointCounts) -> StatementRow:
-    """The check points that were scored, and those that were not.
+    """Make the row of scored and of other check points.
 
     Parameters
     ----------
     points : PointCounts
-        Of the check points.
+        Counts of the check points.
     """
     if points.surveyed == 0:
         return StatementRow.of("Check points", Statement("no check point", "warning"))
@@ -265,12 +264,12 @@ def check_statement(points: PointCounts) -> StatementRow:
 
 
 def _elsewhere(points):
-    """Number of points without points of the cloud, by whether another scanner saw them."""
+    """Number of points without points of the cloud, by observation by another scanner."""
     return Counter(why == SEEN_BY_OTHERS for _, why in points.outside)
 
 
 def _control(report):
-    """The control points, or what a result without any is relative to."""
+    """Row of the control points, or of the reference of a result without any."""
     points = report.points("control")
     if points.surveyed:
         return control_statement(points)
@@ -284,12 +283,12 @@ def _control(report):
 
 
 def control_statement(points: PointCounts) -> StatementRow:
-    """The control points that were used, refused and not seen.
+    """Make the row of used, refused and missing control points.
 
     Parameters
     ----------
     points : PointCounts
-        Of the control points.
+        Counts of the control points.
     """
     values = {
         "scored": points.scored,
@@ -306,7 +305,7 @@ def control_statement(points: PointCounts) -> StatementRow:
 
 
 def _datum(report) -> Iterator[StatementRow]:
-    """What the control as a whole differs by from the cloud."""
+    """Yield rows on overall differences of control and cloud."""
     if report.datum:
         lengths = {each.term: each.length for each in report.datum}
         items = ((each.term, each.sentence) for each in report.datum)
@@ -315,7 +314,7 @@ def _datum(report) -> Iterator[StatementRow]:
 
 
 def _extrapolated(report):
-    """The parts that no control point holds: green where they are as good as what is judged."""
+    """Row of the unconstrained parts: green if they are as good as the rest."""
     weak = report.support.weak
     if not weak and report.is_held_by_others:
         return StatementRow.of("Extrapolated", Statement("held by other drives", "warning"))
@@ -352,7 +351,7 @@ def _extrapolated(report):
 
 
 def _left_out(report) -> Iterator[StatementRow]:
-    """What remains at control points that the others alone correct."""
+    """Yield the row of leave-one-out residuals at control points."""
     left_out = report.control.left_out
     if left_out is None:
         return
@@ -364,7 +363,7 @@ def _left_out(report) -> Iterator[StatementRow]:
 
 
 def _sigma(report) -> Iterator[StatementRow]:
-    """What the estimate itself believes of its result."""
+    """Yield the row of the estimated accuracy."""
     sigma = report.position_sigma
     if sigma is None:
         return
@@ -377,7 +376,7 @@ def _sigma(report) -> Iterator[StatementRow]:
 
 
 def has_assumed_sigma(rows: Iterable[dict]) -> bool:
-    """Return True if a sigma of the POS is a default.
+    """True if a sigma of the POS is a default.
 
     Parameters
     ----------
@@ -390,18 +389,18 @@ def has_assumed_sigma(rows: Iterable[dict]) -> bool:
 def assumed_statement(
     rows: list[dict], purpose: str, rating: str, uses: Mapping[str, str] | None = None
 ) -> Iterator[StatementRow]:
-    """The accuracies that nobody stated, with the defaults that stand in; nothing without any.
+    """Yield the row of accuracies that nobody stated, with their defaults; nothing without any.
 
     Parameters
     ----------
     rows : list of dict
-        ``assumed`` of a document: key, value, unit and, where there is one, the estimate.
+        ``assumed`` of a document: key, value, unit and, if available, the estimate.
     purpose : str
-        What becomes of them: the end of the sentence.
+        Their use: the end of the sentence.
     rating : str
-        Of RATINGS, where a sigma is among them; else it is green.
+        One of RATINGS, used if a sigma is among them; otherwise green.
     uses : mapping of str to str, optional
-        What a default without an estimate is used for, by its key.
+        Use of a default without an estimate, by key.
     """
     if not rows:
         return
@@ -419,7 +418,7 @@ def assumed_statement(
 
 
 def warning_statements(warnings: Iterable[str]) -> Iterator[StatementRow]:
-    """What was doubtful on the way, if anything was.
+    """Yield the row of warnings, if any.
 
     Parameters
     ----------
@@ -432,7 +431,7 @@ def warning_statements(warnings: Iterable[str]) -> Iterator[StatementRow]:
 
 
 def _named(points):
-    """Items of the points that took no part although they were surveyed."""
+    """Items of the surveyed points that were not used."""
     rows = (*points.refused, *points.missing, *points.outside)
     return capped((name, reason_in_words(why)) for name, why in rows)
 
@@ -442,12 +441,12 @@ def _names(points):
 
 
 def capped(items: Iterable[tuple[str, str]]) -> tuple[tuple[str, str], ...]:
-    """The first of some items, and how many more there are.
+    """First of some items, and the number of further ones.
 
     Parameters
     ----------
     items : iterable of (str, str)
-        As of a StatementRow.
+        Items of a StatementRow.
     """
     items = tuple(items)
     more = len(items) - NAMED

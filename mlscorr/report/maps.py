@@ -1,4 +1,4 @@
-"""Maps: trajectory, targets and their horizontal residuals as arrows, and what was seen twice.
+"""Maps: trajectory, targets with horizontal residuals as arrows, and tie features.
 
 Both have panels in equal scales, with whole meters as tick labels.
 """
@@ -40,13 +40,13 @@ STATES = ("Before the correction", "After the correction")
 
 @styled
 def tie_figure(correction: Correction, residuals: TieResiduals) -> Figure:
-    """Plan of the ties, before and after: side by side, or one above the other on a long street.
+    """Draw a plan of the ties, before and after, side by side or, for a long street, stacked.
 
     Parameters
     ----------
     correction : Correction
     residuals : TieResiduals
-        What the correction leaves of the ties.
+        Residuals of the ties after the correction.
     """
     states = dict(zip(STATES, (residuals.ties.misclosure, residuals.after), strict=True))
     words = "Trajectory (corrected)"
@@ -55,12 +55,12 @@ def tie_figure(correction: Correction, residuals: TieResiduals) -> Figure:
 
 @styled
 def search_figure(trajectory: Trajectory, ties: Ties, refused: Ties) -> Figure:
-    """Plan of the ties that a search found, and of the pairs that it refused.
+    """Draw a plan of the ties found by a search, and of the refused pairs.
 
     Parameters
     ----------
     trajectory : Trajectory
-        As recorded.
+        Recorded trajectory.
     ties, refused : Ties
     """
     both = Ties.concatenate([ties, refused])
@@ -70,7 +70,7 @@ def search_figure(trajectory: Trajectory, ties: Ties, refused: Ties) -> Figure:
 
 
 def _tie_plan(trajectory, place, used, states, words):
-    """Plans of places (n, 2, 3) coloured by misclosures (n,) of one or two states, in m."""
+    """Draw plans of positions (n, 2, 3) colored by misclosures (n,) of one or two states, in m."""
     way = track(trajectory)
     places = place.mean(axis=1)[:, :2]
     misfits = [1000 * np.abs(misclosure) for misclosure in states.values()]  # mm
@@ -102,7 +102,7 @@ def _tie_plan(trajectory, place, used, states, words):
 
 
 def _kinds_legend(used, words):
-    """Legend entries of what is drawn."""
+    """Legend entries of drawn items."""
     handles = [Line2D([], [], label=words, **TRACK)]
     dot = {"linestyle": "none", "marker": "o", "markersize": 3, "color": "#5b2a86"}
     if used.any():
@@ -121,7 +121,7 @@ NEXT_WORDS = "Where another control point helps most"
 
 @styled
 def map_figure(correction: Correction, report: CorrectionReport) -> Figure:
-    """Plan of the trajectory and the targets with residual arrows before and after.
+    """Draw a plan of the trajectory and the targets with residual arrows before and after.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def map_figure(correction: Correction, report: CorrectionReport) -> Figure:
     figure = new_figure(1.25 + (SETTINGS.figure_width - 1.1) * height / width)
     axes = figure.add_subplot()
     axes.plot(*way.T, **TRACK)
-    # hides under its mark
+    # hidden under its mark
     if times:
         short = _arrows(axes, arrows, times, 0.008 * width)
     else:
@@ -175,12 +175,12 @@ def map_figure(correction: Correction, report: CorrectionReport) -> Figure:
 
 
 def mark_places(axes: Axes, places: Sequence[tuple[float, float]]) -> None:
-    """Number the places where another control point belongs, the best first.
+    """Number the positions for further control points, best first.
 
     Parameters
     ----------
     axes : Axes
-        Of a map.
+        Axes of a map.
     places : sequence of (easting, northing)
         Units: m.
     """
@@ -199,7 +199,7 @@ def mark_places(axes: Axes, places: Sequence[tuple[float, float]]) -> None:
 
 
 def _enlargement(residuals, extent):
-    """How many times the arrows are larger than the map: 1, 2, 5, 10, ...; 0 without arrows."""
+    """Magnification of the arrows relative to the map: 1, 2, 5, 10, ...; 0 without arrows."""
     longest = np.hypot(*residuals.T).max(initial=0.0)
     if longest > 0:
         return nice(SETTINGS.longest_arrow * extent / longest)
@@ -207,7 +207,7 @@ def _enlargement(residuals, extent):
 
 
 def _bounds(points, extent):
-    """Lower left and upper right corner with a margin, and the height of the strip at the foot.
+    """Lower left and upper right corner with a margin, and height of the strip at the bottom.
 
     The strip is kept free of data for the scale bar and the north arrow.
     """
@@ -222,9 +222,9 @@ def _bounds(points, extent):
 
 
 def _arrows(axes, rows, times, shortest):
-    """Draw horizontal residuals from the surveyed place, broad before and thin after.
+    """Draw horizontal residuals from the surveyed position, wide before and thin after.
 
-    Returns how many after the correction are too short to draw.
+    Return the number of arrows after the correction that are too short to draw.
     """
     place = array(rows, "surveyed")[:, :2]
     for name, color, width in (("before", BEFORE, 0.026), ("after", AFTER, 0.018)):
@@ -241,16 +241,16 @@ def _quiver(axes, place, vector, color, width):
 
 
 def write_names(axes: Axes, names: Mapping[str, tuple[Any, int]], width: float) -> None:
-    """Each target's name beside its mark; left out where it would cover another name.
+    """Write each target's name next to its mark, unless it would cover another name.
 
     Parameters
     ----------
     axes : Axes
-        Of a map, with its stars: where one or a name stands, a name goes to the other side.
+        Axes of a map, with its stars; a name avoids stars and names by using the other side.
     names : mapping
-        To easting and northing (m), and to 1 for a name right of the mark, -1 for one left of it.
+        Name to easting and northing (m), and 1 for a name right of the mark, -1 for left.
     width : float
-        Of a figure's whole width on the map. Units: m.
+        Width of a whole figure on the map. Units: m.
     """
     # m on the map
     taken = []
@@ -281,13 +281,13 @@ def write_names(axes: Axes, names: Mapping[str, tuple[Any, int]], width: float) 
 
 
 def _covers(box, others):
-    """Whether a box (middle and half its size) covers any of others."""
+    """True if a box (middle and half its size) covers any others."""
     others = np.reshape(others, (-1, 4))
     return (np.abs(others[:, :2] - box[:2]) < others[:, 2:] + box[2:]).all(axis=1).any()
 
 
 def _key(axes, low, high, strip, times):
-    """Scale bar, arrow scale and north arrow in the free strip at the foot."""
+    """Draw scale bar, arrow scale and north arrow in the free strip at the bottom."""
     width = high[0] - low[0]
     axes.axhspan(low[1], low[1] + strip, color="white", zorder=2.5)
     axes.axhline(low[1] + strip, color="#bbbbbb", linewidth=0.6, zorder=2.6)
@@ -319,7 +319,7 @@ def _key(axes, low, high, strip, times):
 
 
 def _legend(rows, arrows, times, short):
-    """Legend entries of what is really drawn."""
+    """Legend entries of drawn items."""
     handles = [Line2D([], [], label="Trajectory (corrected)", **TRACK)]
     handles += mark_handles(WORDS, {row.group for row in rows})
     if times:
@@ -334,17 +334,17 @@ def _legend(rows, arrows, times, short):
 
 
 def map_panels(count: int, share: float) -> tuple[Figure, np.ndarray]:
-    """A figure and its panels (count,): side by side, or one above the other for a long street.
+    """Make a figure with panels (count,), side by side or, for a long street, stacked.
 
     Parameters
     ----------
     count : int
-        Maps of the same place: one or two.
+        Number of maps of the same area: one or two.
     share : float
-        Of its height in its width.
+        Ratio of height to width.
     """
     columns = 2 if share > 0.7 and count > 1 else 1
-    # inch: labels and colours
+    # inch: labels and colors
     lines = count // columns
     beside = 1.8
     width = SETTINGS.figure_width / columns - beside
@@ -370,9 +370,9 @@ def corners(points: np.ndarray, thinnest: float) -> tuple[np.ndarray, np.ndarray
     Parameters
     ----------
     points : (n, 2) array
-        NaN where none is known. Units: m.
+        NaN if unknown. Units: m.
     thinnest : float
-        Least half width of the map over its length: none is a thin line.
+        Smallest half width of the map over its length, so that it is not a thin line.
     """
     low = np.nanmin(points, axis=0)
     high = np.nanmax(points, axis=0)
@@ -383,7 +383,7 @@ def corners(points: np.ndarray, thinnest: float) -> tuple[np.ndarray, np.ndarray
 
 
 def frame(axes: Axes, low: np.ndarray, high: np.ndarray, ticks: int = 5) -> None:
-    """Limits, equal scale on both axes, and whole metres as tick labels.
+    """Set limits, equal scale on both axes, and whole meters as tick labels.
 
     Parameters
     ----------
@@ -391,7 +391,7 @@ def frame(axes: Axes, low: np.ndarray, high: np.ndarray, ticks: int = 5) -> None
     low, high : (2,) array
         Corners. Units: m.
     ticks : int
-        Intervals of an axis, at most.
+        Largest number of intervals of an axis.
     """
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])

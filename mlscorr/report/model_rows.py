@@ -7,14 +7,14 @@ from mlscorr.report.wording import MEANINGS
 
 
 class ModelRow(NamedTuple):
-    """A parameter of the model.
+    """Parameter of the model.
 
     Parameters
     ----------
     name : str
     value : object
     unit, meaning : str
-        Empty where there is none.
+        Empty without one.
     """
 
     name: str
@@ -24,12 +24,12 @@ class ModelRow(NamedTuple):
 
 
 def model_rows(model: Mapping[str, Any]) -> list[ModelRow]:
-    """Rows of the parameters of a model, those in sections one by one.
+    """Make rows of the parameters of a model, including those in sections.
 
     Parameters
     ----------
     model : mapping
-        Of report.json, without its tables.
+        Model of report.json, without its tables.
 
     >>> model_rows({"covariance": {"correlation_time": 28.4}})[0][:3]
     ('Correlation time of the drift', 28.4, 's')
@@ -38,7 +38,7 @@ def model_rows(model: Mapping[str, Any]) -> list[ModelRow]:
 
 
 def _entries(pairs: Iterable[tuple[str, Any]]) -> Iterator[tuple[str, Any]]:
-    """Keys and values; those of a section that has meanings of its own follow one by one."""
+    """Yield keys and values, including those in sections with their own meanings."""
     for key, value in pairs:
         inside = isinstance(value, Mapping) and key not in MEANINGS
         if inside and value:
@@ -48,7 +48,7 @@ def _entries(pairs: Iterable[tuple[str, Any]]) -> Iterator[tuple[str, Any]]:
 
 
 def _row(key, value):
-    """Row of a key; one without a meaning of its own is named by the key."""
+    """Row of a key; without a meaning of its own, the name is the key."""
     if key in MEANINGS:
         name, unit, meaning = MEANINGS[key]
         return ModelRow(name, value, unit, meaning)

@@ -1,4 +1,4 @@
-"""Pages: one HTML file each that holds its style, scripts and pictures, for reading offline."""
+"""HTML pages with embedded style, scripts and pictures, for offline reading."""
 
 import base64
 from dataclasses import dataclass
@@ -20,23 +20,23 @@ LIBRARIES = ("numpy", "scipy", "laspy", "lazrs", "numba", "pyproj", "matplotlib"
 
 @dataclass(frozen=True)
 class Page:
-    """A self-contained page: the skeleton with a summary, sections, styles and scripts.
+    """Self-contained page: the skeleton with a summary, sections, styles and scripts.
 
     Parameters
     ----------
     title : str
-        Of the browser's window.
+        Title of the browser's window.
     summary : str
-        The template that stands above the sections.
+        Template above the sections.
     sections : dict
-        Titles of the sections by their names, in their order. A section is the template of its
-        name, which holds a heading whose id is the name.
+        Titles of the sections by name, in order. A section is the template of its name, with a
+        heading whose ID is the name.
     content : dict
-        What the templates show.
+        Content of the templates.
     prefix : str
-        Before the sections' names in the names of their templates.
+        Prefix of the sections' names in the names of their templates.
     styles, scripts : tuple of str
-        Files beside those that all pages have.
+        Files in addition to those of all pages.
     """
 
     title: str
@@ -48,12 +48,12 @@ class Page:
     scripts: tuple[str, ...] = ()
 
     def html(self) -> str:
-        """The text of the page, which says when and by which versions it was written.
+        """Return the text of the page, with its time and versions.
 
         Raises
         ------
         jinja2.UndefinedError
-            Where a template shows what the content doesn't have.
+            If a template uses content that is missing.
         """
         frame = {"versions": versions(), "written": now(), "window_title": self.title}
         frame |= {name: getattr(self, name) for name in ("summary", "sections", "prefix")}
@@ -67,7 +67,7 @@ class Page:
 
 
 def environment(folder: Path = TEMPLATES) -> Environment:
-    """Templates of a folder, which escape what they are given and know how numbers are shown."""
+    """Make templates of a folder, with escaping and number formatting."""
     templates = Environment(
         loader=FileSystemLoader(folder),
         autoescape=True,
@@ -82,12 +82,12 @@ def environment(folder: Path = TEMPLATES) -> Environment:
 
 
 def raw(name: str) -> Markup:
-    """A file of the page as it is: style and scripts, which are our own."""
+    """Return a file of the page unescaped: our own style and scripts."""
     return Markup((TEMPLATES / name).read_text(encoding="utf-8"))
 
 
 def show(value: object) -> str:
-    """Any value of a document in words, numbers with four figures.
+    """Format any value of a document in words, numbers with four figures.
 
     >>> show([0.25, None]), show(True), show({"E": 12.0}), show(357700.02)
     ('0.25, not determined', 'yes', 'E: 12', '357700.0')
@@ -99,7 +99,7 @@ def show(value: object) -> str:
             return "yes"
         return "no"
     if isinstance(value, int | float):
-        is_time = abs(value) >= 1e5  # of a week: four figures of it tell no day
+        is_time = abs(value) >= 1e5  # of a week: four figures of it do not show the day
         if isinstance(value, int):
             return f"{value:d}"
         return f"{value:{'.1f' if is_time else '.4g'}}"
@@ -111,12 +111,12 @@ def show(value: object) -> str:
 
 
 def data_uri(picture: bytes, kind: str = "svg+xml") -> str:
-    """A picture as the address of an image that lies in the page itself."""
+    """Encode a picture as a data URI."""
     return f"data:image/{kind};base64," + base64.b64encode(picture).decode()
 
 
 def drawn(figures: Figures) -> dict[str, str]:
-    """Figures by name, each as the address of an image.
+    """Draw figures by name, each as a data URI.
 
     Parameters
     ----------
@@ -126,11 +126,11 @@ def drawn(figures: Figures) -> dict[str, str]:
 
 
 def versions() -> list[tuple[str, str]]:
-    """Names and versions of mlscorr and the libraries that made the numbers."""
+    """Names and versions of mlscorr and the libraries behind the numbers."""
     known = (next(iter(distributions(name=name)), None) for name in ("mlscorr", *LIBRARIES))
     return [(package.name, package.version) for package in known if package is not None]
 
 
 def now() -> str:
-    """The time of writing, as pages show it."""
+    """Time of writing, as shown on pages."""
     return f"{datetime.now(UTC):%Y-%m-%d %H:%M:%S} UTC"

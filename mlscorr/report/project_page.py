@@ -1,4 +1,4 @@
-"""The page of a project: its drives on a map, and a table that leads to each."""
+"""Page of a project: its drives on a map, and a table with links to each."""
 
 from pathlib import Path
 
@@ -17,16 +17,16 @@ SECTIONS = {"drives": "Drives", "map": "Map"}
 
 
 def write_project(path: str | Path, document: dict, tracks: dict[str, np.ndarray]) -> None:
-    """Write the self-contained page of a project, which leads to those of its drives.
+    """Write the self-contained page of a project, with links to those of its drives.
 
     Parameters
     ----------
     path : path
-        The HTML file.
+        HTML file.
     document : dict
-        The content of project.json.
+        Contents of project.json.
     tracks : dict
-        Easting, northing (m) and expected error (m) along each drive (k, 3), by its name.
+        Easting, northing (m) and expected error (m) along each drive (k, 3), by name.
     """
     if tracks:
         figures = {"map": data_uri(svg(project_map(tracks)))}
@@ -43,15 +43,15 @@ def write_project(path: str | Path, document: dict, tracks: dict[str, np.ndarray
 
 @styled
 def project_map(tracks: dict[str, np.ndarray]) -> Figure:
-    """Plan of all drives, coloured by the error to expect.
+    """Draw a plan of all drives, colored by the expected error.
 
     Parameters
     ----------
     tracks : dict
-        As of write_project.
+        See write_project.
     """
     places = np.vstack([track[np.isfinite(track[:, 0])] for track in tracks.values()])
-    low, high = corners(places[:, :2], 0.4)  # so wide that labels below it don't touch
+    low, high = corners(places[:, :2], 0.4)  # wide enough for labels below it
     width, height = high - low
     figure = new_figure(1.0 + 6.0 * float(np.clip(height / width, 0.3, 1.3)))
     axes = figure.add_subplot()

@@ -1,4 +1,4 @@
-"""The page of two results compared: summary, difference over time, and a table by target."""
+"""Page of a comparison of two results: summary, difference over time, and a table by target."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,7 +12,7 @@ from matplotlib.patches import Patch
 from mlscorr.report import style
 from mlscorr.report.pages import Page, data_uri
 
-SECTIONS = {  # in their order; one without anything to show is left out
+SECTIONS = {  # in order; empty ones are omitted
     "time": "Over time",
     "scores": "RMSE",
     "targets": "Every target",
@@ -30,9 +30,9 @@ def write_results(path: str | Path, document: dict, curves: Curves) -> None:
     Parameters
     ----------
     path : path
-        The HTML file.
+        HTML file.
     document : dict
-        The content of compare_results.json.
+        Contents of compare_results.json.
     curves : tuple
         Arguments of results_figure.
     """
@@ -61,7 +61,7 @@ def results_figure(
     sigmas: Sequence[np.ndarray | None],
     gaps: np.ndarray,
 ) -> Figure:
-    """Difference of two corrected trajectories over time, with one sigma of each result.
+    """Draw the difference of two corrected trajectories over time, with both sigmas.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def results_figure(
     sigmas : pair of (n, 3) array or None
         One sigma of the first and of the second result. Units: m.
     gaps : (k, 2) array
-        Which no line crosses. Units: s.
+        Gaps, which no line crosses. Units: s.
     """
     start = np.floor(gps_time[0])
     figure = style.new_figure(5.6)

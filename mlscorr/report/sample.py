@@ -1,4 +1,4 @@
-"""As much of a cloud as pictures of it need, gathered in one pass and in flat memory."""
+"""Sample of a cloud for pictures, collected in one pass with flat memory."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -12,12 +12,12 @@ from mlscorr.survey import PointCloud
 
 
 class EvenSample:
-    """Every step-th point of what is added; the step doubles where that becomes too many.
+    """Every step-th point; the step doubles if there are too many points.
 
     Parameters
     ----------
     limit : int
-        So many points are kept, up to twice as many.
+        Number of points kept; up to twice as many occur.
     """
 
     def __init__(self, limit: int):
@@ -27,9 +27,9 @@ class EvenSample:
         self.parts = []
 
     def add(self, cloud: PointCloud) -> None:
-        """Take the step-th points of a further part."""
+        """Add the step-th points of a further part."""
         picked = cloud[-self.count % self.step :: self.step]
-        self.parts.append(PointCloud.concatenate([picked]))  # a copy, or all would stay in memory
+        self.parts.append(PointCloud.concatenate([picked]))  # a copy, or all would remain in memory
         self.count += len(cloud)
         while sum(map(len, self.parts)) > 2 * self.limit:
             self.step *= 2
@@ -48,28 +48,28 @@ def _every_second(parts):
 
 @dataclass(frozen=True)
 class CloudSample:
-    """Every step-th point of a cloud, and where step > 1 all near targets and walls, too."""
+    """Every step-th point of a cloud, and for step > 1 all points near targets and walls."""
 
     cloud: PointCloud
     step: int
 
     def chunks(self) -> Iterator[PointCloud]:
-        """The points in chunks, as a file's are read."""
+        """Yield the points in chunks, like those of a file."""
         for first in range(0, len(self.cloud), IO_SETTINGS.chunk_points):
             yield self.cloud[first : first + IO_SETTINGS.chunk_points]
 
 
 class CloudSampler:
-    """Gathers the sample of a cloud that passes in chunks.
+    """Collector of the sample of a cloud from chunks.
 
     Parameters
     ----------
     targets : list of TargetRow
-        Those near which points are kept.
+        Targets near which points are kept.
     walls : (k, 3) array
-        Places near which points are kept, too. Units: m.
+        Further positions near which points are kept. Units: m.
     limit : int
-        Of the points spread over the cloud, near targets and near walls: at most twice as many.
+        Number of points spread over the cloud, near targets, and near walls; at most twice as many.
     """
 
     def __init__(
@@ -81,7 +81,7 @@ class CloudSampler:
         self._near = [EvenSample(limit) for _ in self._regions]
 
     def add(self, chunk: PointCloud) -> None:
-        """Take what the sample needs of a further chunk."""
+        """Add the relevant points of a chunk."""
         self._spread.add(chunk)
         number = _cell_numbers(chunk.xyz)
         rows = np.flatnonzero(_is_in(number, self._cells))
@@ -90,7 +90,7 @@ class CloudSampler:
 
     @property
     def sample(self) -> CloudSample:
-        """The sample of all that was added."""
+        """Sample of all added chunks."""
         parts = [*self._spread.parts]
         if self._spread.step > 1:
             parts += [part for near in self._near for part in near.parts]
@@ -103,13 +103,13 @@ def gather(
     walls: np.ndarray,
     limit: int = SETTINGS.sample_points,
 ) -> CloudSample:
-    """The sample of a cloud that is streamed as chunks.
+    """Collect the sample of a cloud that is streamed in chunks.
 
     Parameters
     ----------
     chunks : iterable of PointCloud
     targets, walls, limit
-        As of CloudSampler.
+        See CloudSampler.
     """
     sampler = CloudSampler(targets, walls, limit)
     for chunk in chunks:
@@ -130,15 +130,15 @@ def near_rows(xyz: np.ndarray, targets: list[TargetRow]) -> np.ndarray:
 
 
 def _cells(targets):
-    """Sorted numbers of the plan cells about the targets."""
-    # four times half of what a close-up shows, as it is seen from aside; no target is over 1 m
+    """Sorted numbers of the plan cells around the targets."""
+    # four times half of a close-up's width, as it is oblique; no target is over 1 m
     radius = [2 * np.linalg.norm(row.before) + 4.0 for row in targets]
     middle = [(row.surveyed + row.observed) / 2 for row in targets]
     return _about(np.reshape(middle, (-1, 3)), np.array(radius)[:, None])
 
 
 def _about(places, radius):
-    """Sorted numbers of the plan cells within a radius of places (n, 3) along both axes."""
+    """Sorted numbers of the plan cells within a radius of positions (n, 3) along both axes."""
     low, high = (
         np.floor((places[:, :2] + s * radius) / SETTINGS.plan_cell).astype(int) for s in (-1, 1)
     )
@@ -160,5 +160,5 @@ def _cell_numbers(xyz):
 
 
 def _is_in(number, cells):
-    """Which numbers are among those of the cells (sorted)."""
+    """Flag of numbers that are among those of the cells (sorted)."""
     return cells[np.searchsorted(cells, number)] == number

@@ -1,19 +1,19 @@
-"""The numbers that pages, figures and pictures are made with."""
+"""Settings of pages, figures and pictures."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Sizes and limits of what the report shows.
+    """Sizes and limits of the report's contents.
 
-    None of them changes a result; they were set by looking at the pages of wuhan_drive and of the
-    practice surveys, on a screen and on paper, where no other source is named. Sizes of letters
-    and lines of figures are those of ``mlscorr.report.style.STYLE``.
+    None of them changes a result. If no other source is named, they were chosen from the pages of
+    wuhan_drive and of the practice surveys, on screen and on paper. Sizes of letters and lines in
+    figures are in ``mlscorr.report.style.STYLE``.
     """
 
     # words and figures
-    difference: float = 0.002  # m; surveying a target tells no less, so no axis is finer either
+    difference: float = 0.002  # m; accuracy of a surveyed target, and thus finest axis
     figure_width: float = 7.6  # inch: A4 without its margins
     dots_per_inch: int = 200  # of PNGs: letters of 8.5 pt stay sharp on paper
     curve_epochs: int = 3000  # rows of a curve: two for each dot of a figure's width
@@ -21,21 +21,21 @@ class Settings:
     longest_arrow: float = 0.12  # of the map's width
     axis_names: int = 60  # more names under an axis would touch each other
 
-    # targets, as they were found
-    ellipse_scale: float = 10.0  # one sigma itself is too small to be seen
-    low_score: float = 0.9  # most true targets have more; less is a reason to look, not to reject
+    # targets, as found
+    ellipse_scale: float = 10.0  # one sigma itself is too small to see
+    low_score: float = 0.9  # most true targets have more; lower ones need a check, not refusal
     target_figure: tuple[float, float] = (1.85, 2.15)  # inch
 
-    # what is taken of the cloud
-    sample_points: int = 1_000_000  # of each part; up to twice as many are gathered; guard
-    plan_cell: float = 2.0  # m, of the grid that tells what is near a target, and of walls
-    framing_points: int = 100_000  # that frame the whole survey; more change no pixel
+    # samples of the cloud
+    sample_points: int = 1_000_000  # of each part; up to twice as many are collected; guard
+    plan_cell: float = 2.0  # m, of the grid to find points near targets and walls
+    framing_points: int = 100_000  # that frame the whole survey; more do not change a pixel
     viewer_points: tuple[int, int] = (36_000, 24_000)  # even and near targets: 3 MB of a page
     shown_points: int = 300_000  # of a page of clouds alone: 6 MB
-    shown_extent: float = 100_000.0  # m; float32, in which views draw, holds 4 mm there
+    shown_extent: float = 100_000.0  # m; float32, in which views draw, resolves 4 mm there
     close_ups: int = 24  # targets: 15 MB of a page
     panel: tuple[int, int] = (640, 480)  # pixels
-    close_up: tuple[int, int] = (440, 330)  # pixels, as the page shows it: so are its letters
+    close_up: tuple[int, int] = (440, 330)  # pixels, as shown on the page, and so are its letters
 
     # how pictures are taken of it
     darkest_median: float = 0.35  # of a scale, where the darker picture has its median
@@ -44,16 +44,16 @@ class Settings:
     finest_picture: float = 40e6  # pixels of a picture while marks are drawn: 120 MB; guard
     picture_sizes: tuple[int, int] = (64, 8192)  # pixels, least and largest width and height; guard
     page_margins: tuple[float, float, float, float] = (0.012, 0.105, 0.11, 0.045)
-    # of width or height: beside the panels, above and below them, between stacked ones
+    # of width or height: next to the panels, above and below them, between stacked ones
     open3d_timeout: float = 60.0  # s for a pair of pictures; a software driver takes 5 s; guard
-    largest_street: float = 250.0  # m; more is seen from above, where its streets don't overlap
+    largest_street: float = 250.0  # m; larger ones are viewed from above, without overlaps
     sideways_angle: float = 50.0  # deg, at most, to see all of a target's misclosure
-    visible: float = 0.01  # m, a misclosure that is looked at from aside
+    visible: float = 0.01  # m, a misclosure that is viewed from the side
     section_half_width: tuple[float, float] = (1.0, 6.0)  # m, at least and at most
-    wall_height: float = 1.5  # m, of the least wall
+    wall_height: float = 1.5  # m, of the smallest wall
     wall_flatness: float = 0.05  # m, the largest standard deviation of its points from a plane
-    facades: int = 20  # of ties, where passes lie the farthest apart: some of them are well covered
-    normal_points: int = 15  # that tell how a wall or a target is turned
+    facades: int = 20  # of ties, with the largest misclosures: some of them are well covered
+    normal_points: int = 15  # required to determine the orientation of a wall or target
 
 
 SETTINGS = Settings()

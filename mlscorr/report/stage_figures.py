@@ -1,4 +1,4 @@
-"""One figure of each stage of a correction: targets, misclosures, the POS error, scores."""
+"""One figure for each stage of a correction: targets, misclosures, POS error, scores."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ STATES = {"before": style.BEFORE, "after": style.AFTER, "leave-one-out": style.G
 
 
 def targets_figure(targets: Sequence[PassTarget]) -> Figure:
-    """Targets one by one, those with the highest scores where they don't fit a screen.
+    """Draw targets one by one, only the highest scores if they do not fit a screen.
 
     Parameters
     ----------
@@ -55,13 +55,13 @@ def targets_figure(targets: Sequence[PassTarget]) -> Figure:
 
 @style.styled
 def misclosure_figure(control: Matched, check: Matched, trajectory: Trajectory) -> Figure:
-    """Misclosures (surveyed - observed) over time, axis by axis, with one sigma.
+    """Draw misclosures (surveyed - observed) over time, axis by axis, with one sigma.
 
     Parameters
     ----------
     control, check : Matched
     trajectory : Trajectory
-        Its start is time zero of the figure.
+        Its start is time zero in the figure.
     """
     figure = style.new_figure(5.2)
     panels = figure.subplots(3, 1, sharex=True)
@@ -84,7 +84,7 @@ def misclosure_figure(control: Matched, check: Matched, trajectory: Trajectory) 
 
 @style.styled
 def pos_error_figure(estimate: Estimate) -> Figure:
-    """The correction of the position over time with its sigma, and what it rests on.
+    """Draw the position correction over time with its sigma, and the observations behind it.
 
     Parameters
     ----------
@@ -128,12 +128,12 @@ def pos_error_figure(estimate: Estimate) -> Figure:
 
 @style.styled
 def score_figure(scores: Mapping[str, Score]) -> Figure:
-    """RMSE before, after and leave-one-out, on each axis and in 3D; the scale is logarithmic.
+    """Draw RMSE before, after and leave-one-out, on each axis and in 3D, on a logarithmic scale.
 
     Parameters
     ----------
     scores : mapping
-        By what they are of; those of no point are left out.
+        By kind of point; empty ones are omitted.
     """
     known = {name: score for name, score in scores.items() if score.before.n}
     figure = style.new_figure(3.2)

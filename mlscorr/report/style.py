@@ -1,4 +1,4 @@
-"""The style of all figures: a palette, sizes of letters and lines, legends, thinned curves."""
+"""Style of all figures: palette, sizes of letters and lines, legends, thinned curves."""
 
 import io
 import re
@@ -19,7 +19,7 @@ from PIL.PngImagePlugin import PngInfo
 
 from mlscorr.report.settings import SETTINGS
 
-# Okabe and Ito (2008), Color Universal Design: colour-blind readers can tell them apart
+# Okabe and Ito (2008), Color Universal Design: distinguishable by color-blind readers
 BLACK = "#000000"
 ORANGE = "#E69F00"
 SKY = "#56B4E9"
@@ -33,7 +33,7 @@ BAND: dict[str, Any] = {"facecolor": f"{SKY}59", "edgecolor": "none"}  # of one 
 OUTSIDE: dict[str, Any] = {
     "facecolor": "#f3e9c9",
     "edgecolor": "none",
-}  # of what control points hold
+}  # of parts constrained by control points
 OUTAGE: dict[str, Any] = {"facecolor": "#8fb0dd", "edgecolor": "none"}
 STEP: dict[str, Any] = {"color": "#7b4fa3", "linewidth": 0.9, "linestyle": (0, (1, 1.5))}
 SPAN: dict[str, Any] = {"color": "#8a6d00", "linewidth": 0.8, "linestyle": (0, (4, 3))}
@@ -70,7 +70,7 @@ STYLE: Any = {
     "lines.linewidth": 1.2,
     "hatch.linewidth": 0.5,
     "svg.fonttype": "path",
-    "text.parse_math": False,  # names from files may hold dollar signs
+    "text.parse_math": False,  # names from files may contain dollar signs
     "svg.hashsalt": "mlscorr",
 }
 styled = matplotlib.rc_context(STYLE)  # decorator
@@ -83,7 +83,7 @@ def _font():
 
 
 def label(name: str | None, longest: int = 14) -> str:
-    """A name from a file as the font can draw it: one line, cut when long.
+    """Format a name from a file for the font: one line, truncated if long.
 
     >>> label("T01"), label(None), label("A name that is long")
     ('T01', 'no name', 'A name that i…')
@@ -96,7 +96,7 @@ def label(name: str | None, longest: int = 14) -> str:
 
 
 def nice(value: float) -> float:
-    """The largest of 1, 2, 5 times a power of ten that is not above a positive value.
+    """Largest of 1, 2, 5 times a power of ten that does not exceed a positive value.
 
     >>> nice(0.71), nice(380.0)
     (0.5, 200.0)
@@ -106,19 +106,19 @@ def nice(value: float) -> float:
 
 
 class NotebookFigure(Figure):
-    """A figure that notebooks show without pyplot, which would keep and show it twice."""
+    """Figure that notebooks show without pyplot, which would show it twice."""
 
     def _repr_png_(self) -> bytes:
         return png(self)
 
 
 def new_figure(height: float) -> Figure:
-    """An empty figure of the common width (height in inch)."""
+    """Make an empty figure of the common width (height in inch)."""
     return NotebookFigure(figsize=(SETTINGS.figure_width, height), layout="constrained")
 
 
 def legend_above(figure: Figure, handles: Sequence[Artist], columns: int = 3) -> None:
-    """A legend above all axes, where it covers no data."""
+    """Draw a legend above all axes, where it covers no data."""
     figure.legend(handles=handles, loc="outside upper left", ncols=columns)
 
 
@@ -128,9 +128,9 @@ def mark_handles(words: dict[str, str], groups: set[str]) -> list[Line2D]:
     Parameters
     ----------
     words : dict
-        What each group is called.
+        Name of each group.
     groups : set of str
-        Those that are drawn.
+        Drawn groups.
     """
     return [
         Line2D([], [], linestyle="none", label=text, **MARKS[group])
@@ -140,13 +140,13 @@ def mark_handles(words: dict[str, str], groups: set[str]) -> list[Line2D]:
 
 
 def mark_handle(marker: str, color: str, words: str, size: float | None = None) -> Line2D:
-    """A mark in a legend.
+    """Make a mark in a legend.
 
     Parameters
     ----------
     marker, color, words : str
     size : float, optional
-        As matplotlib has it by default. Units: pt.
+        matplotlib's default if not given. Units: pt.
     """
     return Line2D(
         [], [], linestyle="none", marker=marker, markersize=size, color=color, label=words
@@ -154,7 +154,7 @@ def mark_handle(marker: str, color: str, words: str, size: float | None = None) 
 
 
 def draw(figures: Figures, name: str) -> Figure:
-    """The figure of a name.
+    """Draw the figure with a name.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def draw(figures: Figures, name: str) -> Figure:
     Raises
     ------
     ValueError
-        Where there is none.
+        If there is none.
     """
     if name not in figures:
         raise ValueError(f"There is no figure '{name}' here: {', '.join(figures)}.")
@@ -172,7 +172,7 @@ def draw(figures: Figures, name: str) -> Figure:
 
 
 def svg(figure: Figure) -> bytes:
-    """The figure as the bytes of an SVG, coordinates cut to 0.01 pt."""
+    """Return the figure as the bytes of an SVG, with coordinates cut to 0.01 pt."""
     stream = io.BytesIO()
     with matplotlib.rc_context(STYLE):
         _lay_out(figure)
@@ -222,7 +222,7 @@ def _lay_out(figure):
 def thin(
     values: np.ndarray, gps_time: np.ndarray, gaps: np.ndarray, limit: int = SETTINGS.curve_epochs
 ) -> np.ndarray:
-    """Rows to draw of curves: each bin's minima and maxima, the ends, the edges of gaps.
+    """Select rows of curves to draw: each bin's minima and maxima, the ends, the edges of gaps.
 
     Parameters
     ----------
@@ -230,7 +230,7 @@ def thin(
     gps_time : (n,) array
     gaps : (g, 2) array
     limit : int
-        At most this many rows (and two for each gap) are kept.
+        Largest number of rows, in addition to two for each gap.
 
     Returns
     -------
@@ -251,7 +251,7 @@ def thin(
 
 
 def break_at_gaps(gps_time: np.ndarray, gaps: np.ndarray, *values: np.ndarray) -> list[np.ndarray]:
-    """The times and curves with NaN put into each gap, so that no line crosses it.
+    """Insert NaN into times and curves at each gap, so that no line crosses it.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The tables of a correction's page, and what is said of its ties."""
+"""Tables of a correction's page, and statements on its ties."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,13 +17,13 @@ QUANTITIES = ("Easting", "Northing", "Height (vertical)", "Horizontal distance",
 
 @dataclass(frozen=True)
 class RmseRow:
-    """A row of the table of RMSE.
+    """Row of the table of RMSE.
 
     Parameters
     ----------
     label : str
     strong : bool
-        Whether a verdict may rest on it.
+        True if a verdict may use it.
     n : int
     rmse : (5,) array
         E, N, H, horizontal and 3D. Units: m.
@@ -36,7 +36,7 @@ class RmseRow:
 
 
 def norm(vector: Sequence[float] | np.ndarray, axes: int = 3) -> float:
-    """Length of the first axes of a vector, NaN when one is missing.
+    """Length of the first axes of a vector, NaN if one is missing.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def norm(vector: Sequence[float] | np.ndarray, axes: int = 3) -> float:
 
 
 def rmse_rows(report: CorrectionReport) -> list[RmseRow]:
-    """Rows of the table of RMSE, the independent ones first.
+    """Make rows of the table of RMSE, independent ones first.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def rmse_rows(report: CorrectionReport) -> list[RmseRow]:
 def statistics_rows(
     report: CorrectionReport,
 ) -> list[tuple[str, int, list[tuple[str, np.ndarray, np.ndarray]]]]:
-    """Blocks (title, n, rows) of all statistics, a row (name, before, after) for each quantity.
+    """Blocks (title, n, rows) of all statistics, with a row (name, before, after) per quantity.
 
     Parameters
     ----------
@@ -83,8 +83,7 @@ def statistics_rows(
     Returns
     -------
     list of tuple
-        before and after are mean, std, RMSE, least and largest (5,), NaN where not determined.
-        Units: m.
+        before and after are mean, std, RMSE, least and largest (5,), NaN if undetermined. Units: m.
     """
     check = report.check
     control = report.control
@@ -105,19 +104,19 @@ def _columns(statistics: Statistics):
 
 
 def tie_statements(section: dict[str, Any] | None, control: int) -> list[Statement]:
-    """What ties between passes did: how far apart these are, and what control that spares.
+    """Statements on the effect of ties between passes: misclosures, and equivalent control.
 
     Parameters
     ----------
     section : dict or None
         ``ties`` of report.json.
     control : int
-        Number of control points that took part.
+        Number of used control points.
 
     Returns
     -------
     list of Statement
-        Why there are none in one of them; none where nobody looked for any.
+        With the reason if there are no ties; empty without a search.
     """
     if section is None:
         return []
@@ -133,7 +132,7 @@ def tie_statements(section: dict[str, Any] | None, control: int) -> list[Stateme
         facts.append(Statement("contradicting ties", values={"wrong": wrong}))
     if control == 0:
         return [*facts, Statement("relative ties", "warning")]
-    if "share" not in section:  # an area's, of which the drive is a piece
+    if "share" not in section:  # an area's, which includes the drive
         return facts
     facts.append(Statement("share of control", values={"control": section["share"]["control"]}))
     sufficient = section["sufficient_control"]
@@ -146,13 +145,13 @@ def tie_statements(section: dict[str, Any] | None, control: int) -> list[Stateme
 
 
 def tie_sentences(section: dict[str, Any] | None, control: int) -> list[str]:
-    """What ties between passes did, in sentences for a reader who never heard of them.
+    """Sentences on the effect of ties between passes, for readers new to them.
 
     Parameters
     ----------
     section : dict or None
         ``ties`` of report.json.
     control : int
-        Number of control points that took part.
+        Number of used control points.
     """
     return in_words(tie_statements(section, control))

@@ -1,4 +1,4 @@
-"""A small figure of each target, so that a surveyor can judge at a glance whether it is one."""
+"""Small figure of each target, for a quick visual check by a surveyor."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ CIRCLE = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)  # of radius 1
 def target_drawings(
     rows: list[TargetRow], fitted: dict[tuple[int, float], FittedTarget]
 ) -> list[tuple[str, bytes]]:
-    """Pairs (title, PNG, some 20 kB) of the rows that hold an observation.
+    """Pairs (title, PNG of about 20 kB) of the rows with an observation.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ class Frame:
 
 
 def _doubt(row, target):
-    """Words where a target was not used, or is hardly like one."""
+    """Phrase on an unused target, or on one with a low score."""
     if row.role == "check":
         return ""
     if not row.used:
@@ -145,14 +145,14 @@ def _doubt(row, target):
 def write_contact_sheet(
     path: str | Path, rows: list[dict], fitted: dict[tuple[int, float], FittedTarget]
 ) -> None:
-    """Write one picture of all targets, those with the highest scores, in order of pass and time.
+    """Write one picture of the targets with the highest scores, sorted by pass and time.
 
     Parameters
     ----------
     path : path
-        The PNG file.
+        PNG file.
     rows : list of dict
-        Of targets.json. Those without a name are called by their row in targets.csv.
+        Rows of targets.json. Targets without a name are labeled by their row in targets.csv.
     fitted : dict
         FittedTarget by (pass number, gps_time).
     """
@@ -262,7 +262,9 @@ def _fit(pen, frame, target):
 
 
 def _upright(target):
-    """Plane axes (2, 2) to right and up as the scanner sees them; of a flat one, up is north."""
+    """Plane axes (2, 2) to the right and up as seen from the scanner; for a flat target, up is
+    north.
+    """
     normal = target.normal
     if normal[2] ** 2 < 0.5:
         up = np.array([0.0, 0.0, 1.0])

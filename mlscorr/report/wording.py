@@ -1,4 +1,4 @@
-"""The sentences of reports: what a correction, a calibration and a comparison say of a survey."""
+"""Sentences of reports on a correction, a calibration and a comparison of a survey."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
@@ -15,7 +15,7 @@ from mlscorr.wording import (
     thousands,
 )
 
-NAMED = 6  # points or stretches that stand on the first screen; the tables have all of them
+NAMED = 6  # points or intervals on the first screen; the tables have all
 ASSUMED_NAMES = {  # of a key of survey.toml
     "pos.position_sigma": "Position of the POS",
     "pos.attitude_sigma": "Attitude of the POS",
@@ -23,20 +23,20 @@ ASSUMED_NAMES = {  # of a key of survey.toml
     "scanner.range_noise": "Range noise",
     "scanner.angle_noise": "Angle noise",
 }
-JUDGES = {  # what a verdict on a correction rests on
+JUDGES = {  # basis of a verdict on a correction
     "check": "as independent check points tell",
     "leave-one-out": "as control points tell that were left out in turn",
     "fit": "but only at the points that it was made from: nothing independent can judge it",
 }
 PLACES = {True: "only another scanner saw the target", False: "nothing was scanned"}
-OTHERS = {  # kinds of methods beside our own
+OTHERS = {  # kinds of methods other than our own
     "one move": "Best of those that move the whole cloud as one",
     "over time": "Best of polynomials and interpolation over time",
 }
 
 
 def names_in_words(names: Sequence[str]) -> str:
-    """Names of points in a sentence; of many the first, and how many more there are.
+    """Names of points in a sentence; of many, the first ones and the number of the others.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def names_in_words(names: Sequence[str]) -> str:
 def stretch_in_words(
     start: float, end: float, chainage: float, length: float, why: str, sigma: float
 ) -> tuple[str, str]:
-    """Where a part lies that no control point holds, and why, with its sigma.
+    """Location of an unconstrained part, and the reason, with its sigma.
 
     Parameters
     ----------
@@ -70,14 +70,14 @@ def stretch_in_words(
 
 
 def assumed_in_words(row: Mapping[str, Any], use: str | None = None) -> tuple[str, str]:
-    """An accuracy that nobody stated: its name, and its default with its size by this survey.
+    """Unstated accuracy: its name, and its default with its size estimated in this survey.
 
     Parameters
     ----------
     row : dict
-        Of ``assumed`` of a document.
+        Row of ``assumed`` of a document.
     use : str, optional
-        What a default without an estimate is used for.
+        Use of a default without an estimate.
     """
     text = f"{_assumed_size(row['value'], row['unit'])} assumed"
     if row.get("estimate") is not None:
@@ -88,7 +88,7 @@ def assumed_in_words(row: Mapping[str, Any], use: str | None = None) -> tuple[st
 
 
 def _assumed_size(value, unit):
-    """A size, or several, in words."""
+    """Format a size, or several, in words."""
     values = [value]
     if isinstance(value, list | tuple):
         values = value
@@ -116,7 +116,9 @@ def _off(before, after):
 
 
 def _improved(before, after, kind, times, holds_everywhere):
-    """It boasts of no factor where a part of the cloud may be as far off as it was."""
+    """Sentence on the improvement; without a factor if a part of the cloud may be as wrong as
+    before.
+    """
     where = ""
     if not holds_everywhere and kind == "check":
         where = " at the points that were seen"
@@ -128,7 +130,7 @@ def _improved(before, after, kind, times, holds_everywhere):
 
 
 def points_in_words(points: int, observations: int) -> str:
-    """How many points: '8 points', or '12 observations of 8 points'.
+    """Number of points: '8 points', or '12 observations of 8 points'.
 
     Parameters
     ----------
@@ -141,7 +143,7 @@ def points_in_words(points: int, observations: int) -> str:
 
 
 def _rmse(before, after):
-    """RMSE (3,) before and after, with as many decimals as the smallest needs."""
+    """RMSE (3,) before and after, with the decimals of the smallest one."""
     low = min(*before, *after)
     decimals = 4
     if low >= 0.03:
@@ -215,7 +217,7 @@ def _control(scored, surveyed, refused, hidden, elsewhere):
 
 
 def _uncontrolled(is_tied, sigma):
-    """What a result without control points is relative to."""
+    """Sentence on the reference of a result without control points."""
     result = "No control point takes part: nothing but the POS says where the cloud lies."
     if is_tied:
         result += (
@@ -228,7 +230,7 @@ def _uncontrolled(is_tied, sigma):
 
 
 def _moved(held, extrapolated, left):
-    """Which share of the points was corrected, and on which grounds."""
+    """Sentence on the share of corrected points, and the basis."""
     total = max(held + extrapolated + left, 1)
     sentence = (
         f"{percent(held / total)} of the points corrected where control holds them, "
@@ -281,7 +283,7 @@ def _assumed(count, purpose, sections, has_sigma):
     )
 
 
-# Ties between passes, for a reader who never heard of them
+# Ties between passes, for readers new to them
 
 
 def _unused_ties(n, has_control):
@@ -352,7 +354,7 @@ def _relative(first, name, fit, lever_arm, boresight):
 
 
 def _component(row):
-    """A part of a mounting, with what it lacks and its sigma in mm or deg."""
+    """Component of a mounting, with its correction and sigma in mm or deg."""
     value = row["lsc"]
     sigma = row["lsc_sigma"]
     if row["unit"] == "m":
@@ -379,7 +381,7 @@ def _undetermined(components, count):
 
 
 def _calibrated(end: str) -> Callable[..., str]:
-    """Wording of how far targets of a role were and are off."""
+    """Wording of the errors of targets of a role before and after."""
 
     def sentence(role, before, after):
         return f"3D RMSE of {role} points {length_in_words(before)} → {length_in_words(after)}{end}"
@@ -388,7 +390,7 @@ def _calibrated(end: str) -> Callable[..., str]:
 
 
 def _scanner(end: str) -> Callable[..., str]:
-    """Wording of what the scanner's own ranges and encoder lack."""
+    """Wording of errors of the scanner's own ranges and encoder."""
 
     def sentence(range_offset, encoder_scale):
         undetermined = []
@@ -497,7 +499,7 @@ def _untied(name, other, why):
 
 
 def _finely(value):
-    """A difference of two results, to a tenth of a millimeter below a centimeter."""
+    """Format a difference of two results, to a tenth of a millimeter below a centimeter."""
     if value < 0.0095:
         return f"{1000 * value:.1f} mm"
     return length_in_words(value)
@@ -567,7 +569,7 @@ CORRELATED = (
 
 
 def _check_sigmas(relation: str, consequence: str) -> Callable[..., str]:
-    """A sentence on the test of check points, by how their residuals relate to the sigmas."""
+    """Sentence on the test of check points, by the relation of their residuals to the sigmas."""
 
     def sentence(points, statistic, degrees_of_freedom, limits, significance, factor):
         inside = "within"
@@ -701,12 +703,12 @@ SENTENCES: dict[str, Wording] = {
 
 
 def in_words(statements: Iterable[Statement]) -> list[str]:
-    """Sentences of statements.
+    """Return the sentences of statements.
 
     Parameters
     ----------
     statements : iterable of Statement
-        Of keys of SENTENCES.
+        With keys of SENTENCES.
     """
     return [statement.sentence(SENTENCES) for statement in statements]
 

@@ -1,8 +1,8 @@
-"""Mechanisms without a name: errors drawn at random from a grammar, for training and grading.
+"""Unnamed mechanisms: errors drawn at random from a grammar, for training and grading.
 
-Each moves points in some direction, by some function of something that varies along the drive.
-No library knows them. Pairs of direction and covariate are split by a hash: what trains or sets
-anything takes one half, what grades a diagnosis takes the other, and no pair is in both.
+Each moves points in one direction, by a function of a covariate that varies along the drive. None
+is in the library of effects. Pairs of direction and covariate are split by a hash: one half is for
+training and setting of constants, the other for grading a diagnosis, and no pair is in both.
 """
 
 import hashlib
@@ -20,9 +20,9 @@ from mlscorr.simulate.survey import PulseBlock, SimulatedSurvey
 from mlscorr.survey import Mounting, Trajectory
 
 Described = dict[str, tuple[Callable, tuple[str, float], tuple[str, str]]]
-MOMENT = 0.3  # s to each side, over which speed, turns and acceleration are taken
-EPOCH = 0.1  # s between the times at which the motion is worked out
-DIRECTIONS = {  # words of which a right lead has one; unit; largest size
+MOMENT = 0.3  # s to each side, over which speed, turns and acceleration are computed
+EPOCH = 0.1  # s between the times at which the motion is computed
+DIRECTIONS = {  # words of which a correct hint has one; unit; largest size
     "beam": ("range error", "m", 0.5),
     "scan": ("scan angle error|across|roll error|range error", "rad", 0.02),
     "across": ("across|heading error|pitch error|along", "rad", 0.02),
@@ -36,7 +36,7 @@ DIRECTIONS = {  # words of which a right lead has one; unit; largest size
     "forward": ("along|time error|pitch error|easting|northing", "m", 1.0),
     "clock": ("time error|along|easting|northing", "s", 0.2),
 }
-COVARIATES = {  # words of which a right lead has one
+COVARIATES = {  # words of which a correct hint has one
     "range": "range|incidence|intensity",
     "scan angle": "scan angle|turn of the scanner|incidence",
     "side": "scan angle|turn of the scanner|range",
@@ -68,7 +68,7 @@ SHAPES = (
 
 @dataclass(frozen=True)
 class RecordedPoints:
-    """Points as recorded, and what they were georeferenced with.
+    """Points as recorded, with the data used for georeferencing.
 
     Parameters
     ----------
@@ -92,28 +92,28 @@ class RecordedPoints:
 
 @dataclass(frozen=True)
 class DisplacedSurvey(SimulatedSurvey):
-    """A SimulatedSurvey with one scanner whose points are recorded elsewhere.
+    """SimulatedSurvey with one scanner whose recorded points are displaced.
 
-    ``move`` is a function of RecordedPoints that returns by how much, (n, 3) in m on the map.
+    ``move`` is a function of RecordedPoints that returns displacements (n, 3) in m on the map.
     """
 
     move: Any = None
 
     @classmethod
     def of(cls, survey: SimulatedSurvey, move: Callable) -> "DisplacedSurvey":
-        """The same survey, moved.
+        """Return the same survey, displaced.
 
         Parameters
         ----------
         survey : SimulatedSurvey
         move : function
-            Of RecordedPoints: by how much they are moved, (n, 3) in m on the map.
+            Returns displacements of RecordedPoints, (n, 3) in m on the map.
         """
         known = {field.name: getattr(survey, field.name) for field in fields(survey)}
         return cls(**known, move=move)
 
     def blocks(self, **size: int) -> Iterator[PulseBlock]:
-        """Blocks as of the survey, their points moved."""
+        """Yield blocks of the survey with displaced points."""
         for block in super().blocks(**size):
             cloud = block.cloud
             poses = (self.trajectory, self.mounting)
@@ -123,7 +123,7 @@ class DisplacedSurvey(SimulatedSurvey):
 
 @dataclass(frozen=True)
 class Mechanism:
-    """One sentence of the grammar: a direction, what it varies with, and how."""
+    """One sentence of the grammar: a direction, a covariate, and a function of it."""
 
     direction: str
     covariate: str
@@ -131,35 +131,37 @@ class Mechanism:
 
     @property
     def name(self) -> str:
-        """The sentence."""
+        """Sentence of the mechanism."""
         return f"{self.direction} by {self.covariate}, {self.shape}"
 
     @property
     def unit(self) -> tuple[str, float]:
-        """Unit of its size, and the largest size that a user would not see at once."""
+        """Unit of its size, and the largest size that a user would not notice immediately."""
         return DIRECTIONS[self.direction][1:]
 
     @property
     def lead(self) -> tuple[str, str]:
-        """A right lead has one of the words of each, which are parted by |."""
+        """Words of a correct hint, which has one of each; alternatives are separated by |."""
         return DIRECTIONS[self.direction][0], COVARIATES[self.covariate]
 
     @property
     def is_for_training(self) -> bool:
-        """Whether it may set anything: by a hash of direction and covariate, whatever the shape."""
+        """True if it may be used for training, by a hash of direction and covariate, for any
+        shape.
+        """
         pair = f"{self.direction} by {self.covariate}".encode()
         return hashlib.sha256(pair).digest()[0] % 2 == 0
 
     def __call__(self, points: RecordedPoints, size: float, rng: np.random.Generator) -> np.ndarray:
-        """By how much points are recorded elsewhere: (n, 3) in m on the map.
+        """Displacements of points: (n, 3) in m on the map.
 
         Parameters
         ----------
         points : RecordedPoints
         size : float
-            In its unit; the displacement is linear in it.
+            Size in its unit; the displacement is linear in it.
         rng : Generator
-            Draws where thresholds lie and how often waves repeat.
+            For positions of thresholds and wavelengths.
         """
         a, b = rng.random(2)
         value = _shaped(self.shape, _covariate(self.covariate, points), a, b)
@@ -167,17 +169,17 @@ class Mechanism:
 
 
 def mechanisms() -> tuple[Mechanism, ...]:
-    """All sentences of the grammar."""
+    """Return all sentences of the grammar."""
     return tuple(Mechanism(*parts) for parts in product(DIRECTIONS, COVARIATES, SHAPES))
 
 
 def training_mechanisms() -> tuple[Mechanism, ...]:
-    """The half on which constants may be set."""
+    """Return the half for which constants may be set."""
     return tuple(each for each in mechanisms() if each.is_for_training)
 
 
 def described(known: Iterable[Mechanism]) -> Described:
-    """Function, unit with largest size, and lead of each mechanism, by name.
+    """Function, unit with largest size, and hint of each mechanism, by name.
 
     Parameters
     ----------
@@ -187,7 +189,7 @@ def described(known: Iterable[Mechanism]) -> Described:
 
 
 def load_mechanisms(path: Path) -> Described:
-    """The same of a file that has MECHANISMS (functions), UNITS (unit, largest) and LEADS by name.
+    """Load the same from a file with MECHANISMS (functions), UNITS (unit, largest) and LEADS.
 
     Parameters
     ----------
@@ -196,9 +198,9 @@ def load_mechanisms(path: Path) -> Described:
     Raises
     ------
     ValueError
-        When one of them is missing, or the file can't be run.
+        If one of them is missing, or the file cannot be run.
     FileNotFoundError
-        When the file is.
+        If the file is missing.
     """
     path = Path(path)
     if not path.is_file():
@@ -231,7 +233,7 @@ def _shaped(name, u, a, b):
 
 
 def _direction(name, points):
-    """Displacements (n, 3) by a unit: a metre, a radian, a second."""
+    """Displacements (n, 3) for one unit: a meter, a radian, a second."""
     pose = points.trajectory.at(points.gps_time)
     right, forward, up = np.moveaxis(pose.attitude.as_matrix(), 2, 0)
     arm = points.xyz - pose.position
@@ -256,7 +258,7 @@ def _direction(name, points):
 
 
 def _covariate(name, points):
-    """Values (n,), most of them from -1 to 1 whatever part of the survey is seen."""
+    """Values (n,), mostly from -1 to 1 in any part of the survey."""
     trajectory = points.trajectory
     pose = trajectory.at(points.gps_time)
     sight = np.linalg.norm(points.scanner_xyz, axis=1)
@@ -270,7 +272,7 @@ def _covariate(name, points):
             return body[:, 0] / 15.0
         return body[:, 2] / 5.0
     if name == "heading":
-        return pose.attitude.apply([0.0, 1.0, 0.0])[:, 0]  # the same for angles a turn apart
+        return pose.attitude.apply([0.0, 1.0, 0.0])[:, 0]  # the same for angles a full turn apart
     if name == "elapsed":
         return _spread(points.gps_time, trajectory.gps_time)
     if name == "elapsed in the pass":
@@ -286,13 +288,13 @@ def _covariate(name, points):
 
 
 def _spread(values, whole):
-    """Values from -1 to 1 where they lie between the 5th and the 95th percentile of the whole."""
+    """Scale values so that the 5th and 95th percentiles of the whole become -1 and 1."""
     low, high = np.percentile(whole, [5.0, 95.0])
     return np.clip((2 * values - low - high) / max(high - low, 1e-9), -1.5, 1.5)
 
 
 def _motion(points):
-    """How the vehicle moves when points (n,) are seen."""
+    """Motion of the vehicle at the times of points (n,)."""
     table = _motion_table(points.trajectory)
 
     def when_seen(values):

@@ -1,4 +1,4 @@
-"""Scenarios of all sorts, small enough to be made by the hundred in seconds each."""
+"""Random scenarios of many kinds, small enough to make hundreds in seconds each."""
 
 import warnings
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from mlscorr.simulate.survey import SimulatedSurvey, simulate
 
 @dataclass(frozen=True)
 class Mix:
-    """Of what scenarios are mixed, so that each is made in seconds.
+    """Distribution of scenarios, so that each is made in seconds.
 
     Parameters
     ----------
@@ -21,19 +21,19 @@ class Mix:
         Shares of river banks, of spinning scanners on streets, of surveys with two passes and with
         a reference surface.
     canyons, outages : float
-        Shares with few satellites, and with none, for some seconds.
+        Shares with few satellites, and without GNSS, for some seconds.
     pulses : float
-        Of a survey of a street at most: some 1.6 million points.
+        Largest number in a survey of a street: about 1.6 million points.
     duration : tuple
         Shortest and longest pass. Units: s.
     lines : tuple
         Slowest and fastest scanner. Units: 1/s.
     spacing : float
-        Of the way that each target needs, at least. Units: m.
+        Smallest spacing of targets along the path. Units: m.
     heavy_tails, freedom : float
         Share of surveys whose targets err by Student's t, and its degrees of freedom.
     attempts : int
-        At a scenario: along some ways targets find no place.
+        Attempts at a scenario, because some paths have no room for targets.
     """
 
     rivers: float = 0.2
@@ -57,7 +57,7 @@ MIX = Mix()
 def random_survey(
     entropy: Sequence[int], name: str = "survey", effects: Sequence[dict] = ()
 ) -> SimulatedSurvey:
-    """SimulatedSurvey of a random scenario; the same entropy gives the same survey.
+    """Make the SimulatedSurvey of a random scenario; the same entropy gives the same survey.
 
     Effects, each a dict of its name and parameters as in scenario.toml, change nothing else.
 
@@ -70,13 +70,13 @@ def random_survey(
     *streams, tails = np.random.SeedSequence(entropy).spawn(MIX.attempts + 1)
     for number, stream in enumerate(streams):
         choice, world = stream.spawn(2)
-        seed = world.generate_state(4)  # a SeedSequence would go on where the first survey stopped
+        seed = world.generate_state(4)  # a SeedSequence would continue after the first survey
         try:
             scenario = random_scenario(np.random.default_rng(choice), name)
             with warnings.catch_warnings(action="error"):
                 made = simulate(scenario, np.random.default_rng(seed))
             break
-        except (ValueError, UserWarning):  # no place for a target, or a span beyond the way
+        except (ValueError, UserWarning):  # no room for a target, or an interval beyond the path
             if number == MIX.attempts - 1:
                 raise
     more = _heavier(made, np.random.default_rng(tails))
@@ -87,7 +87,7 @@ def random_survey(
 
 
 def random_scenario(rng: Generator, name: str = "survey") -> Scenario:
-    """Scenario of a street or a river bank with one or two passes, no two alike.
+    """Draw a random scenario of a street or a river bank with one or two passes.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def _targets(rng, river, control, check):
 
 
 def _passes(rng, river, two):
-    """One pass, or a second one: back on the other lane, or a boat's along the same bank."""
+    """Draw one pass, or a second one: back on the other lane, or again along the bank by boat."""
     if not two:
         return ({},)
     lateral = rng.uniform(0.9, 1.4)
@@ -164,7 +164,7 @@ def _passes(rng, river, two):
 
 
 def _mounting(rng, boresight):
-    """Lever arm and boresight as a drawing has them: no two vehicles are built alike."""
+    """Draw lever arm and boresight as in a drawing, different for each vehicle."""
     lever_arm = np.array([0.1, -0.6, 0.4]) + rng.uniform(-0.3, 0.3, 3)
     turned = np.array(boresight) + rng.uniform(-3.0, 3.0, 3)
     return {"lever_arm": tuple(lever_arm.round(4)), "boresight": tuple(turned.round(3))}
@@ -175,8 +175,8 @@ def _noises(rng):
 
 
 def _street_scanner(rng, fastest):
-    """A line scanner askew, or now and then a spinning one with a few rings, of so many pulses a
-    second at most.
+    """Draw an oblique line scanner, or sometimes a spinning one with a few rings, up to a given
+    number of pulses per second.
     """
     pulses = int(rng.integers(300, 501))
     common = {"points_per_line": pulses, **_noises(rng)}
@@ -190,7 +190,7 @@ def _street_scanner(rng, fastest):
 
 
 def _river_scanner(rng):
-    """A line scanner that looks to the bank alone, by as many pulses a line."""
+    """Draw a line scanner that covers only the bank, with the same number of pulses per line."""
     around = 360.0 / 150.0
     return {
         "points_per_line": int(rng.integers(400, 501) * around),
@@ -202,7 +202,7 @@ def _river_scanner(rng):
 
 
 def _spans(rng, share, end, shortest, longest):
-    """One span (start, duration) within a drive, or none. Units: s."""
+    """Draw one interval (start, duration) within a drive, or none. Units: s."""
     happens = rng.random() < share
     start = rng.random()
     length = rng.uniform(shortest, longest)
@@ -212,8 +212,8 @@ def _spans(rng, share, end, shortest, longest):
 
 
 def _heavier(survey, rng):
-    """What is to be added to the surveyed targets (n, 3) of a survey without effects, so that
-    their errors have the tails of Student's t and the same variance. Units: m.
+    """Additions (n, 3) to the surveyed targets that give errors a Student's t distribution with
+    the same variance, for a survey without effects. Units: m.
     """
     happens = rng.random() < MIX.heavy_tails
     n = len(survey.targets)

@@ -1,4 +1,4 @@
-"""What POS, scanner and surveyor record of the truth, with the effects that act on it."""
+"""Recording of the truth by POS, scanner and surveyor, with effects."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -19,11 +19,11 @@ ON_PULSES = ("clock", "angle")  # at which all echoes of a pulse are one
 
 
 def disturb(shots: Shots, effects: tuple, reference: Reference, streams: tuple) -> Shots:
-    """Shots after the effects on clock, angle, range and return.
+    """Apply the effects on clock, angle, range and return to Shots.
 
-    Each stage sees what the scanner measured, and changes what it declares. Columns of first echoes
-    are all there, seen or not, and later echoes have streams of their own, so that what one effect
-    draws doesn't depend on another.
+    Each stage receives the measurements of the scanner, and changes the declared fields. Columns
+    contain all first echoes, received or not, and later echoes have separate streams, so that the
+    draws of one effect do not depend on another.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def disturb(shots: Shots, effects: tuple, reference: Reference, streams: tuple) 
 def recorded_passes(
     scenario: Scenario, scene: Scene, true_passes: tuple[Trajectory, ...], rng: Generator
 ) -> list[Trajectory]:
-    """What the POS records of each pass.
+    """Make the trajectories that the POS records in each pass.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def recorded_passes(
 
 
 def streams_by_file(passes: int, scanners: int, scan_rng: Generator, effect_rng: Generator) -> dict:
-    """Random streams by file name: a scanner's noise, effects on first and on later echoes.
+    """Random streams by file name: scanner noise, effects on first and on later echoes.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def streams_by_file(passes: int, scanners: int, scan_rng: Generator, effect_rng:
     scanners : int
         Number of scanners.
     scan_rng : Generator
-        For their noise.
+        For the scanners' noise.
     effect_rng : Generator
         For the effects.
     """
@@ -104,7 +104,7 @@ def streams_by_file(passes: int, scanners: int, scan_rng: Generator, effect_rng:
 
 
 def true_mounting(scanner: ScannerScenario) -> Mounting:
-    """Mounting of a ScannerScenario.
+    """Return the mounting of a ScannerScenario.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def true_mounting(scanner: ScannerScenario) -> Mounting:
 
 
 def split_passes(trajectory: Trajectory, lengths: Iterable[int]) -> tuple[Trajectory, ...]:
-    """The passes of a joined Trajectory, by their numbers of epochs.
+    """Split a joined Trajectory into passes, by their numbers of epochs.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def split_passes(trajectory: Trajectory, lengths: Iterable[int]) -> tuple[Trajec
 def surveyed_targets(
     targets: Targets, centre: np.ndarray, scenario: TargetScenario, rng: Generator
 ) -> ControlPoints:
-    """ControlPoints of all targets, with the noise of the survey.
+    """Make ControlPoints of all targets, with the noise of the survey.
 
     Parameters
     ----------
@@ -156,12 +156,12 @@ def surveyed_targets(
 
 
 def spread_checks(count: int, scenario: TargetScenario) -> np.ndarray:
-    """Which of the targets are check points: evenly among them, not at the ends, (count,) bool.
+    """Flag (count,) of check points: evenly among the targets, not at the ends.
 
     Parameters
     ----------
     count : int
-        Of the targets that found a place; as large a share of them is check points as of all.
+        Number of placed targets; the share of check points among them is the same as among all.
     scenario : TargetScenario
     """
     check = round(count * scenario.check / (scenario.control + scenario.check))

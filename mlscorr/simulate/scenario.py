@@ -1,6 +1,6 @@
-"""What a simulated survey should be, as one frozen value, and scenario.toml, which states it.
+"""Scenario of a simulated survey as one frozen value, and scenario.toml, which states it.
 
-Lengths in m, times in s, angles in deg. Every default says where it comes from.
+Lengths in m, times in s, angles in deg. Every default has its source.
 """
 
 from pathlib import Path
@@ -27,17 +27,17 @@ class _Part(BaseModel):
 
 
 class SceneScenario(_Part):
-    """What stands along the way."""
+    """Objects along the way."""
 
     kind: Literal["street", "river", "mesh"] = "street"
     file: Path | None = None  # PLY or OBJ in map coordinates, for kind = "mesh"
     reflectance: Share = 0.3  # of a mesh: asphalt 0.2 to plaster 0.5 at 905-1550 nm
-    house_height: tuple[Positive, Positive] = (6.0, 11.0)  # two to three storeys
-    gaps: Share = 0.4  # of the houses, a gap after which a cross wall shows
+    house_height: tuple[Positive, Positive] = (6.0, 11.0)  # two to three stories
+    gaps: Share = 0.4  # of the houses, followed by a gap in which a cross wall is visible
     trees: NotNegative = 4.0  # per 100 m of street
     cars: NotNegative = 5.0  # parked, per 100 m of street
     poles: NotNegative = 5.5  # per 100 m of street: lamps every 18 m
-    markings: bool = False  # a dashed middle line, and a line along each kerb of a street
+    markings: bool = False  # a dashed middle line, and a line along each curb of a street
     reference: bool = False  # write reference.ply: ground and walls as a static scan gives them
 
     @model_validator(mode="after")
@@ -60,21 +60,21 @@ class TargetScenario(_Part):
 
 
 class PassScenario(_Part):
-    """One pass along the way: forward or back, beside the centre line, after a pause."""
+    """One pass along the way: forward or back, off the center line, after a pause."""
 
     direction: Literal["forward", "back"] = "forward"
-    lateral: float = 0.0  # to the right of the centre line as seen forward
+    lateral: float = 0.0  # to the right of the center line as seen forward
     pause: Positive = 30.0  # before this pass; the trajectory has a gap there
-    speed: Positive | None = None  # the drive's, when not given
+    speed: Positive | None = None  # by default the drive's
 
 
 class DriveScenario(_Part):
-    """How the vehicle moves; or a trajectory file instead."""
+    """Motion of the vehicle, or a trajectory file instead."""
 
     duration: Positive = 60.0  # of the first pass, which sets the length of the way
     speed: Positive = 8.0  # m/s, usual of mobile mapping in towns
     stops: Spans = ()  # standing still in the first pass
-    turns: Annotated[float, Field(ge=0, le=90)] = 15.0  # deg, how far the way swings to each side
+    turns: Annotated[float, Field(ge=0, le=90)] = 15.0  # deg, swing of the way to each side
     u_turn: bool = False  # drive the way back in the same pass
     passes: Annotated[tuple[PassScenario, ...], Field(min_length=1)] = (PassScenario(),)
     pose_rate: Positive = 100.0  # Hz, usual of exported trajectories
@@ -82,11 +82,11 @@ class DriveScenario(_Part):
 
 
 class ScannerScenario(_Part):
-    """A line scanner, or a spinning one with rings of beams; mounting of its own."""
+    """Line scanner, or spinning scanner with rings of beams; with its own mounting."""
 
     kind: Literal["line", "spinning"] = "line"
     lever_arm: Vector = (0.10, -0.60, 0.40)  # right, forward, up
-    boresight: Vector = (90.0, 0.0, 35.0)  # R_L^P = Rz(c) Ry(b) Rx(a): plane askew, as is usual
+    boresight: Vector = (90.0, 0.0, 35.0)  # R_L^P = Rz(c) Ry(b) Rx(a): oblique plane, as usual
     lines_per_second: Positive = 150.0  # or turns a second of a spinning one (10 to 20)
     points_per_line: Annotated[int, Field(ge=8)] = 1000  # pulses a line and ring
     field_of_view: tuple[float, float] = (-180.0, 180.0)  # scan angles that are measured
@@ -95,16 +95,16 @@ class ScannerScenario(_Part):
     angle_noise: NotNegative = 0.002  # one sigma, the paper's class of scanner
     beam_divergence: NotNegative = 0.0  # mrad, full angle; 0.35 for RIEGL VQ-250
     max_range: Positive = 100.0
-    loss: Share = 0.0  # of returns of a hundredth of full strength, as of asphalt 12 m away
+    loss: Share = 0.0  # of returns with 1 % of full strength, as of asphalt 12 m away
 
 
 class PosScenario(_Part):
-    """GNSS and inertial sensors with their errors; or a series of errors from a file."""
+    """GNSS and inertial sensors with their errors, or a series of errors from a file."""
 
     grade: Literal["tactical", "mems"] = "tactical"  # see pos_error for the figures of each
     gnss_rate: Positive = 1.0  # Hz, the paper's
-    odometer: bool = False  # a wheel odometer that the filter uses too
-    processing: Literal["smoothed", "filtered"] = "smoothed"  # afterwards, or in real time
+    odometer: bool = False  # a wheel odometer, also used by the filter
+    processing: Literal["smoothed", "filtered"] = "smoothed"  # post-processed, or in real time
     outages: Spans = ()  # no GNSS at all
     canyons: Spans = ()  # few satellites, multipath
     sky_view: bool = False  # outages and multipath from the height of the scene's walls
@@ -112,24 +112,24 @@ class PosScenario(_Part):
 
 
 class EffectScenario(_Part):
-    """One effect by its name and its parameters, as mlscorr.effects names them."""
+    """One effect by its name and parameters, as in mlscorr.effects."""
 
     model_config = ConfigDict(extra="allow", frozen=True)
     name: str
 
     @property
     def effect(self) -> Effect:
-        """The effect as a value: an Effect of mlscorr.effects."""
+        """Return the effect as a value: an Effect of mlscorr.effects."""
         return make_effect(self.name, **(self.model_extra or {}))
 
     @model_validator(mode="after")
     def _is_known(self):
-        make_effect(self.name, **(self.model_extra or {}))  # refuses what no survey can have
+        make_effect(self.name, **(self.model_extra or {}))  # refuses impossible values
         return self
 
 
 class Scenario(_Part):
-    """A whole simulated survey; times count from the start of the drive."""
+    """Complete simulated survey; times count from the start of the drive."""
 
     name: str = "street"
     crs: str = "EPSG:32650"
@@ -144,12 +144,12 @@ class Scenario(_Part):
 
     @property
     def imperfections(self) -> tuple[Effect, ...]:
-        """The effects as values (tuple of Effect), in the order in which they act."""
+        """Effects as values (tuple of Effect), in the order in which they act."""
         return in_order(effect.effect for effect in self.effects)
 
     @property
     def end(self) -> float | None:
-        """When the last pass ends, from the start of the drive, at most; None for a given file."""
+        """Latest end of the last pass, from the start of the drive; None for a file."""
         if self.drive.file is not None:
             return None
         ways = [self.drive.speed / (p.speed or self.drive.speed) for p in self.drive.passes]
@@ -177,17 +177,17 @@ DEMO = Scenario(  # slow and coarse, so that a million points are enough
     name="demo",
     drive=DriveScenario(speed=4.2),
     scanner=(ScannerScenario(lines_per_second=75.0, points_per_line=400),),
-    # in real time, not smoothed afterwards, so that the drift is easy to see
+    # in real time, not post-processed, so that the drift is easy to see
     pos=PosScenario(processing="filtered", outages=((25.0, 25.0),), canyons=((4.0, 12.0),)),
 )
 FILES = (("scene", "file"), ("drive", "file"), ("pos", "error_file"))  # that a scenario may name
 
 
 def read_scenario(path: Path | str) -> Scenario:
-    """Scenario of a TOML file; the files it names stand relative to it.
+    """Read the scenario of a TOML file; file names are relative to it.
 
-    Raises ValueError for bad TOML, unknown keys (with the nearest known one) and values that no
-    survey can have; FileNotFoundError for files that aren't there.
+    Raises ValueError for bad TOML, unknown keys (with the most similar one) and impossible values;
+    FileNotFoundError for missing files.
 
     Parameters
     ----------
@@ -210,7 +210,7 @@ def read_scenario(path: Path | str) -> Scenario:
 
 
 def scenario_files(scenario: Scenario) -> list[Path]:
-    """Paths of the files that a scenario names, which a simulation must not overwrite.
+    """Paths of the files named in a scenario, which a simulation must not overwrite.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""simulator.toml: what a simulator believes of a survey, and the effects that it has."""
+"""simulator.toml: assumed properties of a survey in a simulator, and its effects."""
 
 import warnings
 from dataclasses import dataclass, replace
@@ -21,16 +21,16 @@ DECIMALS = 12  # of numbers in deg that a person may have written
 
 @dataclass(frozen=True)
 class Simulator:
-    """What is believed of a survey, so that it can be simulated.
+    """Assumed properties of a survey, with which it can be simulated.
 
     Parameters
     ----------
     mounting : Mounting or None
-        As recorded; None where nobody knows it.
+        Recorded mounting; None if unknown.
     scanner : Scanner
     pos : Pos
     effects : tuple of Effect
-        That turn what is true into what is recorded, in the order in which they act.
+        Effects from truth to record, in the order in which they act.
     """
 
     mounting: Mounting | None
@@ -40,7 +40,7 @@ class Simulator:
 
 
 class WindowSection(TomlSection):
-    """A time in which the POS is worse, see Pos."""
+    """Interval in which the POS is worse; see Pos."""
 
     start: Annotated[float, Field(allow_inf_nan=False)]  # gps_time, s
     length: Positive  # s
@@ -49,18 +49,18 @@ class WindowSection(TomlSection):
 
 
 class BelievedPosSection(PosSection):
-    """The POS that the survey states, and windows in which it errs more."""
+    """POS as stated by the survey, with intervals of larger errors."""
 
     windows: list[WindowSection] = Field(default_factory=list)
 
     def pos(self) -> Pos:
-        """The Pos with its windows."""
+        """Return the Pos with its intervals."""
         windows = tuple((w.start, w.length, w.factor, w.shape) for w in self.windows)
         return replace(super().pos(), windows=windows)
 
 
 class SimulatorFile(TomlSection):
-    """What stands in simulator.toml, in its own units (deg)."""
+    """Contents of simulator.toml, in its own units (deg)."""
 
     mounting: MountingSection | None = None
     scanner: ScannerSection = ScannerSection()
@@ -69,7 +69,7 @@ class SimulatorFile(TomlSection):
 
     @property
     def imperfections(self) -> tuple[Effect, ...]:
-        """The effects, in the order in which they act."""
+        """Effects, in the order in which they act."""
         return in_order(effect.effect for effect in self.effects)
 
     @model_validator(mode="after")
@@ -79,9 +79,9 @@ class SimulatorFile(TomlSection):
 
 
 def beliefs_of(survey: Survey) -> Simulator:
-    """The Simulator that survey.toml describes: no effects.
+    """Make the Simulator that survey.toml describes, without effects.
 
-    How well a calibration knows the mounting is no part of it.
+    The calibrated accuracy of the mounting is not included.
 
     Parameters
     ----------
@@ -92,13 +92,13 @@ def beliefs_of(survey: Survey) -> Simulator:
 
 
 def read_simulator(path: Path | str) -> Simulator:
-    r"""Simulator of a simulator.toml.
+    r"""Read the Simulator of a simulator.toml.
 
     Sections [mounting], [scanner] and [pos] have the keys and units of survey.toml, [[effects]]
-    those of scenario.toml; what is left out has the defaults of survey.toml.
+    those of scenario.toml; missing keys have the defaults of survey.toml.
 
-    Raises ValueError for bad TOML, unknown keys and effects (with the nearest known one) and
-    values that no survey can have; FileNotFoundError where there is no such file.
+    Raises ValueError for bad TOML, unknown keys and effects (with the most similar one) and
+    impossible values; FileNotFoundError if there is no such file.
 
     Parameters
     ----------
@@ -119,10 +119,10 @@ def read_simulator(path: Path | str) -> Simulator:
 
 
 def write_simulator(simulator: Simulator, path: Path | str) -> None:
-    """Write simulator.toml; a file there is replaced.
+    """Write simulator.toml, replacing an existing file.
 
-    What nobody stated is left out, so that whoever reads it knows that it is assumed. Numbers of
-    up to 12 decimals in deg are read as the same to the last bit, others to 1e-15 rad.
+    Unstated values are omitted, so that a reader knows that they are assumed. Numbers of up to 12
+    decimals in deg are read as the same to the last bit, others to 1e-15 rad.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def write_simulator(simulator: Simulator, path: Path | str) -> None:
 
 
 def _degrees(radians):
-    """The number in deg that is these radians when it is read: rounded where that is the same."""
+    """Value in deg that is read as exactly these radians: rounded if that gives the same."""
     degrees = np.degrees(radians)
     rounded = np.round(degrees, DECIMALS)
     if np.radians(rounded) == radians:

@@ -1,4 +1,4 @@
-"""A whole survey, simulated: what was recorded, and the truth behind it."""
+"""Complete simulated survey: the recorded data, and the truth."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -26,13 +26,13 @@ from mlscorr.simulate.scenario import Scenario
 from mlscorr.simulate.scene import Mesh, Scene, build_scene, static_scan
 from mlscorr.survey import ControlPoints, Mounting, PointCloud, Pos, Summary, Trajectory, check_rng
 
-STREAMS = 7  # drive, scene, scan, POS, control, effects, reference: each leaves all others
+STREAMS = 7  # drive, scene, scan, POS, control, effects, reference: all independent
 
 
 @dataclass(frozen=True)
 class PulseBlock:
-    """Some pulses of one pass and scanner: as measured, and as georeferenced with what was
-    recorded. Of ``fired`` pulses, ``pulses`` are the returns and ``cloud`` their points.
+    """Some pulses of one pass and scanner: measured, and georeferenced with the recorded data.
+    Of ``fired`` pulses, ``pulses`` are the returns and ``cloud`` their points.
     """
 
     file: str
@@ -43,20 +43,20 @@ class PulseBlock:
 
 @dataclass(frozen=True, repr=False)
 class SimulatedSurvey(Summary):
-    """One simulated survey. Its pulses are made anew, block by block, each time they are asked for.
+    """One simulated survey, whose pulses are made again, block by block, on each request.
 
     Parameters
     ----------
     scenario : Scenario
     scene : Scene
     true_passes, passes : tuple of Trajectory
-        Where the vehicle was, and what the POS recorded; one for each pass, in time order.
+        True and recorded trajectories, one for each pass, in order of time.
     true_mountings, mountings : tuple of Mounting
-        Of each scanner, as it is and as it is recorded.
+        True and recorded mounting of each scanner.
     targets : ControlPoints
         All targets as surveyed, in the order of the scene's targets.
     is_check : (n,) bool array
-        Which of them are check points.
+        True for check points.
     true_centre : (n, 3) array
         Map coordinates of the targets. Units: m.
     effects : tuple of Effect
@@ -67,9 +67,9 @@ class SimulatedSurvey(Summary):
     beam_streams : dict
         Random streams of the effects on the beam.
     seed : int or None
-        Of the random numbers, where it is known.
+        Seed of the random numbers, if known.
     static_scan : Mesh, optional
-        Ground and walls about the origin as a static scan gives them, where a reference is wanted.
+        Ground and walls relative to the origin as from a static scan, if a reference is requested.
     """
 
     scenario: Scenario
@@ -90,17 +90,17 @@ class SimulatedSurvey(Summary):
 
     @cached_property
     def true_trajectory(self) -> Trajectory:
-        """The true trajectory of all passes; between them are gaps."""
+        """True trajectory of all passes, with gaps between them."""
         return Trajectory.concatenate(self.true_passes)
 
     @cached_property
     def trajectory(self) -> Trajectory:
-        """The recorded trajectory of all passes; between them are gaps."""
+        """Recorded trajectory of all passes, with gaps between them."""
         return Trajectory.concatenate(self.passes)
 
     @property
     def mounting(self) -> Mounting:
-        """The first scanner's recorded Mounting."""
+        """Recorded Mounting of the first scanner."""
         return self.mountings[0]
 
     @property
@@ -110,7 +110,7 @@ class SimulatedSurvey(Summary):
 
     @property
     def fired(self) -> int:
-        """Number of pulses that all scanners fire on all passes."""
+        """Number of pulses fired by all scanners in all passes."""
         return sum(
             pulses_of_a_pass(trajectory, scanner)
             for trajectory in self.true_passes
@@ -119,17 +119,17 @@ class SimulatedSurvey(Summary):
 
     @cached_property
     def surfaces(self) -> Surfaces:
-        """The scene as rays meet it."""
+        """Scene as a target of rays."""
         return Surfaces(self.scene.mesh)
 
     def blocks(self, **size: int) -> Iterator[PulseBlock]:
-        """Blocks of all files in turn, each file in time order; any number of times the same."""
+        """Yield blocks of all files in sequence, each in order of time; repeatable."""
         scanners = len(self.scenario.scanner)
         for number, file in enumerate(self.files):
             yield from self._blocks_of(file, *divmod(number, scanners), **size)
 
     def _blocks_of(self, file, number, k, **size):
-        """Blocks of a pass and scanner, both counted from 0."""
+        """Yield blocks of a pass and scanner, both counted from 0."""
         scanner = self.scenario.scanner[k]
         origin = np.array(self.scenario.origin)
         noise, *streams = self.streams[file]
@@ -150,7 +150,7 @@ class SimulatedSurvey(Summary):
             **size,
         ):
             shots = recording.disturb(undisturbed, self.effects, self.reference, streams)
-            # what a wrong clock puts outside the trajectory, no one can georeference
+            # points outside the trajectory because of a wrong clock cannot be georeferenced
             shots.kept[recorded.outside(shots.gps_time)] = False
             pulses = shots.pulses()
             xyz = recorded.place(
@@ -161,25 +161,23 @@ class SimulatedSurvey(Summary):
 
     @cached_property
     def pulses(self) -> MeasuredPulses:
-        """MeasuredPulses of all files; for small surveys."""
+        """MeasuredPulses of all files, for small surveys."""
         return MeasuredPulses.concatenate([block.pulses for block in self.blocks()])
 
     @cached_property
     def cloud(self) -> PointCloud:
-        """PointCloud of all files, georeferenced with what was recorded; for small surveys."""
+        """PointCloud of all files, georeferenced with the recorded data, for small surveys."""
         return PointCloud.concatenate([block.cloud for block in self.blocks()])
 
     @property
     def target(self) -> np.ndarray:
-        """Which target each point of the cloud truly lies on, board included; -1 for none."""
+        """True target of each point of the cloud, board included; -1 for none."""
         return self.scene.target[self.pulses.triangle]
 
     def write(
         self, folder: Path | str, progress: Callable | None = None, overwrite: bool = True
     ) -> None:
-        """Write the survey folder, whole or not at all: survey.toml, clouds, trajectory, control,
-        and the truth. ``progress(title, total)`` returns a function of what was just done: pulses
-        first, then bytes of their truth.
+        """Write the survey folder atomically: survey.toml, clouds, trajectory, control, truth.
 
         Raises ValueError when a scanner met nothing on a pass; OSError when writing fails.
 
@@ -187,20 +185,20 @@ class SimulatedSurvey(Summary):
         ----------
         folder : path
         progress : function, optional
-            Of a title and a total; returns one of what was just done.
+            Function of a title and a total; returns a function of the amount just done.
         overwrite : bool
-            Whether files of the same name are replaced.
+            True to replace files of the same name.
 
         Raises
         ------
         ValueError
-            A scanner that met nothing on a pass.
+            If a scanner has no return in a pass.
         """
         write_survey(self, folder, progress, overwrite)
 
 
 def simulate(scenario: Scenario, rng: Generator) -> SimulatedSurvey:
-    """SimulatedSurvey of a scenario; every stage has its own random stream.
+    """Simulate the survey of a scenario; every stage has its own random stream.
 
     Parameters
     ----------
@@ -210,7 +208,7 @@ def simulate(scenario: Scenario, rng: Generator) -> SimulatedSurvey:
     Raises
     ------
     ValueError
-        A scenario that no survey can have, and what is no generator.
+        If the scenario is impossible, or rng is not a generator.
 
     Examples
     --------
@@ -234,14 +232,14 @@ def simulate(scenario: Scenario, rng: Generator) -> SimulatedSurvey:
     streams = effect_streams(effect_rng)
     seed = getattr(rng.bit_generator.seed_seq, "entropy", None)
 
-    # The way, what stands along it, and the drive.
+    # Way, objects along it, and drive.
     line, length, true_passes = drive(scenario, drive_rng)
     scene = build_scene(scenario, line, length, scene_rng)
     centre = np.array(scenario.origin) + scene.targets.centre
     span = true_passes[0].gps_time[0], true_passes[-1].gps_time[-1]
     reference = Reference(*span, centre.mean(axis=0))
 
-    # What POS, mechanic and surveyor record.
+    # Records of POS, mechanic and surveyor.
     def with_effects(stage, value):
         return apply_effects(effects, stage, value, reference, streams)
 
@@ -281,16 +279,16 @@ NOTHING_MET = "No pulse of {} met anything: look at drive, scene, max_range and 
 def write_survey(
     survey: SimulatedSurvey, folder: Path | str, progress: Callable | None, overwrite: bool
 ) -> None:
-    """Write a SimulatedSurvey, whole or not at all; see SimulatedSurvey.write.
+    """Write a SimulatedSurvey atomically; see SimulatedSurvey.write.
 
     Parameters
     ----------
     survey : SimulatedSurvey
     folder : path
     progress : function or None
-        As of SimulatedSurvey.write.
+        See SimulatedSurvey.write.
     overwrite : bool
-        Whether files of the same name are replaced.
+        True to replace files of the same name.
     """
     progress = progress or (lambda *_: lambda _done: None)
     done = progress("Simulating pulses", survey.fired)
@@ -302,7 +300,7 @@ def write_survey(
             for name, array in _truth_arrays(survey).items():
                 truth.put(name, array)
             truth.watch = progress("Writing their truth", truth.growing)
-        for file in set(survey.files) - set(points):  # no beam of it lies in its field of view
+        for file in set(survey.files) - set(points):  # its field of view has no beam
             raise ValueError(NOTHING_MET.format(file))
         write_trajectory_csv(part / "trajectory.csv", survey.trajectory)
         (part / "control.csv").write_text(_control_csv(survey))
@@ -314,7 +312,7 @@ def write_survey(
 
 @contextmanager
 def _disk_errors(folder):
-    """Say of what could not be written which folder it was for."""
+    """Name the folder in errors of writing."""
     try:
         yield
     except OSError as error:
@@ -325,7 +323,7 @@ def _disk_errors(folder):
 
 
 def _write_cloud(path, survey, blocks, truth, done):
-    """One cloud file and the truth of its points; returns their number."""
+    """Write one cloud file and the truth of its points; return their number."""
     origin = np.array(survey.scenario.origin)
     scenario = survey.scenario
     with cloud_writer(path, origin, scenario.crs, created=CREATED) as writer:
@@ -359,7 +357,7 @@ def _truth_arrays(survey):
 
 
 def _truth(survey, points):
-    """Content of truth.json: the effects, the mountings as they are and as recorded, the rest."""
+    """Contents of truth.json: effects, true and recorded mountings, and the rest."""
     effects = [(effect.name, asdict(effect)) for effect in survey.effects]
     single = effects[0][1] if len(effects) == 1 else dict(effects)
     return {
@@ -377,7 +375,7 @@ def _truth(survey, points):
 
 
 def _mounting(mounting):
-    """Lever arm (m) and boresight (deg) as survey.toml has them."""
+    """Lever arm (m) and boresight (deg) as in survey.toml."""
     return {
         "lever_arm": np.asarray(mounting.lever_arm).round(9).tolist(),
         "boresight": mounting.boresight.as_euler("xyz", degrees=True).round(9).tolist(),
@@ -385,7 +383,7 @@ def _mounting(mounting):
 
 
 def _control_csv(survey):
-    """control.csv, with the normals left out, as a surveyor rarely has them."""
+    """Make control.csv without normals, as a surveyor rarely has them."""
     rows = ["name,easting,northing,height,sigma_horizontal,sigma_vertical,kind,size,role"]
     t = survey.targets
     for i, name in enumerate(t.name):
@@ -397,7 +395,9 @@ def _control_csv(survey):
 
 
 def _survey_toml(survey):
-    """survey.toml, with the recorded mountings and what is believed of scanners and POS."""
+    """Make survey.toml, with the recorded mountings and the assumed accuracies of scanners and
+    POS.
+    """
     scenario = survey.scenario
     trajectory = survey.trajectory
     attitude = np.degrees(np.median(trajectory.attitude_sigma, axis=0))
@@ -420,7 +420,7 @@ def _survey_toml(survey):
 
 
 def _scanner_sections(survey):
-    """The scanner and its mounting, or each of several with its files and mounting."""
+    """Sections of the scanner and its mounting, or of several with their files and mountings."""
     scanners = survey.scenario.scanner
     mountings = [_mounting(m) for m in survey.mountings]
     beliefs = []
@@ -442,5 +442,5 @@ def _scanner_sections(survey):
 
 
 def _short(number):
-    """A number to three digits."""
+    """Format a number to three digits."""
     return float(f"{number:.3g}")

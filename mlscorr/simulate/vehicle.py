@@ -1,11 +1,11 @@
-"""What carries the scanner: how high, how wide it turns, how it is shaken."""
+"""Vehicle of the scanner: height, turning radius, vibrations."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Vehicle:
-    """How a vehicle moves.
+    """Motion of a vehicle.
 
     Parameters
     ----------
@@ -14,7 +14,7 @@ class Vehicle:
     turning_radius : float
         Of a U-turn. Units: m.
     tightest_bend : float
-        Radius that bends of its way don't go below. Units: m.
+        Smallest radius of bends. Units: m.
     vibration : (3,) tuple
         RMS of roll, pitch, heading. Units: deg.
     heave : float
@@ -22,11 +22,12 @@ class Vehicle:
     frequencies : tuple
         Of both. Units: Hz.
     calm_speed : float
-        At which it shakes half as much as at speed; 0 where it always shakes. Units: m/s.
+        Speed at which it vibrates half as much as at full speed; 0 for constant vibration. Units:
+        m/s.
     weave : float
-        To each side: nobody drives a straight line. Units: m.
+        Lateral deviation to each side, because nobody drives a straight line. Units: m.
     weave_length, weave_time : float
-        Of a radian of it at least, which keeps it to 0.2 m/s^2. Units: m, s.
+        Smallest length and time of a radian of it, which limits it to 0.2 m/s^2. Units: m, s.
     """
 
     pos_height: float
@@ -50,7 +51,7 @@ CAR = Vehicle(  # a van with the POS on its roof, on its springs: road to body r
     frequencies=(0.13, 0.37, 0.9, 1.6),
     calm_speed=1.5,
 )
-BOAT = Vehicle(  # in small waves of a few metres
+BOAT = Vehicle(  # in small waves of a few meters
     pos_height=2.5,
     turning_radius=8.0,
     tightest_bend=150.0,

@@ -1,8 +1,8 @@
-"""Surfaces of a cloud while it streams: cells of space and time, and their planes, poles and paint.
+"""Surfaces of a streamed cloud: cells of space and time, and their planes, poles and paint.
 
-FeatureCollector finds all three for ties from the moments of cells (CellTable) alone, whatever the
-order of the points. search_planes refines planes by the points of whole moments (MomentStream), for
-the diagnosis, which needs these points again.
+FeatureCollector finds all three for ties from the moments of cells (CellTable) only, for points in
+any order. search_planes refines planes by the points of complete moments (MomentStream) for the
+diagnosis, which needs these points again.
 """
 
 from mlscorr.surfaces._thinning import direction_class, first_of_groups, kind_number

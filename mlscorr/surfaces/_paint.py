@@ -1,4 +1,4 @@
-"""Painted lines and dashes by where scan lines cross them, brighter than the road beside."""
+"""Painted lines and dashes, from the crossings of scan lines brighter than the adjacent road."""
 
 from dataclasses import dataclass
 
@@ -14,18 +14,18 @@ from mlscorr.survey import Columns, PointCloud, TieFeatures
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Crossings(Columns):
-    """Where scan lines crossed paint, n times.
+    """Crossings of scan lines with paint, n of them.
 
     Parameters
     ----------
     gps_time : (n,) array
         Units: s.
     place : (n, 3) array
-        The middle between both edges. Units: m.
+        Middle between both edges. Units: m.
     variance : (n,) array
-        Of that along the scan line. Units: m^2.
+        Variance of it along the scan line. Units: m^2.
     group : (n,) int array
-        Of the file and the segment of the trajectory, as in the keys of cells.
+        Group of the file and the trajectory's segment, as in the keys of cells.
     """
 
     gps_time: np.ndarray
@@ -35,7 +35,7 @@ class Crossings(Columns):
 
 
 def find_crossings(cloud: PointCloud, passes: np.ndarray, group: int) -> Crossings:
-    """The Crossings of a chunk whose scan lines are in order; none where beams take turns.
+    """Find the crossings in a chunk with ordered scan lines; none if beams alternate.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def find_crossings(cloud: PointCloud, passes: np.ndarray, group: int) -> Crossin
     crossings = Crossings(
         gps_time=time,
         place=(cloud.xyz[before] + cloud.xyz[first] + cloud.xyz[last] + cloud.xyz[after]) / 4,
-        # each edge is anywhere between two points, as likely as elsewhere
+        # each edge is uniformly distributed between two points
         variance=(gaps[0] ** 2 + gaps[1] ** 2) / 48,
         group=group + segment,
     )
@@ -70,13 +70,14 @@ def bright_runs(xyz: np.ndarray, intensity: np.ndarray, limits: np.ndarray) -> n
     xyz, intensity : (n, 3), (n,) arrays
         In the order of scan lines.
     limits : (3,) array
-        Widest run (m), which is how far back the ground counts too; least contrast, in sigmas of
-        the ground's intensity; steepest ground.
+        Widest run (m), also the length of ground that counts; smallest contrast, in sigmas of the
+        ground's intensity; steepest ground.
 
     Returns
     -------
     (k, 4) int array
-        Numbers of the last point before each run, of its first and last, and of that after it.
+        Indices of the last point before each run, of its first and last point, and of the point
+        after it.
     """
     widest, contrast, steepest = limits
     runs = np.empty((len(xyz) // 3 + 1, 4), np.int64)
@@ -90,7 +91,7 @@ def bright_runs(xyz: np.ndarray, intensity: np.ndarray, limits: np.ndarray) -> n
         z = xyz[i, 2] - xyz[i - 1, 2]
         step = np.sqrt(x * x + y * y + z * z)
         value = float(intensity[i])
-        if step > widest / 5:  # fewer points don't show the ground's intensity
+        if step > widest / 5:  # too few points to show the ground's intensity
             first = -1
             end = -1
             known = 0.0
@@ -150,9 +151,9 @@ class Stripes(Columns):
     along : (n, 3) array
         Unit vector, level.
     ends : (n, 2) array
-        How far it reaches along that from the centre. Units: m.
+        Extent along that direction from the center. Units: m.
     begin, end : (n,) array
-        When it was first and last seen. Units: s.
+        Times of the first and last observation. Units: s.
     length, width : (n,) array
         Variances of the crossings along and across. Units: m^2.
     pace : (n,) array
@@ -188,7 +189,7 @@ def find_markings(crossings: Crossings, start: float) -> TieFeatures:
     Returns
     -------
     TieFeatures
-        The group stands for pass_number and scanner.
+        The group is that of pass_number and scanner.
     """
     since = crossings.gps_time - start
     whole = _connected(crossings, window_of(since))
@@ -244,7 +245,7 @@ def window_of(since: np.ndarray) -> np.ndarray:
 
 
 def _with_both_ends(dashes, start):
-    """Those seen at once, and wholly in one window: two lost crossings are no end."""
+    """Tracks observed at once, and entirely in one window: two lost crossings are no end."""
     took = dashes.end - dashes.begin
     margin = 3 * took / (dashes.count - 1)
     begin, end = (window_of(t - start) for t in (dashes.begin - margin, dashes.end + margin))

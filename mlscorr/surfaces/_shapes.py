@@ -1,4 +1,4 @@
-"""Planes and poles among cells, from the moments of their points alone."""
+"""Planes and poles among cells, from the moments of their points only."""
 
 from dataclasses import dataclass, replace
 
@@ -14,10 +14,10 @@ from mlscorr.surfaces.cells import (
 from mlscorr.surfaces.settings import SETTINGS
 from mlscorr.survey import Columns, Survey, TieFeatures
 
-# Visible is the half of a pole that faces the scanner, its points evenly spread across the beam:
-# their mean lies pi / 4 of the radius before the axis, their variance across is radius^2 / 3, and
-# that along the beam (2/3 - pi^2 / 16) radius^2. Of a square one that shows two sides they lie
-# 1 / (1 + sin 2 a) of half its width before it, turned by a: 2 / pi on average.
+# The scanner measures the facing half of a pole, with points evenly spread across the beam. Their
+# mean is pi / 4 of the radius in front of the axis, their variance is radius^2 / 3 across and (2/3
+# - pi^2 / 16) radius^2 along the beam. For a square pole turned by a, with two visible sides, it is
+# 1 / (1 + sin 2 a) of half its width in front: 2 / pi on average.
 DEPTH = np.pi / 4
 SQUARE_DEPTH = 2 / np.pi
 ACROSS = 1 / 3
@@ -26,16 +26,16 @@ ALONG = 2 / 3 - np.pi**2 / 16
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Shapes(Columns):
-    """Planes or poles of cells: as in TieFeatures, and where their centres are.
+    """Planes or poles of cells: fields of TieFeatures, and shifts to their centers.
 
     Parameters
     ----------
     rows : (n,) int array
-        Of the cells.
+        Rows of the cells.
     direction : (n, 3) array
     variance, tilt, extent : (n,) array
     shift : (n, 3) array
-        From the mean of the points to the centre. Units: m.
+        From the mean of the points to the center. Units: m.
     """
 
     rows: np.ndarray
@@ -47,18 +47,18 @@ class Shapes(Columns):
 
 
 def find_shapes(survey: Survey, cells: Cells) -> TieFeatures:
-    """The planes and poles among cells.
+    """Find the planes and poles among cells.
 
     Parameters
     ----------
     survey : Survey
     cells : Cells
-        Their group stands for pass_number and scanner in what is returned.
+        Their group is used as pass_number and scanner of the result.
     """
     cells, step = join_across_faces(cells)
     full = np.flatnonzero(cells.points >= SETTINGS.feature_points)
     covariance = cells[full].covariance
-    # lambda_0 is not below det / (sum of the principal minors): spares what is no plane its axes
+    # lambda_0 is not below det / (sum of the principal minors); saves the axes of non-planar cells
     minors = (np.trace(covariance, axis1=1, axis2=2) ** 2 - (covariance**2).sum(axis=(1, 2))) / 2
     is_thin = np.linalg.det(covariance) <= SETTINGS.roughest**2 * minors
     is_thin |= covariance[:, 0, 0] + covariance[:, 1, 1] <= SETTINGS.thickest**2
@@ -66,12 +66,12 @@ def find_shapes(survey: Survey, cells: Cells) -> TieFeatures:
     cells = cells[rows]
     step = step[rows]
     values, axes = np.linalg.eigh(covariance[is_thin])
-    values = np.maximum(values, SETTINGS.rounding**2)  # points of a file may be the same
+    values = np.maximum(values, SETTINGS.rounding**2)  # points of a file may coincide
     moments = cells.moments
     sight = cells.centre - scanner_position(survey.trajectory, survey.mounting, cells.gps_time)
     sight /= np.linalg.norm(sight, axis=1, keepdims=True)
     noise = neighbour_covariances(moments)
-    # points in no order, or beams that take turns
+    # unordered points, or alternating beams
     noise[~_is_ordered(moments)] = survey.scanner.range_noise**2 * np.eye(3)
     planes = _planes(moments, values, axes, noise, sight)
     poles = _poles(moments, values, axes, noise, sight, step)
@@ -109,7 +109,7 @@ def _with_time(moments):
 
 
 def _planes(moments, values, axes, noise, sight):
-    """Planes among the cells."""
+    """Find planes among the cells."""
     normal = axes[:, :, 0]
     points = moments[:, 0]
     variance, of_mean = _scatter(values[:, 0], moments, _along(normal, noise))
@@ -125,12 +125,13 @@ def _planes(moments, values, axes, noise, sight):
 
 
 def _scatter(variance, moments, between):
-    """Variance about a plane (n,), and that of its mean. Units: m^2.
+    """Variance about a plane (n,), and variance of its mean. Units: m^2.
 
-    What neighbours on a scan line differ by is noise, and independent; the rest is the surface.
-    Neighbours that correlate by 1 - 1 / ripple, as in a first-order autoregression, leave of the
-    points of a line 1 / (2 ripple - 1). Across the lines the surface is as smooth as along them:
-    what is curved or broken is in a piece, and its mean no better than its roughness.
+    Differences of neighbors on a scan line are independent noise; the rest is the surface.
+    Neighbors that correlate by 1 - 1 / ripple, as in a first-order autoregression, reduce the
+    points of a line to 1 / (2 ripple - 1) independent ones. The surface is equally smooth across
+    the lines, so a curved or broken one is a single sample, whose mean is as uncertain as its
+    roughness.
     """
     points = moments[:, 0]
     variance = variance * points / (points - 3)
@@ -142,19 +143,19 @@ def _scatter(variance, moments, between):
 
 
 def _lines(moments):
-    """Number of scan lines (n,); a guess where the order of points does not show them."""
+    """Number of scan lines (n,); estimated if the order of points does not show them."""
     points = moments[:, 0]
     followers = moments[:, 11]
     return np.where(_is_ordered(moments), points - followers, np.sqrt(points))
 
 
 def _is_ordered(moments):
-    """Cells (n,) in which enough points follow another one to show their noise."""
+    """Flag (n,) of cells with enough consecutive points to determine their noise."""
     return moments[:, 11] >= moments[:, 0] / 4
 
 
 def _poles(moments, values, axes, noise, sight, step):
-    """Poles among the cells that have nothing else."""
+    """Find poles among the cells that contain nothing else."""
     points = moments[:, 0]
     axis = axes[:, :, 2] * np.where(axes[:, 2, 2:] < 0, -1.0, 1.0)
     across = np.cross(axis, sight)
@@ -165,18 +166,19 @@ def _poles(moments, values, axes, noise, sight, step):
     deep = _along(beam, matrix)
     between = _along(beam, noise)
     radius = np.sqrt(side / ACROSS)
-    # by variance a round pole is a seventh as thick as wide; a square one, turned by 5 deg or more,
-    # shows two sides, a fifth as thick as wide and up to a third as deep; a cut arc is a
-    # twentieth as thick as wide, a strip seen askew not at all, and a bush as deep as wide
+    # ratio of variances, depth over width: 1/7 for a round pole; 1/5 to 1/3 for a square one with
+    # two visible sides, turned by 5 deg or more; 1/20 for a cut arc; 0 for an oblique strip; 1 for
+    # a bush
     is_thick = values[:, 0] >= values[:, 1] / 10
     is_round = deep <= 1.5 * ALONG * radius**2 + 2 * between
     depth = np.where(is_round, DEPTH, SQUARE_DEPTH)
     is_pole = is_round | is_thick & (deep <= side / 2 + 2 * between)
     is_pole &= (values[:, 2] >= 2 * SETTINGS.narrowest**2) & (radius <= SETTINGS.thickest)
     is_pole &= axis[:, 2] >= np.cos(SETTINGS.largest_lean)
-    # what touches the border of its cell or moment goes on beyond: it is cut, and its mean is not
-    # the whole's. Of an even strip the border is sqrt(3) sigmas away, by few points up to 2.5. What
-    # is thick is joined with what is beyond, and as wide there; what is flat may be a wall's border
+    # an object at the border of its cell or moment continues beyond: it is cut, and its mean is
+    # biased. The border of a uniform strip is sqrt(3) sigmas away, with few points up to 2.5. A
+    # thick object is joined with the part beyond and has the same width there; a flat one may be
+    # the edge of a wall
     spread = np.sqrt(np.einsum("nii->ni", matrix)[:, :2])
     spread = np.where(is_thick[:, None], spread.max(axis=1, keepdims=True), spread)
     step = np.where(is_thick[:, None], step[:, :2], 0.0)
@@ -186,8 +188,9 @@ def _poles(moments, values, axes, noise, sight, step):
     time = np.einsum("ni,ni->n", across, _with_time(moments)) / np.sqrt(np.maximum(side, 1e-12))
     to_end = SETTINGS.moment / 2 - np.abs(moments[:, 1] / points - SETTINGS.moment / 2)
     is_pole &= to_end >= 2.5 * np.abs(time)
-    of_radius = radius**2 / (5 * points)  # a uniform distribution's variance^2 is known to 0.8 / m
-    # evenly spaced, scan lines leave the middle open by half of a step; one shows no width
+    of_radius = radius**2 / (5 * points)  # variance^2 of a uniform distribution is known to 0.8 / m
+    # for evenly spaced scan lines the middle is uncertain by half a step; a single one gives no
+    # width
     lines = _lines(moments)
     is_pole &= lines > 1
     variance = side / lines**2 + depth**2 * of_radius + (SETTINGS.roundness * radius) ** 2
@@ -199,12 +202,12 @@ def _poles(moments, values, axes, noise, sight, step):
 
 
 def _along(vector, matrix):
-    """The forms v' M v (n,) of vectors (n, 3) and matrices (n, 3, 3)."""
+    """Quadratic forms v' M v (n,) of vectors (n, 3) and matrices (n, 3, 3)."""
     return np.einsum("ni,nij,nj->n", vector, matrix, vector)
 
 
 def _stacked(cells):
-    """Poles (n,) that go on in the cell above or below: people and bollards don't."""
+    """Flag (n,) of poles that continue in the cell above or below, unlike people and bollards."""
     order = np.lexsort([*cells.middle.T[::-1], cells.begin, cells.group])
     column = np.column_stack([cells.middle, cells.begin, cells.group])[order]
     goes_on = (np.diff(column, axis=0) == [0, 0, SETTINGS.cell, 0, 0]).all(axis=1)
@@ -214,10 +217,10 @@ def _stacked(cells):
 
 
 def join_across_faces(cells: Cells) -> tuple[Cells, np.ndarray]:
-    """Cells, of which those of two that share a plane or pole in their face are joined.
+    """Join cells that share a plane or pole in their common face.
 
-    Each would hold half of the plane's noise, whose mean lies 0.8 sigmas off the plane, or a part
-    of the pole, whose middle is not the whole's.
+    Otherwise each would contain half of the plane's noise, with a mean 0.8 sigmas off the plane, or
+    a part of the pole, with a biased middle.
 
     Parameters
     ----------
@@ -226,22 +229,22 @@ def join_across_faces(cells: Cells) -> tuple[Cells, np.ndarray]:
     Returns
     -------
     joined : Cells
-        A cell that another one took up has no points.
+        A cell that was merged into another one has no points.
     step : (n, 3) array
-        To the cells beyond, whose points stand in each one too, if there are any. Units: cells.
+        Step to the cells beyond whose points are included, if there are any. Units: cells.
     """
     moments = cells.moments
     points = moments[:, 0]
     mean = moments[:, 2:5] / points[:, None]
     spread = moments[:, [5, 8, 10]] / points[:, None] - mean**2
     spread = np.sqrt(np.maximum(spread, SETTINGS.rounding**2))
-    # a pole's points are spread by its radius over sqrt(3), which along both axes no wall's are,
-    # and more along it; of a square one a cell may hold one side, beyond which it is as wide
+    # a pole's points are spread by its radius over sqrt(3) in both axes, unlike a wall's, and more
+    # along the pole. A cell may contain one side of a square pole, which is equally wide beyond it
     widest = np.minimum(SETTINGS.thickest / np.sqrt(3), spread[:, 2:])
     is_pole = (spread[:, :2] <= widest).all(axis=1, keepdims=True)
     spread[:, :2] = np.where(is_pole, spread[:, :2].max(axis=1, keepdims=True), spread[:, :2])
     is_thin = (spread <= SETTINGS.roughest) | (is_pole & [True, True, False])
-    # 99 % of a plane's noise lies within 2.5 sigmas
+    # 99 % of a plane's noise is within 2.5 sigmas
     is_cut = is_thin & (points >= SETTINGS.feature_points)[:, None]
     is_cut &= SETTINGS.cell / 2 - np.abs(mean) < 2.5 * spread
     rank = np.argsort(np.argsort(points, kind="stable"))
@@ -254,7 +257,7 @@ def join_across_faces(cells: Cells) -> tuple[Cells, np.ndarray]:
         beyond = _cells_at(cells, rows, step)
         rows, beyond, step = (part[beyond >= 0] for part in (rows, beyond, step))
         is_half = is_cut[beyond, axis] & (mean[beyond, axis] * step[:, axis] < 0)
-        kept = ~(is_half & (rank[rows] < rank[beyond]))  # the smaller half takes part there
+        kept = ~(is_half & (rank[rows] < rank[beyond]))  # the smaller half contributes there
         rows, beyond, step, is_half = (part[kept] for part in (rows, beyond, step, is_half))
         joined[rows] += _moved(joined[beyond], SETTINGS.cell * step)
         joined[beyond[is_half]] = 0.0
@@ -262,7 +265,7 @@ def join_across_faces(cells: Cells) -> tuple[Cells, np.ndarray]:
 
 
 def _cells_at(cells, rows, step):
-    """Rows (k,) of the cells some steps (k, 3) from rows, of their moment and group; or -1."""
+    """Rows (k,) of the cells a given step (k, 3) from rows, in the same moment and group; or -1."""
     corner = cells.middle.min(axis=0)
     place = np.round((cells.middle - corner) / SETTINGS.cell).astype(np.int64) + 1
     moment = np.column_stack([cells.begin, cells.group])
@@ -276,7 +279,7 @@ def _cells_at(cells, rows, step):
 
 
 def _moved(moments, shift):
-    """Moments (k, 22) about the middles of other cells, a shift (k, 3) before. Units: m."""
+    """Moments (k, 22) about the middles of other cells, given a shift (k, 3). Units: m."""
     points = moments[:, :1]
     sums = moments[:, 2:5]
     moved = moments.copy()

@@ -1,4 +1,4 @@
-"""Choice among many features: as many in each second and direction."""
+"""Thinning of many features to a fixed number for each second and direction."""
 
 from collections.abc import Sequence
 
@@ -10,7 +10,7 @@ from mlscorr.survey import TIE_KINDS, TieFeatures, Trajectory
 
 
 def direction_class(direction: np.ndarray) -> np.ndarray:
-    """Number (n,) from 0 to 26 of the nearest of the directions to a cube's neighbours.
+    """Index (n,) from 0 to 26 of the nearest of the directions to a cube's neighbors.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ def direction_class(direction: np.ndarray) -> np.ndarray:
 
 
 def kind_number(features: TieFeatures) -> np.ndarray:
-    """Numbers (n,) of the kinds of features among TIE_KINDS.
+    """Indices (n,) of the kinds of features in TIE_KINDS.
 
     Parameters
     ----------
@@ -32,14 +32,14 @@ def kind_number(features: TieFeatures) -> np.ndarray:
 
 
 def moment_number(gps_time: np.ndarray, trajectory: Trajectory | None = None) -> np.ndarray:
-    """Number (n,) of the moment of times; a standstill is one moment a pause long.
+    """Index (n,) of the moment of each time; a standstill is one moment as long as a pause.
 
     Parameters
     ----------
     gps_time : (n,) array
         Units: s.
     trajectory : Trajectory, optional
-        That says where the scanner stands.
+        Shows the standstills of the scanner.
     """
     moment = np.floor(gps_time / SETTINGS.moment).astype(np.int64)
     if trajectory is None:
@@ -57,19 +57,19 @@ def moment_number(gps_time: np.ndarray, trajectory: Trajectory | None = None) ->
 def thin(
     features: TieFeatures, origin: np.ndarray, trajectory: Trajectory | None = None
 ) -> np.ndarray:
-    """Rows (k,) of the features to keep, whatever the order in which they came.
+    """Select rows (k,) of the features to keep, independent of their order.
 
-    At most SETTINGS.features are kept of each second, pass, kind and class of directions, so that
-    memory follows the time of the drive, not the points. The blocks of space with the smallest of
-    some random numbers are kept. These are the same in all passes, so the same blocks are, too.
+    At most SETTINGS.features are kept for each second, pass, kind and class of directions, so that
+    memory depends on the duration of the drive, not on the points. The blocks of space with the
+    smallest random numbers are kept. The numbers, and thus the blocks, are the same in all passes.
 
     Parameters
     ----------
     features : TieFeatures
     origin : (3,) array
-        Of the blocks: the same for all passes. Units: m.
+        Origin of the blocks, the same for all passes. Units: m.
     trajectory : Trajectory, optional
-        As of moment_number.
+        See moment_number.
     """
     moment = moment_number(features.gps_time, trajectory)
     bins = len(TIE_KINDS) * direction_class(features.direction) + kind_number(features)
@@ -82,14 +82,14 @@ def thin(
 
 
 def first_of_groups(group: np.ndarray, order: Sequence[np.ndarray], number: int) -> np.ndarray:
-    """Rows (k,) of at most a number of each group: the first in an order.
+    """Rows (k,) of at most a given number of each group: the first in an order.
 
     Parameters
     ----------
     group : (n, g) array
-        Rows that are equal are of one group.
+        Equal rows belong to one group.
     order : sequence of (n,) arrays
-        As of numpy.lexsort: the last one counts first.
+        As for numpy.lexsort, the last one is the primary key.
     number : int
     """
     rows = np.lexsort([*order, *group.T])

@@ -1,6 +1,6 @@
 """Moments of the points in cells of space and time, summed while a cloud streams.
 
-The sums are about the middle of each cell, so that no digit is lost at coordinates of UTM size.
+The sums refer to the middle of each cell, so that no digits are lost at UTM coordinates.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from mlscorr.surfaces.settings import SETTINGS
 from mlscorr.survey import Columns, PointCloud
 
 EMPTY = -1
-CELL_BITS = 21  # of a key for each axis: a million cells to each side of the origin
-GROUP_BITS = 24  # of a key for the group, below the number of the moment
+CELL_BITS = 21  # bits of a key for each axis: a million cells to each side of the origin
+GROUP_BITS = 24  # bits of a key for the group, below the number of the moment
 # Columns of the moments of a cell:
 #  0     number of points
 #  1     sum of the times since the cell's moment began (s)
@@ -41,9 +41,9 @@ class Cells(Columns):
     middle : (n, 3) array
         Units: m.
     begin : (n,) array
-        Of their moments. Units: s.
+        Start of their moments. Units: s.
     group : (n,) int array
-        Of the file and the segment of the trajectory.
+        Group of the file and the trajectory's segment.
     moments : (n, 22) array
         Sums over the points about the middle and the beginning; see the columns above.
     """
@@ -85,17 +85,17 @@ class Cells(Columns):
 
     @property
     def key(self) -> np.ndarray:
-        """Number (n,) of the place and moment, the same in all clouds (see place_key)."""
+        """Key (n,) of the position and moment, the same in all clouds (see place_key)."""
         return place_key(self.middle, self.begin)
 
     @property
     def chance(self) -> np.ndarray:
-        """Random number (n,) of the block of the ground, from 0 to 1."""
+        """Random number (n,) of the ground block, from 0 to 1."""
         return block_chance(self.middle)
 
 
 def covariances(moments: np.ndarray) -> np.ndarray:
-    """Covariances (n, 3, 3) of the points of cells; zeros for no points. Units: m^2.
+    """Covariances (n, 3, 3) of the points of cells; zero without points. Units: m^2.
 
     Parameters
     ----------
@@ -107,9 +107,9 @@ def covariances(moments: np.ndarray) -> np.ndarray:
 
 
 def neighbour_covariances(moments: np.ndarray) -> np.ndarray:
-    """Noise (n, 3, 3) of the points of cells by those that follow each other. Units: m^2.
+    """Noise covariances (n, 3, 3) of the points of cells, from consecutive points. Units: m^2.
 
-    Half the mean product of their differences: what neighbours share is the surface.
+    They are half the mean product of differences, because the surface is common to neighbors.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def _symmetric(products):
 
 @loop(inline="always")
 def _slot_of(cell, moment, table, keys):
-    """Where the row of a key stands, or would stand, in an open hash table of a power of two."""
+    """Slot of a key, or a free slot for it, in an open hash table whose size is a power of two."""
     mask = len(table) - 1
     mixed = (cell ^ (moment * np.int64(0x2545F4914F6CDD1D))) * np.int64(-7046029254386353131)
     slot = (mixed ^ (mixed >> 29)) & mask
@@ -140,15 +140,15 @@ def _slot_of(cell, moment, table, keys):
 
 @loop
 def hash_rows(keys: np.ndarray, count: int, size: int) -> np.ndarray:
-    """An open hash table of the first rows of keys.
+    """Make an open hash table of the first rows of keys.
 
     Parameters
     ----------
     keys : (k, 2) int array
     count : int
-        Of rows.
+        Number of rows.
     size : int
-        Of the table: a power of two.
+        Size of the table, a power of two.
     """
     table = np.full(size, EMPTY, np.int64)
     for row in range(count):
@@ -172,34 +172,34 @@ def add_points(
     count: int,
     rows: np.ndarray,
 ) -> tuple[int, int]:
-    """Add points to the moments of their cells, until all are added or no row is left.
+    """Add points to the moments of their cells, until all are added or no row is free.
 
     Parameters
     ----------
     xyz, gps_time : (n, 3), (n,) arrays
     values : (n,) or (0,) array
-        Whose sums are wanted, if any.
+        Values to sum, if any.
     begin : int
-        The first point to add.
+        Index of the first point to add.
     grid : (6,) array
-        Origin (m) and beginning (s) of the cells, their edge (m) and duration (s).
+        Origin (m) and start (s) of the cells, their edge (m) and duration (s).
     passes : (s, 2) array
         Start and end of the trajectory's segments. Units: s.
     group : int
-        Of the first segment: the key of a cell holds group + segment.
+        Group of the first segment; the key of a cell contains group + segment.
     starts : (s,) array
-        First time of each segment, which is updated.
+        First time of each segment; updated.
     table, keys, moments : (t,), (k, 2), (k, 22) arrays
-        Hash table, key and moments of each cell, which are updated.
+        Hash table, key and moments of each cell; updated.
     count : int
         Rows in use.
     rows : (n,) int array
-        Row of each point's cell, which is filled; left as it is for points outside the segments.
+        Row of each point's cell, to be filled; unchanged for points outside the segments.
 
     Returns
     -------
     begin, count : int
-        The first point that was not added, and the rows in use then.
+        Index of the first point that was not added, and the rows in use.
     """
     low = np.inf
     high = -np.inf
@@ -251,7 +251,7 @@ def add_points(
 
 @loop(inline="always")
 def _split(place, grid):
-    """Key of the cell around a place, and the offset (m) of the place from its middle."""
+    """Key of the cell that contains a position, and the offset (m) from its middle."""
     x = place[0] - grid[0]
     y = place[1] - grid[1]
     z = place[2] - grid[2]
@@ -267,7 +267,7 @@ def _split(place, grid):
 
 @loop(inline="always")
 def _add_point(sums, since, x, y, z):
-    """Add a point, so long after the beginning and so far from the middle, to its cell's sums."""
+    """Add a point, given relative to start and middle of its cell, to the cell's sums."""
     sums[0] += 1.0
     sums[1] += since
     sums[2] += x
@@ -281,14 +281,14 @@ def _add_point(sums, since, x, y, z):
 
 @loop(inline="always")
 def _add_difference(sums, x, y, z):
-    """Add the step from the point before."""
+    """Add the step from the previous point."""
     sums[11] += 1.0
     _add_products(sums, 12, x, y, z)
 
 
 @loop(inline="always")
 def _add_products(sums, column, x, y, z):
-    """Add xx, xy, xz, yy, yz, zz to the columns from one on."""
+    """Add xx, xy, xz, yy, yz, zz to the columns starting at one."""
     sums[column] += x * x
     sums[column + 1] += x * y
     sums[column + 2] += x * z
@@ -306,25 +306,25 @@ def add_near_planes(
     normal: np.ndarray,
     limit: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Moments of those points of some groups that lie near the plane of their group.
+    """Moments of the points near the plane of their group.
 
     Parameters
     ----------
     local : (n, 3) array
-        Points, group after group, about a place near them. Units: m.
+        Points, group after group, relative to a nearby position. Units: m.
     since : (n,) array
         Time since the beginning of each group. Units: s.
     ends : (g + 1,) int array
-        Where each group begins, and the last one ends.
+        Start of each group, and end of the last one.
     mean, normal : (g, 3) arrays
-        A point of each plane (m) and its normal.
+        Point of each plane (m) and its normal.
     limit : (g,) array
         Largest distance from the plane. Units: m.
 
     Returns
     -------
     moments : (g, 22) array
-        Here a point follows another one where no point of the group lies between them.
+        Two points are consecutive here if no other point of the group is between them.
     is_near : (n,) bool array
     """
     moments = np.zeros((len(limit), COLUMNS))
@@ -347,14 +347,14 @@ def add_near_planes(
 
 
 class CellTable:
-    """Cells that points may still fall into.
+    """Cells that may still receive points.
 
     Parameters
     ----------
     origin : (3,) array
         Corner of a cell, near the points. Units: m.
     start : float
-        Of the moments. Units: s.
+        Start of the moments. Units: s.
     """
 
     def __init__(self, origin: np.ndarray, start: float = 0.0):
@@ -378,13 +378,13 @@ class CellTable:
         ----------
         cloud : PointCloud
         passes : (s, 2) array
-            Start and end of the trajectory's segments; other points are left out. Units: s.
+            Start and end of the trajectory's segments; other points are ignored. Units: s.
         group : int
-            Of the first segment: a cell has group + segment.
+            Group of the first segment; a cell has group + segment.
         starts : (s,) array, optional
-            First time of each segment, which is updated. Units: s.
+            First time of each segment; updated. Units: s.
         values : (n,) array, optional
-            Of which cells have the sums, too.
+            Values to sum in the cells.
 
         Returns
         -------
@@ -419,11 +419,11 @@ class CellTable:
 
     @property
     def moment(self) -> np.ndarray:
-        """Number (count,) of each cell's moment."""
+        """Index (count,) of each cell's moment."""
         return self.keys[: self.count, 1] >> GROUP_BITS
 
     def of(self, rows: np.ndarray | slice = slice(None)) -> Cells:
-        """Some cells, or all of them.
+        """Return some cells, or all of them.
 
         Parameters
         ----------
@@ -443,7 +443,7 @@ class CellTable:
         return Cells(middle, begin, keys[:, 1] & ((1 << GROUP_BITS) - 1), moments)
 
     def remove(self, rows: np.ndarray) -> None:
-        """Make room for others.
+        """Remove cells to make room for others.
 
         Parameters
         ----------

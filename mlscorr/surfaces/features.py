@@ -1,4 +1,4 @@
-"""Planes, poles and paint of a survey's clouds, found while these are read."""
+"""Planes, poles and paint in a survey's clouds, found while these are read."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -15,19 +15,19 @@ from mlscorr.survey import CloudFile, PointCloud, Survey, TieFeatures, Trajector
 
 
 class FeatureCollector:
-    """Finds planes, poles and paint in the chunks of clouds, in any order.
+    """Collector of planes, poles and paint from chunks of clouds in any order.
 
-    Its memory grows neither with the points nor with the file: it has the cells and the crossings
-    of paint of the last moments, whose points may still come, and of those before a bounded number
-    of features a second (see thin).
+    Its memory grows neither with the points nor with the file. It stores the cells and paint
+    crossings of the last moments, which may still receive points, and a limited number of features
+    per second for earlier ones (see thin).
 
     Parameters
     ----------
     survey : Survey
     cells_in_memory : int, optional
-        With more, those of moments that have passed give their features and are removed.
+        With more cells, those of past moments are converted to features and removed.
     origin : (3,) array, optional
-        Whole metres, near the survey; that of its trajectory by default. Units: m.
+        Whole meters, near the survey; by default from its trajectory. Units: m.
     """
 
     def __init__(
@@ -53,7 +53,7 @@ class FeatureCollector:
         self._loose = 0
 
     def add(self, file: CloudFile, chunk: PointCloud) -> None:
-        """Take in a chunk of a file.
+        """Add a chunk of a file.
 
         Parameters
         ----------
@@ -66,11 +66,11 @@ class FeatureCollector:
         self._cells.add(chunk, self._segments, group, self._starts[source])
         self._crossings.append(find_crossings(chunk, self._segments, group))
         if self._cells.count > self._cells_in_memory:
-            # beams that take turns come a little late
+            # alternating beams are slightly late
             self._close(self._cells.moment.max() - 1)
 
     def _close(self, moment):
-        """Find the features of the moments before one, and thin all so far where they are many."""
+        """Find the features of the moments before one, and thin all features if there are many."""
         rows = self._cells.moment < moment
         self._kept.append(self._shapes(rows))
         self._cells.remove(rows)
@@ -87,7 +87,7 @@ class FeatureCollector:
             self._loose = 0
 
     def _shapes(self, rows):
-        """Features of some cells, each seen from the scanner of its file."""
+        """Find features of some cells, each with the scanner of its file."""
         cells = self._cells.of(rows)
         scanner = self._scanner(cells.group)
         return TieFeatures.concatenate(
@@ -96,11 +96,11 @@ class FeatureCollector:
         )
 
     def _scanner(self, group):
-        """Number of the scanner of groups."""
+        """Index of the scanner of groups."""
         return self._survey.scanner_numbers[group // len(self._segments)]
 
     def features(self) -> TieFeatures:
-        """Features of all chunks so far, in order of pass and time; chunks may still follow."""
+        """Features of all chunks so far, by pass and time; further chunks may follow."""
         rest = [self._shapes(slice(None))]
         if self._crossings:
             rest.append(find_markings(Crossings.concatenate(self._crossings), self._start))
@@ -114,15 +114,15 @@ class FeatureCollector:
 def join_features(
     parts: Iterable[TieFeatures], origin: np.ndarray, trajectory: Trajectory | None = None
 ) -> TieFeatures:
-    """Join features of some passes and thin them, in order of pass and time.
+    """Join features of some passes and thin them, sorted by pass and time.
 
     Parameters
     ----------
     parts : iterable of TieFeatures
     origin : (3,) array
-        As of FeatureCollector. Units: m.
+        See FeatureCollector. Units: m.
     trajectory : Trajectory, optional
-        That says where the scanner stands.
+        Shows the standstills of the scanner.
     """
     features = TieFeatures.concatenate(parts)
     features = features[thin(features, origin, trajectory)]

@@ -1,4 +1,4 @@
-"""Random numbers of places and moments, the same in every cloud, by which some are chosen."""
+"""Random numbers of positions and moments, the same in every cloud, for random selection."""
 
 from typing import Generic, TypeVar
 
@@ -11,7 +11,7 @@ Part = TypeVar("Part", bound=Columns)
 
 
 def integer_hash(numbers: np.ndarray) -> np.ndarray:
-    """A 64-bit number (n,) of integers (n, k): random, but the same for the same ones.
+    """Hash (n,) of integers (n, k): 64 random bits, equal for equal rows.
 
     Parameters
     ----------
@@ -26,12 +26,12 @@ def integer_hash(numbers: np.ndarray) -> np.ndarray:
 
 
 def chance(*numbers: np.ndarray) -> np.ndarray:
-    """A number from 0 to 1 (n,) that depends on integers (n,) alone."""
+    """Random number (n,) from 0 to 1 that depends only on integers (n,)."""
     return (integer_hash(np.column_stack(numbers)) >> np.uint64(11)) / float(1 << 53)
 
 
 def place_key(xyz: np.ndarray, gps_time: np.ndarray) -> np.ndarray:
-    """A number for the cell and moment of points, the same in all clouds.
+    """Key of the cell and moment of points, the same in all clouds.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def place_key(xyz: np.ndarray, gps_time: np.ndarray) -> np.ndarray:
 
 
 def block_chance(xyz: np.ndarray) -> np.ndarray:
-    """A number from 0 to 1 (n,) for the block of the ground of points, the same in all clouds.
+    """Random number (n,) from 0 to 1 for the ground block of points, the same in all clouds.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def block_chance(xyz: np.ndarray) -> np.ndarray:
 
 
 def cell_corner(xyz: np.ndarray) -> np.ndarray:
-    """The least corner (n, 3) of the cells of points. Units: m.
+    """Lowest corner (n, 3) of the cells of points. Units: m.
 
     Parameters
     ----------
@@ -73,17 +73,16 @@ def cell_corner(xyz: np.ndarray) -> np.ndarray:
 
 
 def _in_cells(xyz):
-    """Places in edges of a cell, whose faces stand a third off the whole numbers: models have
-    floors and walls there.
+    """Positions in cell edges, with faces a third off integers, because models have floors and
+    walls there.
     """
     return xyz / SETTINGS.cell + 1.0 / 3.0
 
 
 class BoundedChoice(Generic[Part]):
-    """At most a number of things of a stream, chosen by random numbers that each brings along.
+    """Random choice of at most a given number of items from a stream, by the items' random numbers.
 
-    Things of one number are kept or left together, and the order in which they come does not
-    matter.
+    Items with the same number are kept or dropped together, and the order of items does not matter.
 
     Parameters
     ----------
@@ -93,15 +92,15 @@ class BoundedChoice(Generic[Part]):
     def __init__(self, limit: int):
         self._limit = limit
         self._parts: list[tuple[Part, np.ndarray]] = []
-        self.share = 1.0  # of all numbers: things with larger ones are left out
+        self.share = 1.0  # of all numbers: items with larger ones are dropped
 
     def add(self, part: Part, number: np.ndarray) -> None:
-        """Take things.
+        """Add items.
 
         Parameters
         ----------
         part : Columns
-            Of n rows.
+            Items as n rows.
         number : (n,) array
             From 0 to 1.
         """
@@ -111,10 +110,10 @@ class BoundedChoice(Generic[Part]):
             self._parts = [self._chosen(*pair) for pair in self._parts]
 
     def _chosen(self, part, number):
-        """The rows with a number below the share, and their numbers."""
+        """Rows with a number below the share, and their numbers."""
         rows = number < self.share
         return part[rows], number[rows]
 
     def parts(self) -> list[Part]:
-        """All that is kept, in the order in which it came."""
+        """Return all selected items, in the order in which they were added."""
         return [part for part, _ in self._parts]

@@ -1,4 +1,4 @@
-"""Planes through the points of cells, refined by leaving out what lies off them."""
+"""Planes through the points of cells, refined by removing outliers."""
 
 from dataclasses import dataclass
 
@@ -17,23 +17,23 @@ from mlscorr.survey import Columns, PointCloud
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FittedPlanes(Columns):
-    """Planes of least squares through groups of points.
+    """Least squares planes through groups of points.
 
     Parameters
     ----------
     points : (g,) int array
     since : (g,) array
-        Mean time since the beginning of the group. Units: s.
+        Mean time since the start of the group. Units: s.
     mean : (g, 3) array
-        Mean of the points, from the place that their sums are about. Units: m.
+        Mean of the points, relative to the reference of their sums. Units: m.
     normal : (g, 3) array
-        Unit vector, to either side.
+        Unit vector, with either sign.
     variance : (g,) array
-        About the plane, with the plane's three parameters reckoned. Units: m^2.
+        Variance about the plane, accounting for its three parameters. Units: m^2.
     spread : (g,) array
         One sigma of the points along the plane's narrow direction. Units: m.
     between : (g,) array
-        Variance along the normal by points that follow each other: the noise alone. Units: m^2.
+        Variance along the normal from consecutive points: the noise only. Units: m^2.
     """
 
     points: np.ndarray
@@ -46,17 +46,17 @@ class FittedPlanes(Columns):
 
     @classmethod
     def of(cls, moments: np.ndarray) -> "FittedPlanes":
-        """The planes of moments.
+        """Make the planes of moments.
 
         Parameters
         ----------
         moments : (g, 22) array
-            Of Cells, or of add_near_planes; zeros for no points.
+            From Cells or add_near_planes; zeros without points.
         """
         points = moments[:, 0].astype(int)
         count = np.maximum(points, 1)
         values, axes = np.linalg.eigh(covariances(moments))
-        values = np.maximum(values, 0.0)  # of points in a line rounding makes it negative
+        values = np.maximum(values, 0.0)  # negative by rounding for points in a line
         normal = np.ascontiguousarray(axes[:, :, 0])
         noise = neighbour_covariances(moments)
         return cls(
@@ -71,28 +71,28 @@ class FittedPlanes(Columns):
 
 
 def degrees_of_freedom(points: np.ndarray) -> np.ndarray:
-    """Degrees of freedom about a plane through numbers (n,) of points: a plane has three."""
+    """Degrees of freedom for (n,) points about a plane, which has three parameters."""
     return np.maximum(points - 3, 1)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PlaneSearch:
-    """Planes of cells, and the points behind each of them.
+    """Planes of cells, and the points of each of them.
 
     Parameters
     ----------
     planes : FittedPlanes
-        Of g cells, each about the middle of its cell.
+        For g cells, each relative to the middle of its cell.
     middle : (g, 3) array
-        Of the cells. Units: m.
+        Middle of the cells. Units: m.
     begin : (g,) array
-        Of their moments. Units: s.
+        Start of their moments. Units: s.
     rows : (n,) int array
-        Points of the cells, cell after cell, each cell's in the order of the cloud.
+        Points of the cells, cell after cell, within a cell in the order of the cloud.
     ends : (g + 1,) int array
-        Where each cell begins among the rows, and the last one ends.
+        Start of each cell among the rows, and end of the last one.
     is_on : (n,) bool array
-        Points on the plane.
+        True for points on the plane.
     """
 
     planes: FittedPlanes
@@ -104,15 +104,16 @@ class PlaneSearch:
 
 
 def search_planes(cloud: PointCloud, place: np.ndarray) -> PlaneSearch:
-    """Fit a plane to most points of each cell of space and time that has enough.
+    """Fit a plane to most points of each cell of space and time with enough points.
 
-    Least squares are repeated with the points within ever more sigmas of the plane before.
+    Least squares are repeated with the points within an increasing number of sigmas of the previous
+    plane.
 
     Parameters
     ----------
     cloud : PointCloud
     place : (3,) array
-        Near the cloud: the same for all parts of it. Units: m.
+        Reference near the cloud, the same for all parts of it. Units: m.
     """
     table = CellTable(cell_corner(place))
     cell = table.add(cloud)
@@ -135,14 +136,14 @@ def search_planes(cloud: PointCloud, place: np.ndarray) -> PlaneSearch:
 def trimmed_planes(
     local: np.ndarray, since: np.ndarray, ends: np.ndarray, planes: FittedPlanes
 ) -> tuple[FittedPlanes, np.ndarray]:
-    """Planes of groups of points, and which of the points (n,) lie on them.
+    """Planes of groups of points, and the flag of points (n,) on them.
 
     Parameters
     ----------
     local, since, ends
-        As of add_near_planes.
+        See add_near_planes.
     planes : FittedPlanes
-        Of all points.
+        Planes through all points.
     """
     for trim in SETTINGS.trims:
         limit = trim * np.maximum(np.sqrt(planes.variance), SETTINGS.rounding)
@@ -157,9 +158,9 @@ def fit_planes(local: np.ndarray, ends: np.ndarray) -> FittedPlanes:
     Parameters
     ----------
     local : (n, 3) array
-        Points, group after group, about a place near them. Units: m.
+        Points, group after group, relative to a nearby position. Units: m.
     ends : (g + 1,) int array
-        Where each group begins, and the last one ends.
+        Start of each group, and end of the last one.
     """
     groups = len(ends) - 1
     zeros = np.zeros((groups, 3))

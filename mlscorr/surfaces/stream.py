@@ -9,12 +9,12 @@ from mlscorr.survey import PointCloud, Trajectory
 
 
 def pass_numbers(starts: np.ndarray) -> np.ndarray:
-    """Numbers (n,) of passes from 1 in time.
+    """Numbers (n,) of passes from 1 in order of time.
 
     Parameters
     ----------
     starts : array of n values
-        First time of each, infinite where there is none: those come last. Units: s.
+        First time of each; infinite, and thus last, without one. Units: s.
     """
     number = np.empty(starts.size, int)
     number[np.argsort(starts, axis=None, kind="stable")] = np.arange(1, starts.size + 1)
@@ -22,10 +22,10 @@ def pass_numbers(starts: np.ndarray) -> np.ndarray:
 
 
 class MomentStream:
-    """Gives the points of a stream moment by moment, wherever it was cut into chunks.
+    """Stream of points grouped by moments, regardless of its chunks.
 
-    Points come about in order of time, up or down. Those of the moments about the last one wait
-    for what follows.
+    Points are roughly in order of time, ascending or descending. Those of the last moments wait for
+    further points.
 
     Parameters
     ----------
@@ -38,31 +38,31 @@ class MomentStream:
         self._number = np.empty(0, int)
 
     def add(self, cloud: PointCloud, number: np.ndarray) -> None:
-        """Take points.
+        """Add points.
 
         Parameters
         ----------
         cloud : PointCloud
-            Within the segments of the trajectory.
+            Points within the segments of the trajectory.
         number : (n,) int array
-            Of each in its file.
+            Index of each point in its file.
         """
         self._cloud = PointCloud.concatenate([self._cloud, cloud])
         self._number = np.append(self._number, number)
 
     def moments(self, time: float = np.inf) -> Iterator[tuple[int, PointCloud, np.ndarray]]:
-        """Segment, PointCloud and numbers (k,) of each whole moment, which is given once.
+        """Yield segment, PointCloud and indices (k,) of each complete moment once.
 
         Parameters
         ----------
         time : float, optional
-            Of the last point so far, about which points are still to come. Units: s.
+            Time of the last point so far, around which further points are expected. Units: s.
         """
         cloud = self._cloud
         number = self._number
         segment = self._trajectory.segment(cloud.gps_time)
         moment = np.floor(cloud.gps_time / SETTINGS.moment)
-        # beams that take turns come a little late
+        # alternating beams are slightly late
         is_open = np.abs(moment - np.floor(time / SETTINGS.moment)) <= 1
         self._cloud = cloud[is_open]
         self._number = number[is_open]

@@ -1,4 +1,4 @@
-"""The nouns: what a survey recorded, as frozen values.
+"""Data types of a survey: what was recorded, as frozen values.
 
 float64, SI units, radians inside; map axes E, N, H; body axes X right, Y forward, Z up.
 """

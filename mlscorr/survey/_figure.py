@@ -1,4 +1,4 @@
-"""A figure of points from above, drawn where no report is."""
+"""Figures of points seen from above, for use without a report."""
 
 import io
 
@@ -6,12 +6,12 @@ import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-DRAWN = 200_000  # points: more than a picture has room for
-DOTS = 150  # per inch, in a notebook
+DRAWN = 200_000  # points: more do not fit into a picture
+DOTS = 150  # dots per inch, in a notebook
 
 
 class CloudFigure(Figure):
-    """A figure that notebooks show without pyplot."""
+    """Figure that notebooks show without pyplot."""
 
     def _repr_png_(self) -> bytes:
         stream = io.BytesIO()
@@ -20,7 +20,7 @@ class CloudFigure(Figure):
 
 
 def cloud_figure(xyz: np.ndarray, intensity: np.ndarray) -> Figure:
-    """Points from above, in grey by intensity.
+    """Draw points from above, in gray by intensity.
 
     Parameters
     ----------
@@ -51,14 +51,14 @@ def cloud_figure(xyz: np.ndarray, intensity: np.ndarray) -> Figure:
 
 
 def path_figure(place: np.ndarray, pairs: np.ndarray) -> Figure:
-    """A path from above, with a mark at its start.
+    """Draw a path from above, with a mark at its start.
 
     Parameters
     ----------
     place : (n, 3) array
         Units: m.
     pairs : (k, 2) int array
-        Numbers of the places that a line joins.
+        Indices of the positions that a line joins.
     """
     figure = CloudFigure(figsize=(7.2, 4.8), layout="constrained")
     axes = figure.add_subplot()

@@ -1,4 +1,4 @@
-"""What users hold points in, as a PointCloud, and back: Open3D's tensor clouds and arrays."""
+"""Conversion of users' points to a PointCloud and back: Open3D tensor clouds and arrays."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mlscorr.survey.clouds import PointCloud
 
 
 def as_cloud(points: Any) -> tuple[PointCloud, Callable[[PointCloud], Any]]:
-    """Points as a PointCloud, and a function that puts a moved one into the form they came in.
+    """Return points as a PointCloud, and a function that converts a moved one back to their form.
 
     Parameters
     ----------
@@ -24,14 +24,14 @@ def as_cloud(points: Any) -> tuple[PointCloud, Callable[[PointCloud], Any]]:
     -------
     cloud : PointCloud
     back : function of a PointCloud
-        Of the same points: only its places are taken.
+        It must have the same points; only its positions are used.
 
     Raises
     ------
     TypeError
-        For another form.
+        If the points have another form.
     ValueError
-        As ``PointCloud.from_arrays`` and ``from_open3d``.
+        See ``PointCloud.from_arrays`` and ``from_open3d``.
     """
     if isinstance(points, PointCloud):
         return points, lambda moved: moved
@@ -50,14 +50,14 @@ def as_cloud(points: Any) -> tuple[PointCloud, Callable[[PointCloud], Any]]:
 def geometry_pair(
     before: PointCloud, after: PointCloud, origin: ArrayLike | None
 ) -> dict[str, Any]:
-    """Two states of the same points as tensor clouds that share all but their positions.
+    """Return two states of the same points as tensor clouds that share all but their positions.
 
     Parameters
     ----------
     before, after : PointCloud
-        Points without ``colors`` get greys by intensity.
+        Points without ``colors`` become gray by intensity.
     origin : (3,) array or None
-        As of ``PointCloud.to_open3d``, of both. Units: m.
+        Of both; see ``PointCloud.to_open3d``. Units: m.
 
     Returns
     -------
@@ -71,7 +71,7 @@ def geometry_pair(
 
 
 def is_las(points: Any) -> bool:
-    """Return True for a record of points of laspy, or a file that it has read.
+    """Return True for a laspy point record or a file read by laspy.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def is_las(points: Any) -> bool:
 
 
 def copied_las(points: Any) -> tuple[Any, Any]:
-    """A copy of points of laspy, and the record within it.
+    """Copy laspy points, and return the copy and the point record in it.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def copied_las(points: Any) -> tuple[Any, Any]:
     Raises
     ------
     ValueError
-        For a point format without times.
+        If the point format has no times.
     """
     given = getattr(points, "points", points)
     point_format = given.point_format
@@ -106,7 +106,7 @@ def copied_las(points: Any) -> tuple[Any, Any]:
 
 
 def box_distance(xyz: np.ndarray, place: np.ndarray) -> float:
-    """Distance between the boxes about two sets of points (n, 3) and (m, 3). Units: m.
+    """Distance between the bounding boxes of two sets of points (n, 3) and (m, 3). Units: m.
 
     Parameters
     ----------

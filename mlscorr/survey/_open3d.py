@@ -1,9 +1,9 @@
-"""Points and lines as Open3D's tensor geometries, about an origin that travels with them.
+"""Points and lines as Open3D tensor geometries, about an origin stored with them.
 
-Open3D draws in float32, which at map coordinates holds half a meter: positions are therefore about
-an origin near them, in float64, and each point has it as its attribute ``origin``. That attribute
-takes no memory of its own until Open3D makes a new geometry, and survives what Open3D does with
-points: selecting, cropping, appending.
+Open3D draws in float32, which resolves only half a meter at map coordinates. Positions therefore
+refer to a nearby origin, in float64, which each point has as its attribute ``origin``. The
+attribute takes no memory until Open3D makes a new geometry, and Open3D keeps it when points are
+selected, cropped or appended.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-OWN = ("positions", "gps_time", "intensity", "origin")  # no further attribute may have these names
-GREY = (2.0, 98.0)  # percent of the values between black and white: single points darken no others
+OWN = ("positions", "gps_time", "intensity", "origin")  # reserved names of attributes
+GREY = (2.0, 98.0)  # percentiles of black and white, so that single points do not darken the rest
 
 
 def is_geometry(value: object) -> bool:
-    """Return True for a geometry of Open3D, which is not loaded for it."""
+    """Return True for an Open3D geometry, without loading Open3D."""
     return type(value).__module__.startswith("open3d") or any(
         kind.__module__.startswith("open3d") for kind in type(value).__mro__
     )
@@ -31,7 +31,7 @@ def cloud_geometry(
     further: Mapping[str, np.ndarray],
     origin: np.ndarray | None,
 ) -> Any:
-    """A tensor point cloud that shares the memory of its attributes.
+    """Make a tensor point cloud that shares the memory of its attributes.
 
     Parameters
     ----------
@@ -41,12 +41,12 @@ def cloud_geometry(
     further : mapping
         Arrays (n,) or (n, k).
     origin : (3,) array or None
-        A whole meter near the middle of the points without one. Units: m.
+        By default a whole meter near the middle of the points. Units: m.
 
     Raises
     ------
     ValueError
-        For attributes with a name or a type that can't be kept.
+        If an attribute has a reserved name or an unsupported type.
     """
     _check_attributes(further)
     attributes = {"gps_time": gps_time, "intensity": intensity, **further}
@@ -65,16 +65,16 @@ def line_geometry(
     origin: np.ndarray | None,
     attributes: Mapping[str, np.ndarray],
 ) -> Any:
-    """A tensor line set.
+    """Make a tensor line set.
 
     Parameters
     ----------
     points : (n, 3) array
         Units: m.
     pairs : (k, 2) int array
-        Numbers of the points that a line joins.
+        Indices of the points that a line joins.
     origin : (3,) array or None
-        As of cloud_geometry.
+        See cloud_geometry.
     attributes : mapping
         Arrays (k, ...) of the lines; ``colors`` (k, 3) from 0 to 1.
     """
@@ -89,12 +89,12 @@ def line_geometry(
 
 
 def chosen_origin(xyz: np.ndarray, origin: np.ndarray | None) -> np.ndarray:
-    """The origin (3,) that is asked for, or a whole meter near the middle of points. Units: m.
+    """Return the given origin (3,), or a whole meter near the middle of the points. Units: m.
 
     Raises
     ------
     ValueError
-        For an origin that is no place.
+        If the origin is not three finite numbers.
     """
     if origin is None:
         if len(xyz) == 0:
@@ -109,25 +109,25 @@ def chosen_origin(xyz: np.ndarray, origin: np.ndarray | None) -> np.ndarray:
 
 
 def geometry_columns(geometry: Any, origin: np.ndarray | None) -> tuple[np.ndarray, dict]:
-    """Positions (n, 3) in the map, and the attributes of a tensor point cloud.
+    """Return positions (n, 3) in the map, and the attributes of a tensor point cloud.
 
     Parameters
     ----------
     geometry : open3d.t.geometry.PointCloud
     origin : (3,) array or None
-        Of its positions, where the geometry has none. Units: m.
+        Used if the geometry has none. Units: m.
 
     Returns
     -------
     xyz : (n, 3) array
         Units: m.
     attributes : dict
-        Arrays (n,) or (n, k), which share the geometry's memory.
+        Arrays (n,) or (n, k) that share the geometry's memory.
 
     Raises
     ------
     ValueError
-        For another geometry, or one without points.
+        If the geometry is not a point cloud, or has no points.
     """
     point = getattr(geometry, "point", None)
     if point is None or not hasattr(geometry, "voxel_down_sample"):
@@ -140,18 +140,18 @@ def geometry_columns(geometry: Any, origin: np.ndarray | None) -> tuple[np.ndarr
 
 
 def map_places(geometry: Any, origin: np.ndarray | None = None) -> np.ndarray:
-    """Places (n, 3) of the points of a tensor cloud or line set in the map. Units: m.
+    """Map coordinates (n, 3) of the points of a tensor cloud or line set. Units: m.
 
     Parameters
     ----------
     geometry : open3d.t.geometry.PointCloud or LineSet
     origin : (3,) array or None
-        From which its positions count; its attribute ``origin`` by default, zero without one.
+        Reference of its positions; by default its attribute ``origin``, or zero without one.
 
     Raises
     ------
     ValueError
-        For a geometry without points.
+        If the geometry has no points.
     """
     if "positions" not in geometry.point:
         raise ValueError(
@@ -164,19 +164,19 @@ def map_places(geometry: Any, origin: np.ndarray | None = None) -> np.ndarray:
     if "origin" not in geometry.point or len(positions) == 0:
         return positions.astype(float)
     places = geometry.point["origin"].cpu().numpy()
-    if np.ptp(places, axis=0).any():  # clouds of several origins were put together
+    if np.ptp(places, axis=0).any():  # clouds with several origins were merged
         return positions + places.astype(float)
     return positions + places[0].astype(float)
 
 
 def moved_geometry(geometry: Any, xyz: np.ndarray) -> Any:
-    """A tensor cloud with other places, and all else of another, whose memory it shares.
+    """Return a tensor cloud with new positions and the other attributes of the given one, shared.
 
     Parameters
     ----------
     geometry : open3d.t.geometry.PointCloud
     xyz : (n, 3) array
-        About its origin. Units: m.
+        Relative to its origin. Units: m.
     """
     moved = _open3d().t.geometry.PointCloud()
     place = np.zeros(3)
@@ -190,7 +190,7 @@ def moved_geometry(geometry: Any, xyz: np.ndarray) -> Any:
 
 
 def grey_colors(values: np.ndarray) -> np.ndarray:
-    """Greys (n, 3) uint8 of values, from dark to bright.
+    """Gray values (n, 3) uint8, from dark to bright.
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ def grey_colors(values: np.ndarray) -> np.ndarray:
 
 
 def _check_attributes(further):
-    """Refuse attributes that would take the place of others, or whose type Open3D lacks."""
+    """Refuse attributes with reserved names, or with types that Open3D does not support."""
     taken = sorted(set(further) & set(OWN))
     if taken:
         raise ValueError(
@@ -231,19 +231,19 @@ def _open3d():
 
 
 def _tensor(values):
-    """A tensor on top of an array's memory."""
+    """Wrap an array in a tensor that shares its memory."""
     native = np.asarray(values, values.dtype.newbyteorder("="))
     return _open3d().core.Tensor.from_numpy(np.ascontiguousarray(native))
 
 
 def _repeated(origin, n):
-    """The origin as (n, 3) rows that are all the same memory."""
+    """Repeat the origin as (n, 3) rows that share one row of memory."""
     rows = np.lib.stride_tricks.as_strided(np.array(origin, float), (n, 3), (0, 8))
     return _open3d().core.Tensor.from_numpy(rows)
 
 
 def _columns(values):
-    """Values (n,) as a column, which Open3D asks for."""
+    """Return values (n,) as a column, as Open3D requires."""
     values = np.asarray(values)
     if values.ndim == 1:
         return values[:, None]
@@ -251,7 +251,7 @@ def _columns(values):
 
 
 def _array(tensor):
-    """A tensor's memory as an array, (n,) of one column."""
+    """View a tensor's memory as an array, (n,) for one column."""
     values = tensor.cpu().numpy()
     if values.ndim == 2 and values.shape[1] == 1:
         return values[:, 0]

@@ -1,4 +1,4 @@
-"""Points as they pass in chunks, and the files or arrays that hold them."""
+"""Point clouds in chunks, and the files or arrays they come from."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ NOISE_CLASSES = (7, 18)  # low point (noise) and high noise: ASPRS LAS 1.4 R15, 
 
 @dataclass(frozen=True, repr=False)
 class PointCloud(Columns):
-    """One chunk of points.
+    """One chunk of a point cloud.
 
     Parameters
     ----------
@@ -35,7 +35,8 @@ class PointCloud(Columns):
         In the trajectory's time system. Units: s.
     intensity : (n,) array
     attributes : mapping
-        Further arrays (n,) or (n, k) by name, as ``classification``; they go where the points go.
+        Further arrays (n,) or (n, k) by name, such as ``classification``; they stay with the
+        points.
     """
 
     xyz: np.ndarray
@@ -51,7 +52,7 @@ class PointCloud(Columns):
         intensity: ArrayLike | None = None,
         attributes: Mapping[str, ArrayLike] | None = None,
     ) -> PointCloud:
-        """Make a cloud of arrays, which are checked and, where their types allow, not copied.
+        """Make a cloud from arrays, which are checked and, where their types allow, not copied.
 
         Parameters
         ----------
@@ -60,19 +61,19 @@ class PointCloud(Columns):
         gps_time : (n,) array
             In the trajectory's time system. Units: s.
         intensity : (n,) array, optional
-            Zero by default: then targets are found by their edges alone.
+            Zero by default; targets are then found by their edges only.
         attributes : mapping, optional
             Further arrays (n,) or (n, k) by name.
 
         Returns
         -------
         PointCloud
-            Warns where float32 has rounded coordinates by more than the noise of a LAS file.
+            Warns if float32 rounded the coordinates by more than a LAS file does.
 
         Raises
         ------
         ValueError
-            For arrays of other shapes or unlike lengths, and values that are not finite.
+            If shapes or lengths do not match, or values are not finite.
 
         >>> import numpy as np
         >>> from mlscorr.survey import PointCloud
@@ -93,15 +94,15 @@ class PointCloud(Columns):
         return cloud
 
     def to_open3d(self, origin: ArrayLike | None = None) -> Any:
-        """The cloud as Open3D's tensor geometry, about an origin that travels with it.
+        """Convert the cloud to an Open3D tensor geometry, about an origin stored with it.
 
         ``gps_time``, ``intensity`` and further attributes share the memory of this cloud.
 
         Parameters
         ----------
         origin : (3,) array, optional
-            From which ``positions`` count, float64; a whole meter near the middle by default. The
-            geometry's attribute ``origin`` has it. Units: m.
+            Reference of ``positions``, float64; by default a whole meter near the middle. The
+            geometry stores it as the attribute ``origin``. Units: m.
 
         Returns
         -------
@@ -110,7 +111,7 @@ class PointCloud(Columns):
         Raises
         ------
         ValueError
-            For an origin that is no place, and attributes with names or types that can't be kept.
+            If the origin is not finite, or an attribute has a reserved name or an unsupported type.
 
         >>> import numpy as np
         >>> from mlscorr.survey import PointCloud
@@ -128,25 +129,25 @@ class PointCloud(Columns):
 
     @classmethod
     def from_open3d(cls, cloud: Any, origin: ArrayLike | None = None) -> PointCloud:
-        """Make a cloud of Open3D's tensor geometry.
+        """Make a cloud from an Open3D tensor geometry.
 
         Parameters
         ----------
         cloud : open3d.t.geometry.PointCloud
             With the point attribute ``gps_time`` (s); ``intensity`` and others are kept.
         origin : (3,) array, optional
-            From which its positions count; its attribute ``origin`` by default, and without one
-            the positions are taken as map coordinates. Units: m.
+            Reference of its positions; by default its attribute ``origin``. Without either,
+            positions are map coordinates. Units: m.
 
         Returns
         -------
         PointCloud
-            Warns where float32 has rounded coordinates.
+            Warns if float32 rounded the coordinates.
 
         Raises
         ------
         ValueError
-            Without gps_time or positions, and for values that are not finite.
+            If gps_time or positions are missing, or values are not finite.
         """
         place = None if origin is None else np.asarray(origin, float)
         xyz, columns = _open3d.geometry_columns(cloud, place)
@@ -162,21 +163,21 @@ class PointCloud(Columns):
         return cls.from_arrays(xyz, times, columns.pop("intensity", None), columns)
 
     def plot(self) -> Figure:
-        """The cloud from above, coloured by intensity; of many points every k-th."""
+        """Plot the cloud from above, colored by intensity; large clouds are thinned."""
         from mlscorr.survey._figure import cloud_figure
 
         return cloud_figure(self.xyz, self.intensity)
 
 
 class Correcting(Protocol):
-    """Anything that moves points is a correction, a baseline too."""
+    """Protocol of everything that corrects points: a correction or a baseline."""
 
     def apply(self, cloud: PointCloud) -> PointCloud:
-        """The PointCloud, corrected."""
+        """Return the corrected PointCloud."""
 
 
 def _require_numbers(what, is_number):
-    """Refuse points that have something that is not a number."""
+    """Refuse points with values that are not numbers."""
     bad = np.flatnonzero(~is_number)
     if len(bad):
         raise ValueError(
@@ -186,7 +187,7 @@ def _require_numbers(what, is_number):
 
 
 def _warn_of_rounding(xyz):
-    """Warn where float32 coordinates are rounded by more than those of a LAS file."""
+    """Warn if float32 coordinates are rounded by more than those of a LAS file."""
     if xyz.dtype != np.float32 or len(xyz) == 0:
         return
     largest = np.abs(xyz).max()
@@ -202,23 +203,23 @@ def _warn_of_rounding(xyz):
 
 @dataclass(frozen=True)
 class CloudFile:
-    """A LAS or LAZ file, or the points in it that one of several scanners measured.
+    """LAS or LAZ file, or the part of one that a single scanner measured.
 
     Parameters
     ----------
     path : Path
     points : int
-        Of the file, or of these.
+        Number of points in the file, or in this part.
     time_constant : float
-        Added to the file's gps_time, it gives the trajectory's. Units: s.
+        Added to the file's gps_time to get the trajectory's time. Units: s.
     time_system : str
     point_source_ids : tuple of int, optional
-        Of the points; without it all of the file.
+        IDs of the points in this part; all points by default.
     new_week : float
-        Times of the file below it are of the week after that of the others, as its seconds of
-        week start again. Units: s.
+        Times of the file below it belong to the following week, because seconds of week restart.
+        Units: s.
     noise_classes : tuple of int
-        Classes whose points take no part in a measurement, as withheld points take none.
+        Classes whose points are not used in measurements; withheld points are not used either.
     """
 
     path: Path
@@ -231,13 +232,13 @@ class CloudFile:
 
     @property
     def name(self) -> str:
-        """Of the file, with the ids of the points."""
+        """Name of the file, with the IDs of the points."""
         if self.point_source_ids is None:
             return self.path.name
         return f"{self.path.name} (point_source_id {', '.join(map(str, self.point_source_ids))})"
 
     def rows(self, point_source_id: np.ndarray) -> np.ndarray | slice:
-        """Which points are among these: (n,) bool, or a slice of all.
+        """Select the points of this part: (n,) bool, or a slice of all.
 
         Parameters
         ----------
@@ -249,12 +250,12 @@ class CloudFile:
         return np.isin(point_source_id, self.point_source_ids)
 
     def counted(self, gps_time: np.ndarray) -> np.ndarray:
-        """Times (n,) of the file that count on where its seconds of week start again. Units: s.
+        """Return file times (n,) that keep increasing where seconds of week restart. Units: s.
 
         Parameters
         ----------
         gps_time : (n,) array
-            As the file has them. Units: s.
+            As in the file. Units: s.
         """
         return counted_on(gps_time, self.new_week)
 
@@ -264,19 +265,19 @@ class CloudFile:
         Parameters
         ----------
         gps_time : (n,) array
-            As the file has them. Units: s.
+            As in the file. Units: s.
         """
         return self.counted(gps_time) + self.time_constant
 
 
 @dataclass(frozen=True)
 class CloudInMemory(CloudFile):
-    """Points in memory, which stand for a file: ``path`` is the name of what would be written.
+    """Points in memory that act as a file; ``path`` is the name of the file to write.
 
     Parameters
     ----------
     cloud : PointCloud
-        Two of one name are taken as the same.
+        Two clouds with the same name are treated as the same.
     crs : str, optional
     """
 
@@ -284,14 +285,14 @@ class CloudInMemory(CloudFile):
     crs: str | None = None
 
     def chunks(self, size: int, first: int = 0, end: int | None = None) -> Iterator[PointCloud]:
-        """Points in their order, without a copy.
+        """Yield the points in order, without copying.
 
         Parameters
         ----------
         size : int
-            Points at a time.
+            Points in a chunk.
         first, end : int
-            Numbers of the points at which to start, and to end before.
+            Index of the first point, and of the point after the last.
         """
         assert self.cloud is not None
         end = self.points if end is None else min(end, self.points)
@@ -300,14 +301,14 @@ class CloudInMemory(CloudFile):
 
 
 def counted_on(gps_time: np.ndarray, new_week: float) -> np.ndarray:
-    """Times (n,) to which a week is added where they lie below a limit. Units: s.
+    """Return times (n,), with a week added to those below a limit. Units: s.
 
     Parameters
     ----------
     gps_time : (n,) array
         Units: s.
     new_week : float
-        Infinite below zero where no week ends. Units: s.
+        Minus infinity if no week ends. Units: s.
     """
     if new_week == -np.inf:
         return gps_time

@@ -1,4 +1,4 @@
-"""Records whose fields are columns, one row for each of n things; as data frames of pandas, too.
+"""Records whose fields are columns with one row for each of n items; also as pandas data frames.
 
 pandas is loaded only for a data frame.
 """
@@ -20,9 +20,9 @@ AXES = ("easting", "northing", "height")
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """What dataclasses of arrays (n, ...), tuples of n, mappings of these and Columns share.
+    """Base of dataclasses with columns: arrays (n, ...), tuples of n, mappings of these, Columns.
 
-    Numbers among their fields hold for all rows. Raises ValueError for columns of unlike lengths.
+    Scalar fields apply to all rows. Raises ValueError if columns differ in length.
     """
 
     def __post_init__(self):
@@ -35,28 +35,28 @@ class Columns:
         return len(getattr(self, fields(self)[0].name))
 
     def __getitem__(self, rows) -> Self:
-        """Some rows: bool (n,), numbers (k,), or a slice, which gives views."""
+        """Select rows by bool (n,), indices (k,), or a slice, which gives views."""
         return type(self)(*(_selected(getattr(self, field.name), rows) for field in fields(self)))
 
     def to_frame(self) -> pandas.DataFrame:
-        """A data frame with a row each, vectors in three columns; pandas is needed for it."""
+        """Return a data frame with one row each, vectors in three columns; requires pandas."""
         return columns_frame(_named_columns(self))
 
     @classmethod
     def concatenate(cls, parts: Iterable[Self]) -> Self:
-        """All rows of some records, in their order."""
+        """Concatenate the rows of several records in order."""
         names = [field.name for field in fields(cls)]
         columns = zip(*([getattr(part, name) for name in names] for part in parts), strict=True)
         return cls(*map(_joined, columns))
 
 
 def check_lengths(record: Any) -> None:
-    """Refuse a record whose columns have unlike numbers of rows: one would borrow from another.
+    """Refuse a record whose columns have different numbers of rows.
 
     Parameters
     ----------
     record : dataclass
-        Fields that are no columns take no part.
+        Fields that are not columns are ignored.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def _joined(columns):
         return sum(columns, ())
     if isinstance(columns[0], Columns):
         return type(columns[0]).concatenate(columns)
-    if isinstance(columns[0], Mapping):  # what all of them have
+    if isinstance(columns[0], Mapping):  # the keys that all of them have
         shared = [name for name in columns[0] if all(name in others for others in columns)]
         return {name: np.concatenate([column[name] for column in columns]) for name in shared}
     return np.concatenate(columns)
@@ -100,7 +100,7 @@ def _selected(column, rows):
 
 
 def _named_columns(record):
-    """Name -> column, those of records among the fields with the field's name before."""
+    """Return columns by name; those of nested records get the field's name as prefix."""
     columns = {}
     for field in fields(record):
         value = getattr(record, field.name)
@@ -116,25 +116,25 @@ def _named_columns(record):
 
 
 def rows_frame(rows: Iterable[Mapping[str, Any]]) -> pandas.DataFrame:
-    """A data frame of a document's rows, with a column for each number of a vector.
+    """Make a data frame from a document's rows, with a column for each component of a vector.
 
     Parameters
     ----------
     rows : iterable of mapping
-        Vectors of three are E, N, H.
+        Vectors of length three are E, N, H.
 
     Raises
     ------
     ModuleNotFoundError
-        Without pandas; says the line that installs it.
+        If pandas is missing; the message has the command that installs it.
     """
     frame = _pandas().DataFrame([dict(_cells(row)) for row in rows])
-    # a vector that is not known is None in its row, and NaN in the columns that others have
+    # an unknown vector is None in its row, and NaN in the columns of the other rows
     return frame.drop(columns=[name for name in frame if f"{name}_{AXES[0]}" in frame])
 
 
 def columns_frame(columns: Mapping[str, Sequence | np.ndarray]) -> pandas.DataFrame:
-    """A data frame of columns, with one for each number of a vector or matrix.
+    """Make a data frame from columns, with one for each component of a vector or matrix.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def columns_frame(columns: Mapping[str, Sequence | np.ndarray]) -> pandas.DataFr
     Raises
     ------
     ModuleNotFoundError
-        As rows_frame.
+        See rows_frame.
     """
     parts = [part for name, column in columns.items() for part in _parts(name, column)]
     return _pandas().DataFrame(dict(parts))
@@ -161,7 +161,7 @@ def _pandas():
 
 
 def _cells(row: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
-    """Names and values of the columns of a row."""
+    """Yield names and values of the columns of a row."""
     for key, value in row.items():
         is_vector = isinstance(value, list | tuple) and len(value) == len(AXES)
         if is_vector:
@@ -175,7 +175,7 @@ def _cells(row: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]
 
 
 def _parts(name: str, column) -> Iterator[tuple[str, Any]]:
-    """Names and values (n,) of the columns of an array (n, ...)."""
+    """Yield names and values (n,) of the columns of an array (n, ...)."""
     if np.ndim(column) < 2:
         yield name, column
         return

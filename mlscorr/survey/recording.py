@@ -1,4 +1,4 @@
-"""A survey as it was recorded, and what is believed of its instruments where no file says it."""
+"""A survey as recorded, and the assumed accuracies of its instruments where no file states them."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ SEARCH_RADIUS = 10.0  # m; a lone GNSS receiver errs by 8 m (GPS SPS 2020, 95 %)
 
 @dataclass(frozen=True)
 class Assumption:
-    """An accuracy that nobody stated: a default stands in for it, and nothing is judged by it.
+    """Accuracy that nobody stated: a default is used, and no test relies on it.
 
     Parameters
     ----------
     key : str
-        By which survey.toml states it, as ``pos.position_sigma``.
+        Key of survey.toml that states it, such as ``pos.position_sigma``.
     value : float or tuple of float
         The default.
     unit : str
-        As survey.toml has it.
+        Unit used in survey.toml.
     """
 
     key: str
@@ -43,7 +43,7 @@ class Assumption:
 
 @dataclass(frozen=True)
 class Scanner:
-    """What is believed of the scanner.
+    """Assumed properties of a scanner.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class Scanner:
         One sigma. Units: rad.
     lines_per_second : float
     assumed : tuple of str
-        Names of the noises that nobody stated.
+        Names of the noise values that nobody stated.
 
     >>> from mlscorr.survey import Scanner
     >>> Scanner(range_noise=0.003, lines_per_second=200.0).range_noise
@@ -68,7 +68,7 @@ class Scanner:
 
 @dataclass(frozen=True)
 class Pos:
-    """What is believed of the POS where the trajectory has no sigma columns.
+    """Assumed accuracy of the POS, used if the trajectory has no sigma columns.
 
     Parameters
     ----------
@@ -79,10 +79,10 @@ class Pos:
     correlation_time : float
         Units: s.
     windows : tuple of (start, length, factor, shape)
-        Times (s) in which the position has a further error, as without GNSS, of at most factor
-        sigmas; shape ``rise`` grows to the end, ``hump`` to the middle.
+        Intervals (s) with an additional position error, as in a GNSS outage, of at most factor
+        sigmas. Shape ``rise`` grows toward the end, ``hump`` toward the middle.
     assumed : tuple of str
-        Names of those that nobody stated.
+        Names of the values that nobody stated.
 
     >>> from mlscorr.survey import Pos
     >>> Pos(position_sigma=0.05, correlation_time=60.0).correlation_time
@@ -100,12 +100,12 @@ class Pos:
 
 @dataclass(frozen=True)
 class InputFile:
-    """A file that was read.
+    """Input file and its state when it was read.
 
     Parameters
     ----------
     what : str
-        What it is, in words.
+        Description of the file.
     path : Path
     state : tuple of int or str
         Size (bytes), time of change (ns; a store's ETag) and digest of both ends when its reading
@@ -119,7 +119,7 @@ class InputFile:
 
 @dataclass(frozen=True)
 class ProjectNames:
-    """Names that head a report and a certificate; empty where nobody gave one.
+    """Names for the head of a report and a certificate; empty if not given.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ class ProjectNames:
 
     @property
     def known(self) -> dict[str, str]:
-        """Those given but the title, by what they are, in the order of a title page."""
+        """Given names except the title, in the order of a title page."""
         names = {
             "Client": self.client,
             "Project": self.project,
@@ -158,7 +158,7 @@ class MountedScanner:
     scanner : Scanner
     mounting : Mounting or None
     clouds : tuple of CloudFile
-        Those that it wrote.
+        Files of this scanner.
     """
 
     name: str
@@ -169,7 +169,7 @@ class MountedScanner:
 
 @dataclass(frozen=True, repr=False)
 class Survey(Summary):
-    """One mobile survey as it was recorded: cloud files, trajectory, mounting, control, beliefs.
+    """One mobile survey as recorded: clouds, trajectory, mounting, control and assumed accuracies.
 
     Parameters
     ----------
@@ -180,39 +180,39 @@ class Survey(Summary):
     clouds : tuple of CloudFile
     trajectory : Trajectory
     mounting : Mounting or None
-        Of the one scanner; None where there are several.
+        Mounting of a single scanner; None if there are several.
     control, check : ControlPoints
-        Those that take part in an estimate, and those that never do.
+        Points used in the estimate, and independent points that never are.
     scanner : Scanner
-        Of the one; whatever it says where there are several.
+        The single scanner; ignored if there are several.
     pos : Pos
     reference : Path, optional
         A reference surface in the cloud's coordinates.
     search_radius : float
-        How far from its surveyed point a target may lie in the cloud. Units: m.
+        Largest distance of a target in the cloud from its surveyed point. Units: m.
     use_ties : bool
-        Whether a correction may use what two passes both saw.
+        True if a correction may use tie features in overlaps.
     notes : tuple of str
-        What the readers worked out, for the report.
+        Findings of the readers, for the report.
     layouts : tuple of str
-        Those of the notes that say how tables of others were understood.
+        Notes on how foreign tables were interpreted.
     inputs : tuple of InputFile
         survey.toml and every file that it names.
     scanners : tuple of MountedScanner
-        Where there are several; each cloud file is of one of them, and a file with the points of
-        several is among the clouds once for each.
+        Given if there are several. Each cloud file belongs to one of them; a file with points of
+        several appears once for each.
     corrected_by : tuple of str
-        Names of the control points by which the trajectory, and the clouds, were corrected before.
+        Names of the control points used in an earlier correction of trajectory and clouds.
     is_remounted : bool
-        Whether a calibration changed the mounting, and the clouds are as it was recorded before.
+        True if a calibration changed the mounting while the clouds still follow the recorded one.
     project : ProjectNames
     beam_origin : (3,) array, optional
-        Where the beams come from in body axes, as the cloud shows it, where no mounting is given.
-        Units: m.
+        Origin of the beams in body axes, estimated from the cloud if no mounting is given. Units:
+        m.
     excluded : ControlPoints
-        Control points that the user keeps out of the estimate.
+        Control points that the user excluded from the estimate.
     included : tuple of str
-        Names of the control points that are used whatever the tests say of them.
+        Names of the control points that are used regardless of the tests.
     """
 
     name: str
@@ -254,36 +254,37 @@ class Survey(Summary):
         search_radius: float = SEARCH_RADIUS,
         use_ties: bool = True,
     ) -> Survey:
-        """Make a survey of what is in memory, without a file.
+        """Make a survey from data in memory, without files.
 
         Parameters
         ----------
         clouds : PointCloud, or a sequence of them
-            Each stands for a file. Or arrays: (xyz, gps_time) or (xyz, gps_time, intensity).
+            Each acts as a file. Or arrays: (xyz, gps_time) or (xyz, gps_time, intensity).
         trajectory : Trajectory
         control : ControlPoints
         check : ControlPoints, optional
-            They take part in no estimate.
+            Independent points, not used in any estimate.
         mounting : Mounting, optional
-            Scanner to body; a correction does without, a calibration does not.
+            Scanner to body; needed by a calibration, optional for a correction.
         crs : str, optional
-            As ``EPSG:32650``.
+            For example ``EPSG:32650``.
         name : str
         scanner, pos : Scanner, Pos, optional
-            What is assumed of them.
+            Assumed accuracies.
         search_radius : float
-            How far from its surveyed place a target may lie. Units: m.
+            Largest distance of a target from its surveyed position. Units: m.
         use_ties : bool
 
         Returns
         -------
         Survey
-            For every command that takes one; ``write`` of a result makes LAZ files of its clouds.
+            Accepted by every command; the ``write`` method of a result makes LAZ files of its
+            clouds.
 
         Raises
         ------
         ValueError
-            For clouds without points, of which none was measured within the trajectory, and as
+            If a cloud is empty or has no point within the trajectory; see also
             ``PointCloud.from_arrays``.
 
         >>> import numpy as np
@@ -330,30 +331,30 @@ class Survey(Summary):
 
     @cached_property
     def surveyed(self) -> ControlPoints:
-        """Control points, check points, and those that are excluded, in this order."""
+        """Control points, check points and excluded points, in this order."""
         return self.control + self.check + self.excluded
 
     def choosing(self, exclude: Collection[str] = (), include: Collection[str] = ()) -> Survey:
-        """The survey with some control points kept out of the estimate, and others kept in it.
+        """Return the survey with some control points excluded and others used in any case.
 
         Parameters
         ----------
         exclude : collection of str
-            Names of control points that take no part; their residuals are reported.
+            Names of control points to exclude; their residuals are reported.
         include : collection of str
-            Names of control points that are used though matching or the other points contradict
-            them; those that were excluded before are used again.
+            Names of control points to use even if matching or the other points contradict them,
+            including points excluded before.
 
         Raises
         ------
         ValueError
-            For a name that is no control point, with the nearest, and one that is given as both.
+            If a name is not a control point (with the most similar name), or is given in both.
         """
         return choosing(self, exclude, include)
 
     @property
     def cloud_paths(self) -> tuple[Path, ...]:
-        """Of the cloud files, each once."""
+        """Paths of the cloud files, each once."""
         return tuple(dict.fromkeys(file.path for file in self.clouds))
 
     @property
@@ -362,7 +363,7 @@ class Survey(Summary):
         return sum(file.points for file in self.clouds)
 
     def _overview(self):
-        """What a notebook shows."""
+        """Return the rows that a notebook shows."""
         start, end = self.trajectory.gps_time[[0, -1]]
         gaps = len(self.trajectory.gaps)
         driven = f"{len(self.trajectory)} epochs, {start:.1f} to {end:.1f} s, gaps {gaps}"
@@ -397,12 +398,12 @@ class Survey(Summary):
 
     @property
     def has_assumed_position(self) -> bool:
-        """Whether a default stands in for the sigma of the POS's position."""
+        """True if a default replaces the sigma of the POS position."""
         return any(row.key == "pos.position_sigma" for row in self.assumed_pos)
 
     @property
     def assumed_scanner(self) -> tuple[Assumption, ...]:
-        """Noises of the one scanner that survey.toml does not state."""
+        """Noise values of the single scanner that survey.toml does not state."""
         scanner = self.scanner
         angle = float(np.degrees(scanner.angle_noise).round(9))
         defaults = {"range_noise": (scanner.range_noise, "m"), "angle_noise": (angle, "deg")}
@@ -414,8 +415,10 @@ class Survey(Summary):
 
     @property
     def assumed_mounting(self) -> Mounting:
-        """The mounting; where none is known, beams are in body axes from where they show it, or
-        else from the navigation centre.
+        """Mounting, or an assumed one if none is known.
+
+        Assumed are body axes at the beam origin estimated from the cloud, or else at the navigation
+        center.
         """
         if self.beam_origin is None:
             origin = np.zeros(3)
@@ -425,9 +428,9 @@ class Survey(Summary):
 
     @cached_property
     def by_scanner(self) -> dict[str, Survey]:
-        """The survey of each scanner by its name, with its files, mounting and prior.
+        """Survey of each scanner by its name, with its files, mounting and prior.
 
-        The survey itself, without a name, where there is one scanner.
+        With one scanner: the survey itself, under an empty name.
         """
         parts = {
             mounted.name: replace(self, **vars(mounted) | {"name": self.name, "scanners": ()})
@@ -436,7 +439,7 @@ class Survey(Summary):
         return parts or {"": self}
 
     def of(self, file: CloudFile) -> Survey:
-        """The survey of the scanner that wrote a file.
+        """Return the survey of the scanner that wrote a file.
 
         Parameters
         ----------
@@ -446,11 +449,11 @@ class Survey(Summary):
 
     @property
     def mountings(self) -> tuple[Mounting | None, ...]:
-        """Of each scanner."""
+        """Mounting of each scanner."""
         return tuple(part.mounting for part in self.by_scanner.values())
 
     def with_mountings(self, mountings: Iterable[Mounting]) -> Survey:
-        """The same with another mounting of each scanner.
+        """Return the survey with another mounting for each scanner.
 
         Parameters
         ----------
@@ -463,19 +466,19 @@ class Survey(Summary):
 
     @cached_property
     def scanner_numbers(self) -> np.ndarray:
-        """Number of the scanner of each cloud file, from 0."""
+        """Index of the scanner of each cloud file, from 0."""
         numbers = np.zeros(len(self.clouds), int)
         for number, part in enumerate(self.by_scanner.values()):
             numbers[[self.clouds.index(file) for file in part.clouds]] = number
         return numbers
 
     def rows_by_scanner(self, scanner: np.ndarray) -> Iterator[tuple[Survey, np.ndarray | slice]]:
-        """The survey of each scanner, and which rows it saw.
+        """Yield the survey of each scanner, and the rows it measured.
 
         Parameters
         ----------
         scanner : (n,) int array
-            Number of the scanner of each row, from 0.
+            Index of the scanner of each row, from 0.
 
         Yields
         ------
@@ -489,17 +492,17 @@ class Survey(Summary):
             yield part, rows
 
     def check_one_scanner(self, verb: str) -> None:
-        """Refuse several scanners, for what rests on one mounting.
+        """Refuse surveys with several scanners, for steps that rest on one mounting.
 
         Parameters
         ----------
         verb : str
-            What does.
+            Verb of the step, for the message.
 
         Raises
         ------
         ValueError
-            Names them, and the way out.
+            If there are several; the message names them and the remedy.
         """
         if self.scanners:
             names = ", ".join(mounted.name for mounted in self.scanners)
@@ -511,7 +514,7 @@ class Survey(Summary):
 
 
 def _clouds_of(clouds):
-    """A list of PointClouds, from one, several or arrays."""
+    """Return a list of PointClouds from one, several or arrays."""
     if isinstance(clouds, PointCloud):
         parts = [clouds]
     elif all(isinstance(part, PointCloud) for part in clouds):
@@ -524,21 +527,21 @@ def _clouds_of(clouds):
 
 
 class SurveyFileError(ValueError):
-    """What survey.toml says or leaves out is at fault, though only the data or the work show it."""
+    """Fault in survey.toml that only the data or the processing reveal."""
 
 
 def check_survey(value: object) -> None:
-    """Refuse what is no survey, as the path of one.
+    """Refuse a value that is not a survey, such as its path.
 
     Parameters
     ----------
     value : object
-        Given where a Survey belongs.
+        Passed in place of a Survey.
 
     Raises
     ------
     TypeError
-        With the way out.
+        With the remedy.
     """
     if not isinstance(value, Survey):
         raise TypeError(
@@ -548,17 +551,17 @@ def check_survey(value: object) -> None:
 
 
 def check_rng(value: object) -> None:
-    """Refuse what is no random generator, as a seed.
+    """Refuse a value that is not a random generator, such as a seed.
 
     Parameters
     ----------
     value : object
-        Given as rng.
+        Passed as rng.
 
     Raises
     ------
     ValueError
-        With the way out.
+        With the remedy.
     """
     if not isinstance(value, np.random.Generator):
         raise ValueError(

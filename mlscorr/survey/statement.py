@@ -1,4 +1,4 @@
-"""Statement on a survey as a value: code compares its key, and readers get its sentence."""
+"""Statement on a survey as a value: code compares its key, readers get its sentence."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -10,12 +10,12 @@ Wording = str | Callable[..., str]  # with the names of values in braces, or a f
 
 @dataclass(frozen=True)
 class Statement:
-    """A fact, a doubt, a fault or an advice, before anyone words it.
+    """Fact, doubt, fault or advice, before it is worded.
 
     Parameters
     ----------
     key : str
-        What it is, in a few words; each room lists its own.
+        Identifier in a few words; each package lists its own.
     severity : str
         ``note``, ``warning`` (something may be wrong) or ``fault`` (something is).
     values : mapping
@@ -27,7 +27,7 @@ class Statement:
     values: Mapping[str, Any] = field(default_factory=dict, hash=False)
 
     def sentence(self, wordings: Mapping[str, Wording]) -> str:
-        """The sentence by the wordings of a room.
+        """Return the sentence, by the wordings of a package.
 
         Parameters
         ----------
@@ -37,7 +37,7 @@ class Statement:
         Raises
         ------
         KeyError
-            Where the room has none for the key.
+            If there is no wording for the key.
 
         >>> Statement("no target", values={"name": "T07"}).sentence(
         ...     {"no target": "{name} was not found."}

@@ -1,4 +1,4 @@
-"""What a notebook shows of a value: a line or a short table, not its millions of numbers."""
+"""Display of values in a notebook: a line or a short table instead of millions of numbers."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import Field, fields, is_dataclass
@@ -11,7 +11,7 @@ LONGEST = 60  # characters of a field: three of them fill a line of a notebook
 
 
 class Summary:
-    """Dataclasses (``repr=False``) whose repr has the sizes of arrays, not their numbers.
+    """Dataclasses (``repr=False``) whose repr shows the sizes of arrays, not their numbers.
 
     >>> import numpy as np
     >>> from mlscorr.frames import attitude_from_angles
@@ -38,15 +38,16 @@ position_sigma=None, attitude_sigma=None, session=None, scanned=None, weeks=None
         return html_table(type(self).__name__, rows)
 
     def _overview(self) -> Iterable[Sequence[object]] | None:
-        """Rows of a table for terminal and notebook; those of one cell are sentences.
+        """Rows of a table for terminal and notebook; a row of one cell is a sentence.
 
-        None where the fields say it.
+        None if the fields are shown instead.
+
         """
         return None
 
 
 def _short(value):
-    """A field's value in a few words."""
+    """Describe a field's value in a few words."""
     if isinstance(value, np.ndarray):
         if value.size > 3:
             return f"array {value.shape}"
@@ -62,13 +63,13 @@ def _short(value):
 
 
 def text_table(caption: str, rows: Iterable[Sequence[object]]) -> str:
-    """A table in plain text, below its caption.
+    """Format a table as plain text, below its caption.
 
     Parameters
     ----------
     caption : str
     rows : iterable of sequences
-        One cell alone is a sentence, and takes no part in the widths of columns.
+        A row of one cell is a sentence and does not affect the widths of columns.
 
     >>> print(text_table("Survey", [("street",), ("points", 12), ("crs", "EPSG:32650")]))
     Survey
@@ -93,13 +94,13 @@ def text_table(caption: str, rows: Iterable[Sequence[object]]) -> str:
 
 
 def html_table(caption: str, rows: Iterable[Sequence[object]]) -> str:
-    """A table in HTML, with all that comes from files escaped.
+    """Format a table as HTML, escaping all text that comes from files.
 
     Parameters
     ----------
     caption : str
     rows : iterable of sequences
-        One cell alone covers the columns of the others.
+        A row of one cell spans all columns.
 
     >>> html_table("Survey", [("name", "A & B")])
     '<table><caption>Survey</caption><tr><td>name</td><td>A &amp; B</td></tr></table>'

@@ -1,4 +1,4 @@
-"""Targets: as they were surveyed, as they were observed, and both together."""
+"""Targets: as surveyed, as observed, and both together."""
 
 from __future__ import annotations
 
@@ -29,11 +29,12 @@ class ControlPoints(Columns):
     kind : tuple of n str
         ``circle`` (bright disc or ring; size is its diameter), ``square`` (bright plate; its edge),
         ``hole`` (circular, in a board; its diameter), ``checkerboard`` (two white and two black
-        quadrants; the edge of all four) or ``board`` (plain plate, told by its edges; its edge).
+        quadrants; the edge of all four) or ``board`` (plain plate, recognized by its edges; its
+        edge).
     size : (n,) array
         Units: m.
     normal : (n, 3) array
-        Unit normal of the target's plane; NaN where it was not surveyed.
+        Unit normal of the target's plane; NaN if it was not surveyed.
     """
 
     name: tuple[str, ...]
@@ -53,12 +54,12 @@ class ControlPoints(Columns):
         size: ArrayLike,
         normal: ArrayLike | None = None,
     ) -> ControlPoints:
-        """Make surveyed points of arrays; what all of them share may be given once.
+        """Make surveyed points from arrays; a value that all of them share may be given once.
 
         Parameters
         ----------
         name : sequence of n str
-            Each different.
+            Unique names.
         position : (n, 3) array
             E, N, H. Units: m.
         sigma : (n, 3) or (3,) array
@@ -68,13 +69,12 @@ class ControlPoints(Columns):
         size : (n,) array or float
             Diameter or edge. Units: m.
         normal : (n, 3) array, optional
-            Unit normals of the targets' planes, where they were surveyed.
+            Unit normals of the targets' planes, if surveyed.
 
         Raises
         ------
         ValueError
-            For arrays of unlike lengths, values that are not finite, names that stand twice, and
-            kinds that are none.
+            If lengths differ, values are not finite, a name is repeated or a kind is unknown.
 
         >>> from mlscorr.survey import ControlPoints
         >>> place = [[532_000.0, 3_374_000.0, 42.0], [532_040.0, 3_374_003.0, 42.1]]
@@ -109,7 +109,7 @@ class ControlPoints(Columns):
 
     @classmethod
     def none(cls) -> ControlPoints:
-        """No point at all."""
+        """Empty set of points."""
         vectors = np.empty((0, 3))
         return cls((), vectors, vectors, (), np.empty(0), vectors)
 
@@ -118,12 +118,12 @@ class ControlPoints(Columns):
         return {name: row for row, name in reversed(list(enumerate(self.name)))}
 
     def rows(self, names: tuple[str, ...] | list[str]) -> np.ndarray:
-        """Rows (k,) of the points with these names.
+        """Row numbers (k,) of the points with these names.
 
         Raises
         ------
         KeyError
-            For a name that is none.
+            If there is no point with a name.
         """
         return np.array([self._row_of[name] for name in names], dtype=int)
 
@@ -138,13 +138,13 @@ class TargetObservations(Columns):
     Parameters
     ----------
     name : tuple of n (str or None)
-        The control point that it was matched to.
+        Matched control point.
     pass_number : (n,) int array
-        Passes count from 1 in time.
+        Passes are numbered from 1 in order of time.
     gps_time : (n,) array
         Units: s.
     position : (n, 3) array
-        Observed centre. Units: m.
+        Observed center. Units: m.
     covariance : (n, 3, 3) array
         Units: m^2.
     normal : (n, 3) array
@@ -168,15 +168,15 @@ class TargetObservations(Columns):
 
 @dataclass(frozen=True, repr=False)
 class Matched(Columns):
-    """Observations with the surveyed points that they are, both with n rows.
+    """Observations and their surveyed points, both with n rows.
 
     Parameters
     ----------
     observations : TargetObservations
     surveyed : ControlPoints
-        The point of each observation; one that was observed twice stands twice.
+        Point of each observation, repeated for each further observation.
     scanner : (n,) int array, optional
-        Number of the scanner of each observation, from 0; zero by default.
+        Index of the scanner of each observation, from 0; zero by default.
     """
 
     observations: TargetObservations
@@ -190,18 +190,18 @@ class Matched(Columns):
 
     @classmethod
     def by_name(cls, observations: TargetObservations, points: ControlPoints) -> Matched:
-        """Each observation with the point of its name.
+        """Pair each observation with the point of its name.
 
         Raises
         ------
         KeyError
-            Where there is none.
+            If there is no such point.
         """
         return cls(observations, points[points.rows(observations.name)])
 
     @classmethod
     def none(cls) -> Matched:
-        """No observation at all."""
+        """Empty set of observations."""
         empty = np.empty(0)
         vectors = np.empty((0, 3))
         points = ControlPoints.none()
@@ -223,16 +223,16 @@ class Matched(Columns):
 
     @property
     def misclosure(self) -> np.ndarray:
-        """Surveyed - observed (n, 3) in m, which must be added to the cloud."""
+        """Surveyed - observed (n, 3) in m, to be added to the cloud."""
         return self.surveyed.position - self.observations.position
 
     @property
     def variance(self) -> np.ndarray:
-        """Variance of the misclosure (n, 3) in m^2 by survey and extraction  (Eq. 19)."""
+        """Variance of the misclosure (n, 3) in m^2 from survey and extraction  (Eq. 19)."""
         return self.surveyed.sigma**2 + np.einsum("nii->ni", self.observations.covariance)
 
     @property
     def point_number(self) -> np.ndarray:
-        """Number (n,) of each observation's surveyed point, from 0, in order of appearance."""
+        """Index (n,) of each observation's surveyed point, from 0, in order of appearance."""
         number = {name: i for i, name in enumerate(dict.fromkeys(self.name))}
         return np.array([number[name] for name in self.name], dtype=int)

@@ -1,4 +1,4 @@
-"""What passes saw of the street itself: planes, poles and paint, and which are the same thing."""
+"""Tie features of the street itself (planes, poles, paint), and ties between passes."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from mlscorr.survey.columns import Columns
 
 PAINTED = ("line", "dash")  # on the road
 TIE_KINDS = ("plane", "pole", *PAINTED)  # of features
-PAUSE = 10.0  # s between two visits of one pass: until then the POS error is about one
+PAUSE = 10.0  # s between two visits of one pass; within it the POS error is nearly constant
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TieFeatures(Columns):
-    """Planes, poles and paint as each pass saw them, a metre and a second of it in a row.
+    """Planes, poles and paint as observed in each pass; a row covers about a meter and a second.
 
     Parameters
     ----------
     pass_number : (n,) int array
-        Passes count from 1 in time.
+        Passes are numbered from 1 in order of time.
     scanner : (n,) int array
-        Number of the scanner, from 0.
+        Index of the scanner, from 0.
     kind : (n,) str array
         Of TIE_KINDS.
     gps_time : (n,) array
@@ -30,19 +30,20 @@ class TieFeatures(Columns):
     centre : (n, 3) array
         Mean of the points; of a dash, midway between its ends. Units: m.
     direction : (n, 3) array
-        Unit normal of a plane, towards the scanner; axis of a pole, upwards; level, across a
-        painted line or along a dash, either way.
+        Unit normal of a plane, toward the scanner; axis of a pole, upward; horizontal, across a
+        painted line or along a dash, with either sign.
     variance : (n,) array
-        Of the centre along the direction; of a pole, along any across the axis. Units: m^2.
+        Of the center along the direction; for a pole, along any direction across the axis. Units:
+        m^2.
     tilt : (n,) array
-        Variance of the direction about either axis across it. Units: rad^2.
+        Variance of the direction about each perpendicular axis. Units: rad^2.
     extent : (n,) array
         One sigma of the points along a plane's narrow side, or along a pole or paint. Units: m.
     points : (n,) int array
-        Of paint, scan lines that cross it.
+        For paint, the number of scan lines that cross it.
     sweep : (n, 3) array
-        Gradient of the points' times over a plane, or along a pole: a line scanner on the move sees
-        one end before the other. Units: s/m.
+        Gradient of the points' times over a plane or along a pole, because a moving line scanner
+        reaches one end before the other. Units: s/m.
     """
 
     pass_number: np.ndarray
@@ -58,18 +59,18 @@ class TieFeatures(Columns):
     sweep: np.ndarray
 
     def time_beside(self, rows: np.ndarray, way: np.ndarray) -> np.ndarray:
-        """When points were seen that lie beside the centres of some features. Units: s.
+        """Times at which points near the centers of some features were measured. Units: s.
 
         Parameters
         ----------
         rows : int array
         way : (*rows.shape, 3) array
-            From each centre. Units: m.
+            Offset of the points from each center. Units: m.
 
         Returns
         -------
         array of the rows' shape
-            Not before the first or after the last feature of the pass.
+            Limited to the times of the first and last feature of the pass.
         """
         low, high = (span[self.pass_number] for span in time_spans(self.pass_number, self.gps_time))
         times = self.gps_time[rows] + np.einsum("...i,...i->...", self.sweep[rows], way)
@@ -78,18 +79,18 @@ class TieFeatures(Columns):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Ties(Columns):
-    """Things that were seen twice: scalar observations of what is wrong between both times.
+    """Ties: scalar observations of the difference in error between two views of a feature.
 
     n . (correction of place 1 at time 1 - correction of place 2 at time 2) = misclosure + noise. A
-    plane gives a row along its normal, a pole two rows across its axis, paint one along its
+    plane gives one row along its normal, a pole two rows across its axis, paint one along its
     direction.
 
     Parameters
     ----------
     gps_time : (n, 2) array
-        Of the earlier and the later view. Units: s.
+        Times of the earlier and the later view. Units: s.
     place : (n, 2, 3) array
-        Where both views are compared, as each recorded it: of one point of the thing. Units: m.
+        Point of the feature at which both views are compared, as each recorded it. Units: m.
     direction : (n, 3) array
         Unit vector n along which both are compared.
     misclosure : (n,) array
@@ -100,7 +101,7 @@ class Ties(Columns):
         Of TIE_KINDS.
     pass_number : (n, 2) int array
     scanner : (n, 2) int array
-        Numbers of the scanners, from 0.
+        Indices of the scanners, from 0.
     feature : (n, 2) int array
         Rows of both in the TieFeatures.
     """
@@ -124,25 +125,26 @@ class Ties(Columns):
         variance: np.ndarray,
         correction: np.ndarray | None = None,
     ) -> Ties:
-        """The ties of pairs of features along directions.
+        """Make the ties of pairs of features along directions.
 
         Parameters
         ----------
         features : TieFeatures
         pairs : (n, 2) int array
-            Rows of the features; a pole's pair stands twice.
+            Rows of the features; a pole's pair appears twice.
         direction : (n, 3) array
             Unit vectors.
         variance : (n,) array
             Units: m^2.
         correction : (m, 3) array, optional
-            What is missing at each feature: given it, both views are compared midway between their
-            centres, at the times when each saw that; else each at its own centre. Units: m.
+            Correction at each feature. With it, both views are compared midway between their
+            centers, at the times when each measured that point; otherwise each at its own center.
+            Units: m.
 
         Returns
         -------
         Ties
-            With the earlier view first, whatever the order in a pair.
+            The earlier view comes first, regardless of the order in a pair.
         """
         late = features.gps_time[pairs[:, 0]] > features.gps_time[pairs[:, 1]]
         pairs = np.where(late[:, None], pairs[:, ::-1], pairs)
@@ -171,13 +173,15 @@ class Ties(Columns):
 
     @property
     def is_of_visit(self) -> np.ndarray:
-        """Whether one scanner saw a thing twice at one visit, as one that spins does: (n,) bool."""
+        """Flags (n,) of ties of one scanner within one visit, as of a rotating one."""
         first, second = self.gps_time.T
         return (np.abs(second - first) <= PAUSE) & (self.scanner[:, 0] == self.scanner[:, 1])
 
 
 def _midway(features, pairs, place):
-    """Ways (n, 2, 3) from both places, along their planes or poles, to the middle between them."""
+    """Vectors (n, 2, 3) from both positions, along their planes or poles, to the middle between
+    them.
+    """
     way = place.mean(axis=1, keepdims=True) - place
     axis = features.direction[pairs]
     along = np.einsum("nvi,nvi->nv", axis, way)[:, :, None] * axis

@@ -1,4 +1,4 @@
-"""Where the POS was, and how the scanner stands on it."""
+"""Trajectory of the POS, and mounting of the scanner on it."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ if TYPE_CHECKING:
 Result = TypeVar("Result")
 ANGLES = ("roll", "pitch", "heading")
 GAP_FACTOR = 10.0  # a step longer than ten median steps is a gap
-SAME_EPOCH = 1.0  # s; closer together, two targets say the same of the POS
+SAME_EPOCH = 1.0  # s; control points closer in time give the same information on the POS
 
 
 @dataclass(frozen=True, repr=False)
 class Trajectory(Summary):
-    """Positions and attitudes of the POS navigation centre over time.
+    """Positions and attitudes of the POS navigation center over time.
 
     Parameters
     ----------
@@ -42,17 +42,17 @@ class Trajectory(Summary):
     position_sigma, attitude_sigma : (n, 3) array, optional
         One sigma of E, N, H (m) and of roll, pitch, heading (rad).
     session : (n,) int array, optional
-        Number of the session of the POS of each epoch, where steps alone don't part sessions.
+        Session number of each epoch, if time steps alone do not separate sessions.
     scanned : (n,) bool array, optional
-        Which epochs have points of the clouds about them, where somebody looked.
+        True for epochs near points of the clouds, if this was determined.
     weeks : (n,) int array, optional
-        Weeks that were added to the times of the file, whose seconds of week start again.
+        Weeks that were added to the times of the file, where seconds of week restart.
 
     Raises
     ------
     ValueError
-        For fewer than two epochs, columns of unlike lengths, times that do not increase, or values
-        that are not finite.
+        If there are fewer than two epochs, lengths differ, times do not increase or values are not
+        finite.
     """
 
     gps_time: np.ndarray
@@ -93,14 +93,14 @@ class Trajectory(Summary):
         position_sigma: ArrayLike | None = None,
         attitude_sigma: ArrayLike | None = None,
     ) -> Trajectory:
-        """Make a trajectory of arrays, angles in degrees as in trajectory.csv.
+        """Make a trajectory from arrays, with angles in degrees as in trajectory.csv.
 
         Parameters
         ----------
         gps_time : (n,) array
             Strictly increasing. Units: s.
         position : (n, 3) array
-            Easting, northing, height of the navigation centre. Units: m.
+            Easting, northing, height of the navigation center. Units: m.
         attitude : (n, 3) array
             Roll (right side down), pitch (nose up), heading (clockwise from grid north). Units:
             deg.
@@ -112,7 +112,7 @@ class Trajectory(Summary):
         Raises
         ------
         ValueError
-            As the class itself does.
+            See the class.
 
         >>> from mlscorr.survey import Trajectory
         >>> path = [[532_000.0, 3_374_000.0, 42.0], [532_001.0, 3_374_000.0, 42.0]]
@@ -142,18 +142,18 @@ class Trajectory(Summary):
         return cls(time, place, attitude_from_angles(*angles.T), *sigmas)
 
     def plot(self) -> Figure:
-        """The path from above, with a mark at its start."""
+        """Plot the path from above, with a mark at its start."""
         from mlscorr.survey._figure import path_figure
 
         return path_figure(self.position, self.line_pairs)
 
     def to_open3d(self, origin: ArrayLike | None = None) -> Any:
-        """The path as lines between epochs, broken at its gaps.
+        """Convert the path to lines between epochs, broken at its gaps.
 
         Parameters
         ----------
         origin : (3,) array, optional
-            As of ``PointCloud.to_open3d``.
+            See ``PointCloud.to_open3d``.
 
         Returns
         -------
@@ -163,7 +163,7 @@ class Trajectory(Summary):
         return line_geometry(self.position, self.line_pairs, place, {})
 
     def to_frame(self) -> pandas.DataFrame:
-        """A row for each epoch, angles in degrees, as trajectory.csv; pandas is needed for it."""
+        """Return a data frame with a row for each epoch, as in trajectory.csv; requires pandas."""
         angles = np.degrees(angles_from_attitude(self.attitude))
         columns = {"gps_time": self.gps_time}
         columns |= dict(zip(AXES, self.position.T, strict=True))
@@ -179,7 +179,7 @@ class Trajectory(Summary):
 
     @property
     def line_pairs(self) -> np.ndarray:
-        """Numbers (k, 2) of the epochs between which no gap lies."""
+        """Pairs of indices (k, 2) of consecutive epochs without a gap between them."""
         first = np.arange(len(self) - 1)
         first = first[~np.isin(self.gps_time[:-1], self.gaps[:, 0])]
         return np.column_stack([first, first + 1])
@@ -189,13 +189,13 @@ class Trajectory(Summary):
 
     @property
     def file_time(self) -> np.ndarray:
-        """Times (n,) in s as a file has them, whose seconds of week start again."""
+        """Times (n,) in s as in the file, where seconds of week restart."""
         if self.weeks is None:
             return self.gps_time
         return self.gps_time - WEEK * self.weeks
 
     def derived(self, function: Callable[[Trajectory], Result]) -> Result:
-        """Result of a function of this trajectory, worked out once: a trajectory never changes.
+        """Return a function's result for this trajectory, which is computed only once.
 
         Parameters
         ----------
@@ -210,14 +210,14 @@ class Trajectory(Summary):
         return {}
 
     def __getstate__(self):
-        """Its fields alone: whoever unpickles it works out anew what follows from them."""
+        """Return the fields only; derived values are computed again after unpickling."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @cached_property
     def gaps(self) -> np.ndarray:
         """Start and end (k, 2) in s of the steps longer than ten times the median step.
 
-        With sessions it is the median of each, and from one to the next is a gap, however short.
+        With sessions, the median is that of each, and every change of session is a gap.
         """
         steps = np.diff(self.gps_time)
         if self.session is None:
@@ -238,7 +238,7 @@ class Trajectory(Summary):
         return np.column_stack([starts, np.append(self.gaps[:, 0], self.gps_time[-1])])
 
     def segment(self, gps_time: ArrayLike) -> np.ndarray:
-        """Number of the gap-free segment that holds each time, from 0; -1 where none does.
+        """Index of the gap-free segment that contains each time, from 0; -1 if none does.
 
         Parameters
         ----------
@@ -252,7 +252,7 @@ class Trajectory(Summary):
 
     @property
     def scanned_rows(self) -> np.ndarray:
-        """Numbers (k,) of the epochs with points of the clouds; of all where none is known."""
+        """Indices (k,) of the epochs with points of the clouds, or of all if this is unknown."""
         known = self.scanned is not None and self.scanned.any()
         if known:
             return np.flatnonzero(self.scanned)
@@ -260,13 +260,13 @@ class Trajectory(Summary):
 
     @property
     def scanned_passes(self) -> np.ndarray:
-        """Start and end (k, 2) in s of what was scanned in the parts without a gap."""
+        """Start and end (k, 2) in s of the scanned time within each gap-free segment."""
         time = self.gps_time[self.scanned_rows]
         first = np.flatnonzero(np.diff(self.segment(time), prepend=-1))
         return np.column_stack([time[first], time[np.append(first[1:], len(time)) - 1]])
 
     def scanned_at(self, seconds: np.ndarray) -> Trajectory:
-        """The same, which knows that points of the clouds lie in some seconds alone.
+        """Return the trajectory with the seconds that contain points of the clouds marked.
 
         Parameters
         ----------
@@ -277,33 +277,33 @@ class Trajectory(Summary):
         segment = self.segment(self.gps_time)
         scanned = inside.copy()
         is_step = np.diff(segment) == 0
-        scanned[1:] |= inside[:-1] & is_step  # points lie up to the next epoch
+        scanned[1:] |= inside[:-1] & is_step  # points exist up to the next epoch
         scanned[:-1] |= inside[1:] & is_step
         return replace(self, scanned=scanned)
 
     @property
     def duration(self) -> float:
-        """Time that was recorded, in s, without the gaps."""
+        """Recorded time in s, without the gaps."""
         return self.recorded_time(*self.gps_time[[0, -1]])
 
     @property
     def length(self) -> float:
-        """Length of the recorded path, in m, without what lies across the gaps."""
+        """Length of the recorded path in m, without the gaps."""
         steps = np.linalg.norm(np.diff(self.position, axis=0), axis=1)
         return float(steps[np.diff(self.segment(self.gps_time)) == 0].sum())
 
     def count_passes(self, times: Iterable[np.ndarray], pause: float) -> int:
-        """Number of passes in which several files were scanned.
+        """Count the passes in which several files were scanned.
 
-        A pass ends at a gap of the trajectory, and where no file goes on within a pause. So tiles
-        of one drive are one pass, and so are the files of two scanners.
+        A pass ends at a gap of the trajectory, and where no file continues within the pause. The
+        tiles of one drive, or the files of two scanners, thus form one pass.
 
         Parameters
         ----------
         times : iterable of (n,) array
             Times of some points of each file, in any order. Units: s.
         pause : float
-            Files go on if they do within this and their own widest step. Units: s.
+            Files continue if they do within this and their own longest step. Units: s.
         """
         spans = []
         for of_file in times:
@@ -320,20 +320,20 @@ class Trajectory(Summary):
         return 1 + int(np.count_nonzero(~goes_on))
 
     def recorded_time(self, start: float, end: float) -> float:
-        """Time from start to end without the gaps that lie whole between them. Units: s."""
+        """Time from start to end, without the gaps that are entirely between them. Units: s."""
         starts, ends = self.gaps.T
         return float(end - start - (ends - starts)[(starts >= start) & (ends <= end)].sum())
 
     def control_interval(self, gps_time: np.ndarray) -> float:
-        """Mean interval of control epochs without the gaps between them. Units: s.
+        """Mean interval between control epochs, without the gaps. Units: s.
 
-        The whole of what was recorded where they are one, or as good as one: less than a second was
-        recorded from one to the next, as from the end of a pass to the start of another.
+        It is the whole recorded time if there is one control epoch, or if less than a second was
+        recorded between them, as from the end of a pass to the start of the next.
 
         Parameters
         ----------
         gps_time : (n,) array
-            Times of observed targets, one at least. Units: s.
+            Times of observed targets, at least one. Units: s.
         """
         epochs = control_epochs(gps_time)
         interval = self.recorded_time(epochs[0], epochs[-1]) / max(len(epochs) - 1, 1)
@@ -342,7 +342,7 @@ class Trajectory(Summary):
         return self.recorded_time(*self.gps_time[[0, -1]])
 
     def select(self, rows: slice | ArrayLike) -> Trajectory:
-        """Some of its epochs, in any order.
+        """Select some of the epochs, in any order.
 
         Parameters
         ----------
@@ -356,7 +356,7 @@ class Trajectory(Summary):
 
     @classmethod
     def concatenate(cls, parts: Iterable[Trajectory]) -> Trajectory:
-        """The epochs of several in the order of time, with the columns that all of them have.
+        """Merge the epochs of several trajectories by time, with the columns common to all.
 
         Parameters
         ----------
@@ -375,7 +375,7 @@ class Trajectory(Summary):
         return cls(*map(joined, zip(*table, strict=True)))
 
     def at(self, gps_time: ArrayLike) -> Trajectory:
-        """Trajectory at other times, positions and sigmas linear, attitudes by slerp.
+        """Interpolate the trajectory: positions and sigmas linearly, attitudes by slerp.
 
         Parameters
         ----------
@@ -385,7 +385,7 @@ class Trajectory(Summary):
         Raises
         ------
         ValueError
-            Where a time lies outside the trajectory or in one of its gaps.
+            If a time is outside the trajectory or in one of its gaps.
         """
         gps_time = np.atleast_1d(np.asarray(gps_time, dtype=float))
         outside = self.segment(gps_time) < 0
@@ -407,7 +407,7 @@ class Trajectory(Summary):
         near = np.zeros(len(self), dtype=bool)
         near[before] = True
         near[1:] |= near[:-1]
-        near[-2:] = True  # the last epoch ends an interval, and no time is asked of none
+        near[-2:] = True  # keep the last interval, also if no time is queried
         return _Epochs(
             gps_time,
             linear(self.position),
@@ -420,7 +420,7 @@ class Trajectory(Summary):
 
 
 class _Epochs(Trajectory):
-    """A trajectory asked at arbitrary times: any order and number of epochs."""
+    """Trajectory interpolated at arbitrary times, in any order and number."""
 
     def __post_init__(self):
         pass
@@ -428,7 +428,7 @@ class _Epochs(Trajectory):
 
 @dataclass(frozen=True)
 class Mounting:
-    """Scanner frame to body frame.
+    """Transformation from the scanner frame to the body frame.
 
     Parameters
     ----------
@@ -437,11 +437,11 @@ class Mounting:
     boresight : Rotation
         R_L^P.
     covariance : (6, 6) array, optional
-        Of the lever arm (m) and of a small rotation of the boresight about the body axes (rad), as
-        a calibration left it, or by both sigmas that were measured.
+        Of the lever arm (m) and of a small rotation of the boresight about the body axes (rad),
+        from a calibration, or from both measured sigmas.
     measured : (6,) array, optional
-        One sigma of both where either was measured without a calibration; NaN for what was not.
-        Units: m, rad.
+        One sigma of each component measured without a calibration; NaN for the others. Units: m,
+        rad.
     """
 
     lever_arm: np.ndarray
@@ -451,19 +451,19 @@ class Mounting:
 
     @classmethod
     def from_angles(cls, lever_arm: ArrayLike, boresight: ArrayLike) -> Mounting:
-        """Make a mounting of the numbers that survey.toml has.
+        """Make a mounting from the numbers in survey.toml.
 
         Parameters
         ----------
         lever_arm : (3,) array
-            Right, forward, up from the navigation centre to the scanner's origin. Units: m.
+            Right, forward, up from the navigation center to the scanner's origin. Units: m.
         boresight : (3,) array
             [a, b, c] of R_L^P = Rz(c) Ry(b) Rx(a). Units: deg.
 
         Raises
         ------
         ValueError
-            Unless both are three finite numbers.
+            If either is not three finite numbers.
 
         >>> from mlscorr.survey import Mounting
         >>> Mounting.from_angles([0.1, -0.6, 0.4], [90.0, 0.0, 35.0]).lever_arm.tolist()
@@ -478,7 +478,7 @@ class Mounting:
 
 
 def control_epochs(gps_time: np.ndarray) -> np.ndarray:
-    """Control epochs (k,): times in order, without those within a second of the last one kept.
+    """Control epochs (k,): sorted times, without those within a second of the last one kept.
 
     Parameters
     ----------

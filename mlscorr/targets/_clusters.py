@@ -1,9 +1,9 @@
 """Bright components of a piece of cloud at every level of intensity: a component tree.
 
 A target is brighter than what surrounds it, but intensity falls with range and incidence, so no
-single threshold serves. Each component at each level is a candidate; the shape decides. Levels are
-absolute and a component is judged by itself: what else a piece holds, as a bright wall some meters
-away, hides none (Najman and Couprie 2006). Neighbours are found by voxels in a hash table.
+single threshold works. Each component at each level is a candidate; the shape decides. Levels are
+absolute, and a component is judged by itself: other objects, such as a bright wall some meters
+away, do not hide it (Najman and Couprie 2006). Neighbors are found by voxels in a hash table.
 """
 
 from collections.abc import Iterator
@@ -16,7 +16,7 @@ from mlscorr.compiled_loops import loop
 from mlscorr.targets.settings import SETTINGS
 
 EMPTY = -1
-OCTAVE = 2  # levels of intensity: a step is the least by which dark and bright are told apart
+OCTAVE = 2  # levels of intensity: a step is the smallest contrast of dark and bright
 
 
 def bright_components(
@@ -37,8 +37,8 @@ def bright_components(
     ------
     level : float
     rows : (k,) int array
-        A component that stays the same over levels comes once, at the highest. One that reaches
-        farther than a target and its post is none of them.
+        A component that is the same at several levels is returned once, at the highest. Components
+        larger than a target and its post are omitted.
     """
     level = np.floor(OCTAVE * np.log2(np.maximum(intensity, 1.0))).astype(np.int16)
     known = set()
@@ -51,12 +51,12 @@ def bright_components(
 
 
 def _component_tree(xyz, level, link):
-    """(level, rows in order) of the components of points (n, 3) that a link (m) connects."""
+    """Pairs (level, sorted rows) of the components of points (n, 3) connected by a link (m)."""
     if len(xyz) == 0:
         return
     edge = link / 2
     low = np.array([column.min() for column in xyz.T])
-    low = (np.floor(low / edge) - 1) * edge  # the same cells whatever else there is
+    low = (np.floor(low / edge) - 1) * edge  # the same cells whatever other points there are
     voxel, keys_of, *table = number_voxels(xyz, low, edge)
     brightest_first = np.argsort(-level, kind="stable")
     limits = SETTINGS.smallest_count, 2 * SETTINGS.near_radius
@@ -71,16 +71,16 @@ def _component_tree(xyz, level, link):
 
 @loop
 def _grow(xyz, level, brightest_first, voxel, keys_of, keys, number, limits):
-    """Components as voxels join them from the brightest level down.
+    """Grow components as voxels join them from the brightest level down.
 
-    A component is a run of voxels in the order of their places, as joining two puts one's voxels
-    behind the other's: its level, its first place and its number of voxels (k, 3) describe it.
-    Places (v,) of the voxels come too.
+    A component is a run of voxels in the order of their positions, because joining two appends
+    one's voxels to the other's. It is described by its level, its first position and its number of
+    voxels (k, 3). Positions (v,) of the voxels are also returned.
     """
     smallest, largest = limits
     count = len(keys_of)
     parent = np.full(count, -1)
-    chain = np.full(count, -1), np.arange(count)  # the voxel behind each, the last of each root
+    chain = np.full(count, -1), np.arange(count)  # next voxel of each, last of each root
     sums = np.zeros((2, count), np.int64)  # voxels and points of each root
     box = np.full((3, count), np.inf), np.full((3, count), -np.inf)
     touched = np.full(count, -1)
@@ -128,7 +128,7 @@ def _grow(xyz, level, brightest_first, voxel, keys_of, keys, number, limits):
 
 @loop
 def _join(parent, chain, sums, box, voxel, beside):
-    """Join the components of two voxels, the smaller's voxels behind the larger's."""
+    """Join the components of two voxels, appending the smaller one's voxels to the larger one's."""
     a = root_of(parent, voxel)
     b = root_of(parent, beside)
     if a == b:
@@ -148,7 +148,7 @@ def _join(parent, chain, sums, box, voxel, beside):
 
 @loop
 def _places(parent, behind):
-    """Place (v,) of each voxel when all components follow each other."""
+    """Position (v,) of each voxel if all components follow each other."""
     place_of = np.empty(len(parent), np.int64)
     place = 0
     for root in range(len(parent)):
@@ -161,19 +161,19 @@ def _places(parent, behind):
 
 
 def components(points: np.ndarray, link: float) -> list[np.ndarray]:
-    """Connected components of enough points to be a target.
+    """Connected components with enough points to be a target.
 
     Parameters
     ----------
     points : (n, d) array
         Units: m.
     link : float
-        Points as near as this belong together. Units: m.
+        Points within this distance belong together. Units: m.
 
     Returns
     -------
     list of int arrays
-        Rows of each, in order.
+        Sorted rows of each component.
     """
     label = connected(points, link)
     order = np.argsort(label, kind="stable")
@@ -184,15 +184,15 @@ def components(points: np.ndarray, link: float) -> list[np.ndarray]:
 
 
 def connected(points: np.ndarray, link: float) -> np.ndarray:
-    """Component number of each point: occupied voxels first, so that density costs nothing.
+    """Component number of each point, by occupied voxels, so that density does not cost time.
 
     Parameters
     ----------
     points : (n, d) array
         In two dimensions or three. Units: m.
     link : float
-        Points about as near as this belong together: in the plane the limit is between 0.67 and
-        1.41 of it, in space between 0.47 and 1.45, as they lie in their voxels. Units: m.
+        Points within about this distance belong together. Depending on their position in voxels,
+        the limit is 0.67 to 1.41 of it in the plane, and 0.47 to 1.45 in space. Units: m.
 
     Returns
     -------
@@ -200,18 +200,19 @@ def connected(points: np.ndarray, link: float) -> np.ndarray:
 
     Notes
     -----
-    Of real calls, ``benchmarks/bench_libraries.py`` measured against DBSCAN, which keeps the link
-    exactly: parts of flat patches take Open3D 3 times and scikit-learn 23 times as long, and 15 %
-    of them are parted otherwise; 626 000 points take Open3D 113 times as long (Rand index 0.998).
+    ``benchmarks/bench_libraries.py`` compares real calls with DBSCAN, which uses the exact link.
+    For parts of flat patches, Open3D takes 3 times and scikit-learn 23 times as long, and 15 % of
+    them are split differently. For 626 000 points, Open3D takes 113 times as long (Rand index
+    0.998).
     """
     if len(points) == 0:
         return np.empty(0, int)
     keys = np.zeros(len(points), np.int64)
     shape = []
-    for column in points.T:  # one by one, as they are large where a street is dense
+    for column in points.T:  # one by one, because they are large in dense streets
         cells = np.floor(column / (link / 3)).astype(np.int64)
         cells -= cells.min()
-        shape.append(int(cells.max()) + 3)  # with room for two voxels: no edge is near another
+        shape.append(int(cells.max()) + 3)  # two voxels of margin separate the edges
         keys *= shape[-1]
         keys += cells
     del cells
@@ -231,7 +232,7 @@ def connected(points: np.ndarray, link: float) -> np.ndarray:
 
 @cache
 def _offsets(dimensions):
-    """Offsets (m, d) of voxels less than three apart; three apart is a tie of rounding."""
+    """Offsets (m, d) of voxels at distances below three; exactly three would depend on rounding."""
     around = np.stack(np.meshgrid(*[np.arange(-2, 3)] * dimensions), axis=-1)
     offsets = around.reshape(-1, dimensions)
     return offsets[np.sum(offsets**2, axis=1) < 9]
@@ -239,7 +240,7 @@ def _offsets(dimensions):
 
 @loop
 def _link(occupied, steps, parent):
-    """Give voxels (v,) by their rising keys the lowest of those that steps connect for a parent."""
+    """Give voxels (v,), sorted by key, the lowest voxel that steps connect as parent."""
     count = len(occupied)
     for step in steps:
         above = 0
@@ -259,12 +260,12 @@ def _link(occupied, steps, parent):
 
 @loop
 def root_of(parent: np.ndarray, i: int) -> int:
-    """What stands for the component of i, with the way to it shortened.
+    """Return the root of the component of i, and shorten the path to it.
 
     Parameters
     ----------
     parent : (n,) int array
-        What each was joined with; of a root, itself.
+        Parent of each; a root is its own parent.
     i : int
     """
     while parent[i] != i:
@@ -282,7 +283,7 @@ def number_voxels(xyz: np.ndarray, low: np.ndarray, edge: float) -> tuple[np.nda
     xyz : (n, 3) array
         Units: m.
     low : (3,) array
-        Not above any of them. Units: m.
+        Not above any point. Units: m.
     edge : float
         Units: m.
 
@@ -328,23 +329,23 @@ def number_voxels(xyz: np.ndarray, low: np.ndarray, edge: float) -> tuple[np.nda
 
 
 def sort_by_voxel(cell: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Rows (n,) sorted by cell, and where each cell starts among them (count + 1,).
+    """Sort rows (n,) by cell, and return the start of each cell among them (count + 1,).
 
     Parameters
     ----------
     cell : (n,) int array
         Number of each point's cell.
     count : int
-        Of cells.
+        Number of cells.
     """
-    rows = np.arange(len(cell))  # a matrix sorts its entries by counting
+    rows = np.arange(len(cell))  # a sparse matrix sorts its entries by counting
     matrix = coo_array((rows, (cell, rows)), shape=(count, len(cell))).tocsr()
     return matrix.indices, matrix.indptr
 
 
-@loop(cache=False)  # numba can't call a generator that it read from its cache
+@loop(cache=False)  # numba cannot call a generator that it read from its cache
 def neighbours(key: int, keys: np.ndarray, number: np.ndarray) -> Iterator[int]:
-    """Numbers of the occupied cubes among the 27 about a key.
+    """Yield the numbers of the occupied cubes among the 27 around a key.
 
     Parameters
     ----------
@@ -364,7 +365,7 @@ def neighbours(key: int, keys: np.ndarray, number: np.ndarray) -> Iterator[int]:
 
 @loop
 def key_of(x: float, y: float, z: float, edge: float) -> np.int64:
-    """Key of the cube that holds a place.
+    """Key of the cube that contains a position.
 
     Parameters
     ----------
@@ -376,7 +377,7 @@ def key_of(x: float, y: float, z: float, edge: float) -> np.int64:
 
 @loop
 def _slot(keys, key):
-    """Where a key stands, or would stand, in an open hash table of a power of two."""
+    """Slot of a key, or a free slot for it, in an open hash table whose size is a power of two."""
     mask = len(keys) - 1
     slot = ((key ^ (key >> 23)) * np.int64(-7046029254386353131)) >> 20 & mask
     while keys[slot] != EMPTY and keys[slot] != key:

@@ -1,8 +1,8 @@
-"""What each beam did at the plane of a target: met it bright, met it dark, or went by.
+"""State of each beam at the plane of a target: bright return, dark return, or passed by.
 
-A plate in the air has no darker neighbours on its plane. Beams that returned from behind it tell
-as much; and where nothing returned, the next pulse of a scan line, or the same one a line later,
-looked beside it.
+A plate in the air has no darker neighbors in its plane, but beams that returned from behind it give
+the same information. If nothing returned, the next pulse of the scan line, or the same pulse one
+line later, shows the direction of the missing beam.
 """
 
 from dataclasses import dataclass
@@ -23,14 +23,14 @@ class Echoes:
     Parameters
     ----------
     xyz : (n, 3) array
-        From any origin. Units: m.
+        Relative to any origin. Units: m.
     gps_time : (n,) array
         Units: s.
     intensity : (n,) array
     path : ScannerPath
-        Of the scanner, from the same origin.
+        Path of the scanner, relative to the same origin.
     tolerance : float
-        Points as near to a plane as this are on it. Units: m.
+        Points within this distance of a plane are on it. Units: m.
     """
 
     xyz: np.ndarray
@@ -40,30 +40,30 @@ class Echoes:
     tolerance: float
 
     def sight(self, rows: np.ndarray | slice) -> np.ndarray:
-        """Scanner to point (k, 3) of some rows. Units: m."""
+        """Return the vectors scanner to point (k, 3) of some rows. Units: m."""
         return self.xyz[rows] - self.path.at(self.gps_time[rows])
 
 
 def beams_at_plane(
     echoes: Echoes, plane: Plane, middle: np.ndarray, radius: float, threshold: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Beams that met the plane near a place or went by it; those stopped in front tell nothing.
+    """Beams that met the plane near a position or passed it; beams stopped in front are ignored.
 
     Parameters
     ----------
     echoes : Echoes
     plane : Plane
     middle : (2,) array
-        Of the place in the plane. Units: m.
+        Position in the plane. Units: m.
     radius : float
         Units: m.
     threshold : float
-        Of intensity: bright from here on.
+        Threshold of intensity: bright from this value.
 
     Returns
     -------
     crossings : (k, 2) array
-        In order of time. Units: m.
+        Sorted by time. Units: m.
     state : (k,) int array
         BRIGHT, DARK or MISS.
     rows : (k,) int array
@@ -78,13 +78,15 @@ def beams_at_plane(
 
 @loop
 def _beams_near(xyz, gps_time, path, tolerance, place):
-    """Rows (k,) of these beams, and which of them ended on the plane: thousands of calls look."""
+    """Rows (k,) of these beams, and flags of those that ended on the plane; called thousands of
+    times.
+    """
     origin, axes, middle, radius = place
     epochs, scanner = path
     rows = np.empty(len(xyz), np.int64)
     on_plane = np.empty(len(xyz), np.bool_)
     count = 0
-    # the plane, where the scanner was
+    # the plane, seen from the scanner
     above = np.zeros(len(epochs))
     epoch = 0
     for i in range(3):
@@ -120,20 +122,20 @@ def _beams_near(xyz, gps_time, path, tolerance, place):
 
 
 def missed_points(echoes: Echoes, rows: np.ndarray, plane: Plane) -> np.ndarray:
-    """Places in the plane where beams beside the target's points met nothing at all.
+    """Positions in the plane where beams adjacent to the target's points had no return.
 
     Parameters
     ----------
     echoes : Echoes
     rows : (n,) int array
-        Those on the target.
+        Points on the target.
     plane : Plane
 
     Returns
     -------
     (k, 2) array
-        Units: m. None when the target has fewer than two scan lines, or when the pulses don't
-        follow each other regularly in one line (scanners of many beams at once).
+        Units: m. Empty if the target has fewer than two scan lines, or if pulses are not regular
+        within a line (scanners with several beams).
     """
     uv = plane.crossing(echoes.xyz[rows], echoes.sight(rows))
     pulse, lines = _scan_lines(echoes.gps_time[rows])
@@ -144,7 +146,7 @@ def missed_points(echoes: Echoes, rows: np.ndarray, plane: Plane) -> np.ndarray:
     ends = np.array([line[-1] for line in lines])
     starts = np.array([line[0] for line in lines])
     neighbours = [(ends, pulse, step), (starts, -pulse, -step)]
-    if np.linalg.norm(advance) > np.linalg.norm(step) / 4:  # else the vehicle stands
+    if np.linalg.norm(advance) > np.linalg.norm(step) / 4:  # otherwise the vehicle stands still
         neighbours += [(lines[-1], period, advance), (lines[0], -period, -advance)]
     missed = [
         uv[at][~_returned(echoes, echoes.gps_time[rows[at]] + lag, pulse)] + move
@@ -154,27 +156,29 @@ def missed_points(echoes: Echoes, rows: np.ndarray, plane: Plane) -> np.ndarray:
 
 
 def _returned(echoes, time, pulse):
-    """Whether there is a point of the pulse at each time (n,)."""
+    """Flag (n,) of times at which a point of the pulse exists."""
     right = np.clip(np.searchsorted(echoes.gps_time, time), 1, len(echoes.gps_time) - 1)
     left = echoes.gps_time[right - 1]
     return np.minimum(np.abs(time - left), np.abs(echoes.gps_time[right] - time)) < 0.6 * pulse
 
 
 def _scan_lines(gps_time):
-    """Interval of pulses (s) and scan lines: index arrays of points without a longer pause.
+    """Interval of pulses (s), and scan lines as index arrays of points without a longer pause.
 
-    The interval is 0 where many points share a time: their order in it is unknown.
+    The interval is 0 if many points share a time, because their order is unknown.
     """
     steps = np.diff(gps_time)
     if np.median(steps) <= 0:
         return 0.0, []
     pulse = float(np.percentile(steps[steps > 0], 25))
-    breaks = np.flatnonzero(steps > 12 * pulse) + 1  # a few lost returns don't end a line
+    breaks = np.flatnonzero(steps > 12 * pulse) + 1  # a few lost returns do not end a line
     return pulse, np.split(np.arange(len(gps_time)), breaks)
 
 
 def _line_advance(gps_time, uv, lines, step):
-    """Time (s) and move (2,) in m from a point to its like on the next scan line."""
+    """Time (s) and motion (2,) in m from a point to the corresponding point on the next scan
+    line.
+    """
     along = step / max(np.linalg.norm(step), 1e-9)
     times = []
     moves = []

@@ -1,8 +1,8 @@
-"""Centre of an outline from beams that each tell on which side of it they fell.
+"""Center of an outline from beams that each fell on a known side of it.
 
-The centre is the mean of its posterior under a uniform prior: each beam tells the side of the
-outline it fell on, blurred by footprint and angle noise. The mean of the bright points would be
-drawn to where they are denser. The spread of the posterior is the covariance.
+The center is the mean of its posterior under a uniform prior: each beam gives the side of the
+outline on which it fell, blurred by footprint and angle noise. The mean of the bright points would
+be biased toward dense areas. The spread of the posterior is the covariance.
 """
 
 from dataclasses import dataclass
@@ -16,12 +16,12 @@ from mlscorr.targets.settings import SETTINGS
 
 @dataclass(frozen=True)
 class Size:
-    """What is known of a size before the fit.
+    """Prior of a size before the fit.
 
     Parameters
     ----------
     mean, sigma, low, high : float
-        Normal within limits. Units: m.
+        Normal distribution within limits. Units: m.
     """
 
     mean: float
@@ -32,20 +32,20 @@ class Size:
 
 @dataclass(frozen=True)
 class Outline:
-    """A fitted outline in its plane.
+    """Fitted outline in its plane.
 
     Parameters
     ----------
     centre : (2,) array
         Units: m.
     covariance : (2, 2) array
-        Of the centre. Units: m^2.
+        Of the center. Units: m^2.
     turn, size, inner : float
-        As in ``shapes``: rad, m, share.
+        See ``shapes``: rad, m, share.
     size_sigma : float
         Units: m.
     overlap : float
-        Share of the beams inside by the outline or by what they tell that are so by both.
+        Beams inside by both outline and state, as a share of those inside by either.
     """
 
     centre: np.ndarray
@@ -58,7 +58,7 @@ class Outline:
 
     @property
     def row(self) -> np.ndarray:
-        """The outline as a row of trial outlines."""
+        """Outline as a row of trial outlines."""
         return np.array([*self.centre, self.turn, self.size, self.inner])
 
 
@@ -78,21 +78,21 @@ def fit_outline(
     Parameters
     ----------
     points : (n, 2) array
-        Where they crossed it. Units: m.
+        Crossings with the plane. Units: m.
     state : (n,) int array
-        What each did there: BRIGHT, DARK or PASSED.
+        State of each beam: BRIGHT, DARK or PASSED.
     kind : str
     size : Size
     blur : float
-        One sigma of a beam's place across the outline. Units: m.
+        One sigma of a beam's position across the outline. Units: m.
     start : (2,) array
-        Where to begin. Units: m.
+        Start position. Units: m.
     by_edges : bool
-        Whether intensity tells nothing.
+        True if intensity gives no information.
     ring : bool
-        Whether a circle has a dark inner disc.
+        True if a circle has a dark inner disc.
     rough : bool
-        Whether to stop early.
+        True to stop early.
 
     Source: population Monte Carlo (Cappe et al. 2004) on quasi-random trials; the blur starts wide
     and halves, so that the posterior's mode is not lost.
@@ -141,12 +141,12 @@ def fit_outline(
 
 
 def _ring_limits():
-    """Inner over outer diameter: a ring's dark disc is neither a speck nor all of it."""
+    """Limits of inner over outer diameter: a ring's dark disc is neither a speck nor all of it."""
     return np.array([SETTINGS.core / 2, 1.0 - SETTINGS.core / 4])
 
 
 def _first_trials(middle, size, period, ring, count):
-    """Outlines (c, 5) all about the middle, and which of their columns are free."""
+    """First outlines (c, 5) around the middle, and their free columns."""
     play = SETTINGS.hidden_share * size.mean
     inner = _ring_limits() * ring
     low = np.array([*(middle - play), 0.0, size.low, inner[0]])
@@ -155,7 +155,7 @@ def _first_trials(middle, size, period, ring, count):
 
 
 def _next_trials(mean, covariance, free, number, count):
-    """Outlines drawn from a normal distribution, and minus the log of its density."""
+    """Draw outlines from a normal distribution, with minus the log of its density."""
     scale = np.sqrt(np.diag(covariance)) + 1e-9
     correlation = covariance / np.outer(scale, scale) + 1e-6 * np.eye(len(free))
     root = np.linalg.cholesky(correlation) * scale[:, None]
@@ -166,7 +166,7 @@ def _next_trials(mean, covariance, free, number, count):
 
 
 def _log_prior(trials, size, middle, ring):
-    """Log prior (c,) of trial outlines: uniform about the middle but for the size."""
+    """Log prior (c,) of trial outlines: uniform around the middle except for the size."""
     within = (np.abs(trials[:, :2] - middle) <= SETTINGS.hidden_share * size.mean).all(axis=1)
     within &= (trials[:, 3] >= size.low) & (trials[:, 3] <= size.high)
     if ring:
@@ -176,9 +176,9 @@ def _log_prior(trials, size, middle, ring):
 
 
 def _weights(value):
-    """Weight (c,) of trials by the log of their posterior, and how many they effectively are.
+    """Weight (c,) of trials by their log posterior, and the effective number of them.
 
-    Where too few carry all the weight, the posterior is raised to a power below one.
+    If too few carry all the weight, the posterior is raised to a power below one.
     """
     power = 1.0
     while True:
@@ -194,7 +194,7 @@ def _weights(value):
 
 
 def _moments(trials, weight, period):
-    """Weighted mean (5,) and covariance (5, 5) of outlines; turns are alike by their period."""
+    """Weighted mean (5,) and covariance (5, 5) of outlines; turns are periodic."""
     trials = trials.copy()
     if period:
         angle = np.angle(weight @ np.exp(2j * np.pi / period * trials[:, 2])) * period / 2 / np.pi
@@ -205,7 +205,7 @@ def _moments(trials, weight, period):
 
 
 def _informative(points, mean, spread, form, width):
-    """Rows of the points that can lie near the outline: all others say the same of every trial."""
+    """Rows of the points near the outline; all others are equally likely in every trial."""
     turned = mean[3] * spread[2] * (form != shapes.ROUND)
     play = np.hypot(spread[0], spread[1]) + turned + spread[3] / 2 + spread[4] + 6 * width
     distance = np.abs(shapes.distance_inside(points, mean, form))
@@ -215,6 +215,6 @@ def _informative(points, mean, spread, form, width):
 
 
 def _thinned(rows, side, count):
-    """At most so many of the rows on each side, evenly among them."""
+    """Select at most a given number of rows on each side, evenly spaced."""
     parts = [rows[side[rows] == value] for value in (-1, 0, 1)]
     return np.concatenate([part[:: len(part) // count + 1] for part in parts])

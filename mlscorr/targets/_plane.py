@@ -11,7 +11,7 @@ from mlscorr.targets.settings import SETTINGS
 
 @dataclass(frozen=True)
 class Plane:
-    """A plane in space, and the points on it.
+    """Plane in space, and the points on it.
 
     Parameters
     ----------
@@ -20,7 +20,7 @@ class Plane:
     axes : (3, 3) array
         Rows u, v and the normal.
     sigma : float
-        Of the points about it. Units: m.
+        Sigma of the points about the plane. Units: m.
     inliers : (n,) bool array
     """
 
@@ -30,7 +30,7 @@ class Plane:
     inliers: np.ndarray
 
     def coordinates(self, xyz: np.ndarray) -> np.ndarray:
-        """u, v in the plane and w along the normal.
+        """Return u, v in the plane and w along the normal.
 
         Parameters
         ----------
@@ -40,7 +40,7 @@ class Plane:
         return (xyz - self.origin) @ self.axes.T
 
     def crossing(self, xyz: np.ndarray, sight: np.ndarray) -> np.ndarray:
-        """u, v (n, 2) where beams cross the plane.
+        """Return u, v (n, 2) of the crossings of beams with the plane.
 
         Parameters
         ----------
@@ -49,16 +49,16 @@ class Plane:
         """
         local = self.coordinates(xyz)
         beam = sight @ self.axes.T
-        with np.errstate(divide="ignore", invalid="ignore"):  # a beam along the plane never does
+        with np.errstate(divide="ignore", invalid="ignore"):  # a parallel beam never crosses it
             return local[:, :2] - local[:, 2:] / beam[:, 2:] * beam[:, :2]
 
     def turned_like(self, other: "Plane") -> "Plane":
-        """The same plane with its axes as near as can be to those of another.
+        """Return the plane with axes as close as possible to those of another.
 
         Parameters
         ----------
         other : Plane
-            Nearly parallel.
+            Nearly parallel plane.
         """
         normal = self.axes[2] * np.sign(self.axes[2] @ other.axes[2])
         u = other.axes[0] - (other.axes[0] @ normal) * normal
@@ -68,21 +68,21 @@ class Plane:
 
 @loop
 def most_common(xyz: np.ndarray, triples: np.ndarray, tolerance: float) -> np.ndarray:
-    """Which points lie on the plane that most of them support, nearer ones more.
+    """Flag of points on the plane with most support; nearer points count more.
 
     Parameters
     ----------
     xyz : (n, 3) array
         Units: m.
     triples : (k, 3) int array
-        Rows of three points through which a plane is tried.
+        Rows of three points that define a trial plane.
     tolerance : float
         Units: m.
 
     Returns
     -------
     (n,) bool array
-        None where no three span a plane.
+        All False if no three points span a plane.
 
     Source: MSAC (Torr and Zisserman 2000).
     """
@@ -115,17 +115,17 @@ def fit_plane(xyz: np.ndarray, tolerance: float) -> Plane:
     xyz : (n, 3) array
         Units: m.
     tolerance : float
-        Points as near as this support a plane. Units: m.
+        Points within this distance support a plane. Units: m.
 
     Raises
     ------
     ValueError
-        For fewer than three points.
+        If there are fewer than three points.
 
-    Source: Fischler and Bolles 1981, on triples that are spread evenly over all in place of random
-    ones; the consensus set is refined twice by least squares, the second time within three sigmas.
-    On boards with a post behind, that leaves 0.28 deg and 0.6 mm RMS where ``segment_plane`` of
-    Open3D, in 3 times the time, leaves 1.5 deg and 2.3 mm: it holds more points, those of the post
+    Source: Fischler and Bolles 1981, on evenly spread instead of random triples. The consensus set
+    is refined twice by least squares, the second time within three sigmas. For boards with a post
+    behind them, the RMS is 0.28 deg and 0.6 mm; ``segment_plane`` of Open3D takes 3 times as long
+    and has 1.5 deg and 2.3 mm, because it includes points of the post
     (``benchmarks/bench_libraries.py``).
     """
     if len(xyz) < 3:
@@ -136,7 +136,7 @@ def fit_plane(xyz: np.ndarray, tolerance: float) -> Plane:
 
 @loop
 def _fit_plane(xyz, triples, tolerance):
-    """Origin (3,), axes (3, 3), sigma and inliers (n,): a piece of cloud asks for hundreds."""
+    """Fit origin (3,), axes (3, 3), sigma and inliers (n,); a piece of cloud needs hundreds."""
     middle = xyz.sum(axis=0) / len(xyz)
     local = xyz - middle
     square = np.empty((3, 3))
@@ -146,7 +146,7 @@ def _fit_plane(xyz, triples, tolerance):
         points = local[inside]
         centre = points.sum(axis=0) / len(points)
         points -= centre
-        for i in range(3):  # not by BLAS, which sums otherwise with another number of threads
+        for i in range(3):  # not by BLAS, whose sums depend on the number of threads
             for j in range(3):
                 square[i, j] = np.sum(points[:, i] * points[:, j])
         squares, axes = np.linalg.eigh(square)

@@ -1,4 +1,4 @@
-"""Where in a piece of cloud a target may be: bright components, flat patches, gaps in patches."""
+"""Seeds of targets in a piece of cloud: bright components, flat patches, gaps in patches."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,25 +16,26 @@ from mlscorr.targets.shapes import diameter
 
 @dataclass(frozen=True)
 class Seed:
-    """A place to fit a shape at.
+    """Position at which to fit a shape.
 
     Parameters
     ----------
     rows : (n,) int array
-        Points on the target; about a hole, those of the board.
+        Points on the target; for a hole, points of the board.
     plane : Plane
     threshold : float
-        Of intensity between dark and bright.
+        Threshold of intensity between dark and bright.
     by_edges : bool
-        Whether intensity tells nothing.
+        True if intensity gives no information.
     extent : float
-        About the longest extent of what is visible. Units: m.
+        Approximate longest extent of the visible part. Units: m.
     middle : (2,) array
-        About the centre, in the plane. Units: m.
+        Approximate center, in the plane. Units: m.
     bloomed : bool
-        Whether the receiver was saturated: the outline may be larger than the size.
+        True if the receiver was saturated, so that the outline may be larger than the size.
     mesh : float
-        Of the points about a gap, whose extent is of the largest circle without points. Units: m.
+        Spacing of the points around a gap; the extent is then that of the largest empty circle.
+        Units: m.
     """
 
     rows: np.ndarray
@@ -50,33 +51,33 @@ class Seed:
 def region_seeds(
     echoes: Echoes, region: BrightRegion, origin: np.ndarray, kind: str, size: float | None
 ) -> Iterator[Seed]:
-    """Seeds in one bright region.
+    """Yield seeds in one bright region.
 
     Parameters
     ----------
     echoes : Echoes
     region : BrightRegion
     origin : (3,) array
-        Of the echoes, in the region's coordinates. Units: m.
+        Origin of the echoes, in the region's coordinates. Units: m.
     kind : str
     size : float or None
         Units: m.
     """
     apart = np.linalg.norm(echoes.xyz - (region.centre - origin), axis=1)
     rows = np.flatnonzero((apart <= region.radius) & (echoes.intensity >= region.threshold))
-    guess = size or 1.4 * region.radius  # half a square's diagonal
+    guess = size or 1.4 * region.radius  # half of a square's diagonal
     yield from _bright_parts(echoes, rows, region.threshold, kind, size, guess)
 
 
 def bright_seeds(echoes: Echoes, kind: str, size: float | None) -> Iterator[Seed]:
-    """Seeds at bright components of the extent of a shape.
+    """Yield seeds at bright components with the extent of a shape.
 
     Parameters
     ----------
     echoes : Echoes
     kind : str
     size : float or None
-        Of any extent where it is None. Units: m.
+        None for any extent. Units: m.
     """
     for guess in _guesses(size):
         for level, rows in bright_components(echoes.xyz, echoes.intensity, guess):
@@ -84,7 +85,7 @@ def bright_seeds(echoes: Echoes, kind: str, size: float | None) -> Iterator[Seed
 
 
 def _guesses(size):
-    """Sizes (m) that are looked for where a target's own is not known."""
+    """Sizes (m) to search for if a target's own is not known."""
     if size is None:
         return SETTINGS.size_guesses
     return (size,)
@@ -93,14 +94,14 @@ def _guesses(size):
 def plate_seeds(
     echoes: Echoes, kind: str, size: float | None, rng: np.random.Generator
 ) -> Iterator[Seed]:
-    """Seeds at flat patches of the extent of a shape, whatever their intensity.
+    """Yield seeds at flat patches with the extent of a shape, regardless of intensity.
 
     Parameters
     ----------
     echoes : Echoes
     kind : str
     size : float or None
-        Of any extent where it is None. Units: m.
+        None for any extent. Units: m.
     rng : numpy.random.Generator
     """
     for guess in _guesses(size):
@@ -114,7 +115,7 @@ def plate_seeds(
 
 
 def hole_seeds(echoes: Echoes, size: float | None, rng: np.random.Generator) -> Iterator[Seed]:
-    """Seeds at round gaps in flat patches: where a circle of the size holds no point of it.
+    """Yield seeds at round gaps in flat patches, where a circle of the size contains no point.
 
     Parameters
     ----------
@@ -134,13 +135,13 @@ def hole_seeds(echoes: Echoes, size: float | None, rng: np.random.Generator) -> 
 def flat_patches(
     echoes: Echoes, size: float, rng: np.random.Generator
 ) -> Iterator[tuple[Plane, np.ndarray]]:
-    """Planes of a piece with the rows on each, most points first; a point is on one of them.
+    """Yield planes of a piece with the rows on each, most points first; a point is on one of them.
 
     Parameters
     ----------
     echoes : Echoes
     size : float
-        Of a target. Units: m.
+        Size of a target. Units: m.
     rng : numpy.random.Generator
     """
     left = _thinned(echoes.xyz, size / 12, rng)
@@ -159,7 +160,7 @@ def flat_patches(
 
 
 def _steep(echoes, plane):
-    """Which beams can be said to cross a plane."""
+    """Flag of beams that cross a plane at a sufficient angle."""
     sight = echoes.sight(slice(None))
     return np.abs(sight @ plane.axes[2]) > SETTINGS.least_crossing_sine * np.linalg.norm(
         sight, axis=1
@@ -167,7 +168,7 @@ def _steep(echoes, plane):
 
 
 def _near_triples(xyz, size, rng):
-    """Rows (k, 3) of three points near each other."""
+    """Rows (k, 3) of three points close to each other."""
     seeds = rng.integers(len(xyz), size=SETTINGS.plane_trials)
     balls = cKDTree(xyz).query_ball_point(xyz[seeds], size / 2)
     pairs = [[ball[int(i * len(ball))] for i in rng.random(2)] for ball in balls]
@@ -175,7 +176,7 @@ def _near_triples(xyz, size, rng):
 
 
 def _bright_parts(echoes, rows, threshold, kind, size, guess):
-    """Seeds at the flat parts of a bright component, larger where the receiver was saturated."""
+    """Seeds at the flat parts of a bright component, larger if the receiver was saturated."""
     if len(rows) < SETTINGS.smallest_count:
         return
     bloomed = bool(np.mean(echoes.intensity[rows] >= echoes.intensity.max()) > 0.5)
@@ -187,15 +188,15 @@ def _bright_parts(echoes, rows, threshold, kind, size, guess):
 
 
 def _flat_parts(echoes, rows, size):
-    """Flat parts of a component, with their planes and places in them: itself, or what is left of
-    it without a post or pole before or beside it.
+    """Flat parts of a component, with planes and coordinates in them: all of it, or without a
+    post.
     """
     for _ in range(3):
         if len(rows) < SETTINGS.smallest_count:
             return
         xyz = echoes.xyz[rows]
         longest = np.linalg.norm(np.ptp(xyz, axis=0))
-        if longest + 2 * echoes.tolerance < size / 2:  # too small on whatever plane
+        if longest + 2 * echoes.tolerance < size / 2:  # too small on any plane
             return
         plane = fit_plane(xyz, echoes.tolerance)
         flat = rows[plane.inliers]
@@ -208,14 +209,14 @@ def _flat_parts(echoes, rows, size):
             parts = components(points, link)
         for part in parts:
             if len(part) >= SETTINGS.smallest_count and np.isfinite(points[part]).all():
-                yield flat[part], plane, points[part]  # no beam runs along the plane
+                yield flat[part], plane, points[part]  # no beam is parallel to the plane
         if whole:
             return
         rows = rows[~plane.inliers]
 
 
 def _extent(points, kind, size, guess, bloom=1.0):
-    """Longest extent and middle (2,) of points (n, 2) if a shape may have it, else None."""
+    """Longest extent and middle (2,) of points (n, 2) if a shape may have them, otherwise None."""
     low = points.min(axis=0)
     high = points.max(axis=0)
     shortest, longest = np.sort(high - low)
@@ -231,9 +232,9 @@ def _extent(points, kind, size, guess, bloom=1.0):
 
 
 def _gaps(echoes, plane, points, size):
-    """Middle (2,), radius and mesh (m) of the largest circles with no point on or before a patch.
+    """Middle (2,), radius and spacing (m) of the largest empty circles on or before a patch.
 
-    They are circumcircles of the Delaunay triangles (their centres are Voronoi's corners).
+    They are circumcircles of the Delaunay triangles (centers are Voronoi vertices).
     """
     height = plane.coordinates(echoes.xyz)[:, 2]
     beam = echoes.sight(slice(None)) @ plane.axes[2]
@@ -268,13 +269,13 @@ def _gaps(echoes, plane, points, size):
 
 
 def _surrounded(points, middle):
-    """Whether points (n, 2) lie all round a place: in three quarters of the directions."""
+    """True if points (n, 2) surround a position, in three quarters of the directions."""
     direction = np.arctan2(*(points - middle).T)
     return len(np.unique(np.floor(direction / (2 * np.pi) * 16))) >= 12
 
 
 def _circumcircles(a, b, c):
-    """Centre (n, 2) and radius (n,) of the circles through three points each."""
+    """Center (n, 2) and radius (n,) of the circles through three points each."""
     b = b - a
     c = c - a
     twice = 2 * (b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0])
@@ -288,7 +289,7 @@ def _circumcircles(a, b, c):
 
 
 def _thinned(xyz, voxel, rng):
-    """Rows of one point in each voxel, and at most SETTINGS.piece_points of them."""
+    """Rows of one point in each voxel, at most SETTINGS.piece_points in all."""
     _, rows = np.unique(np.floor(xyz / max(voxel, 0.02)).astype(int), axis=0, return_index=True)
     if len(rows) > SETTINGS.piece_points:
         rows = rng.choice(rows, SETTINGS.piece_points, replace=False)

@@ -1,4 +1,4 @@
-"""Points that fill a cube evenly, in place of random ones: the same cloud gives the same fit."""
+"""Quasi-random points that fill a cube evenly, so that the same cloud gives the same fit."""
 
 from functools import cache
 
@@ -8,7 +8,7 @@ from scipy.special import ndtri
 
 @cache
 def quasi_random(count: int, dimensions: int, block: int = 0) -> np.ndarray:
-    """Points in the open unit cube.
+    """Quasi-random points in the open unit cube.
 
     Parameters
     ----------
@@ -16,18 +16,18 @@ def quasi_random(count: int, dimensions: int, block: int = 0) -> np.ndarray:
     dimensions : int
         Up to five.
     block : int
-        Number of the block of so many points, each unlike the others.
+        Index of the block of count points; each block differs.
 
     Returns
     -------
     (count, dimensions) array
-        Of the Halton sequence (Halton 1960): a number's digits behind the point, in a prime base
-        for each dimension. As scipy.stats.qmc gives it, whose import costs each worker of a
+        Of the Halton sequence (Halton 1960): the reversed digits of the index, with a prime base
+        for each dimension. The same as from scipy.stats.qmc, whose import costs each worker of a
         project 0.4 s and 35 MB.
     """
     points = np.zeros((count, dimensions))
     for k, base in enumerate((2, 3, 5, 7, 11)[:dimensions]):
-        # that of zero is a corner
+        # index zero is a corner
         left = np.arange(count) + block * count + 1
         weight = 1 / base
         while left.any():
@@ -39,11 +39,11 @@ def quasi_random(count: int, dimensions: int, block: int = 0) -> np.ndarray:
 
 @cache
 def quasi_normal(count: int, dimensions: int, block: int = 0) -> np.ndarray:
-    """Points (count, dimensions) of a standard normal distribution.
+    """Quasi-random points (count, dimensions) of a standard normal distribution.
 
     Parameters
     ----------
     count, dimensions, block : int
-        As of quasi_random.
+        See quasi_random.
     """
     return ndtri(quasi_random(count, dimensions, block))

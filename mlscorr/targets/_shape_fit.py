@@ -1,6 +1,6 @@
-"""From a seed to a fitted target: roughly first, which most seeds don't survive, then exactly.
+"""Fit of a target at a seed: a rough fit, which rejects most seeds, then an exact one.
 
-Each fit is assessed by what a surveyor's eye would ask before trusting its centre.
+Each fit is assessed by the criteria that a surveyor would apply before trusting its center.
 """
 
 from dataclasses import dataclass, replace
@@ -31,16 +31,16 @@ from mlscorr.targets.shapes import (
 
 @dataclass(frozen=True)
 class Assessment:
-    """How target-like a fit is.
+    """Assessment of the likeness of a fit to a target.
 
     Parameters
     ----------
     score : float
         0 to 1.
     rank : float
-        Among fits at one place.
+        Rank among fits at one position.
     plausible, accepted : bool
-        Whether a rough or an exact fit passes.
+        True if a rough or an exact fit passes.
     """
 
     score: float
@@ -51,16 +51,16 @@ class Assessment:
 
 @dataclass(frozen=True)
 class ShapeFit:
-    """A shape fitted at a seed, with the beams that tell it.
+    """Shape fitted at a seed, with the beams behind it.
 
     Parameters
     ----------
     seed : Seed
     kind : str
     size : float or None
-        As surveyed. Units: m.
+        Surveyed size. Units: m.
     beams : (n, 2), (n,) and (n,) arrays
-        Crossings (m), state, and rows of the echoes; -1 where nothing returned.
+        Crossings (m), state, and rows of the echoes; -1 without a return.
     outline : Outline
     assessment : Assessment
     """
@@ -74,12 +74,12 @@ class ShapeFit:
 
     @property
     def position(self) -> np.ndarray:
-        """Centre (3,) in the coordinates of the echoes. Units: m."""
+        """Center (3,) in the coordinates of the echoes. Units: m."""
         return self.seed.plane.origin + self.outline.centre @ self.seed.plane.axes[:2]
 
     @property
     def on_target(self) -> np.ndarray:
-        """Which of the beams met the target (n,): about a hole, the board within a radius more."""
+        """Flag (n,) of beams that met the target; for a hole, the board within one more radius."""
         points, state, _ = self.beams
         row = self.outline.row
         row[4] = 0.0
@@ -92,7 +92,7 @@ class ShapeFit:
 
 
 def rough_fit(echoes: Echoes, seed: Seed, kind: str, size: float | None) -> ShapeFit | None:
-    """Fit a shape at a seed quickly; None where it can't be one.
+    """Fit a shape at a seed quickly; None if it is not a target.
 
     Parameters
     ----------
@@ -122,21 +122,21 @@ def rough_fit(echoes: Echoes, seed: Seed, kind: str, size: float | None) -> Shap
 
 
 def exact_fit(echoes: Echoes, fit: ShapeFit, scanner: Scanner) -> ShapeFit | None:
-    """Fit the outline exactly; None where that doesn't fit or hold the centre.
+    """Fit the outline exactly; None if it does not fit or does not determine the center.
 
     Parameters
     ----------
     echoes : Echoes
     fit : ShapeFit
-        Rough.
+        Rough fit.
     scanner : Scanner
-        Noise that blurs the outline.
+        Its noise blurs the outline.
     """
     if 2 * fit.on_target.sum() < SETTINGS.smallest_count:
         return None
     fit = _refined(echoes, fit)
     if not fit.on_target.any() or _sight(echoes, fit)[1] < SETTINGS.least_crossing_sine:
-        return None  # or a line of points alone, whose plane may hold the beams
+        return None  # or a single line of points, whose plane may contain the beams
     seed = fit.seed
     kind = fit.kind
     ring = fit.outline.inner > 0
@@ -161,7 +161,7 @@ def exact_fit(echoes: Echoes, fit: ShapeFit, scanner: Scanner) -> ShapeFit | Non
 
 
 def _beams(echoes, seed, kind, size):
-    """Crossings, state and rows of the beams about a seed; row -1 where nothing returned."""
+    """Crossings, state and rows of the beams near a seed; row -1 without a return."""
     beams = beams_at_plane(echoes, seed.plane, seed.middle, size, seed.threshold)
     if kind == "hole":
         return beams
@@ -171,7 +171,7 @@ def _beams(echoes, seed, kind, size):
 
 
 def _refined(echoes, fit):
-    """The fit with plane and beams anew from all points that are on the target by the rough one."""
+    """Recompute plane and beams of a rough fit from all points on the target."""
     seed = fit.seed
     on_target = fit.beams[2][fit.on_target]
     plane = fit_plane(echoes.xyz[on_target], echoes.tolerance).turned_like(seed.plane)
@@ -179,7 +179,7 @@ def _refined(echoes, fit):
     seed = replace(seed, rows=on_target, plane=plane, middle=shift)
     points, state, rows = beams = _beams(echoes, seed, fit.kind, fit.outline.size)
     fit = replace(fit, seed=seed, outline=replace(fit.outline, centre=shift))
-    if not seed.by_edges and fit.kind != "checkerboard":  # whose threshold holds for both
+    if not seed.by_edges and fit.kind != "checkerboard":  # one threshold applies to both
         inside = distance_inside(points, fit.outline.row, form_of(fit.kind, False))
         beyond = inside < -2 * SETTINGS.rough_blur * fit.outline.size
         bright = echoes.intensity[rows[(state != MISS) & (inside > 0)]]
@@ -189,9 +189,7 @@ def _refined(echoes, fit):
 
 
 def _contradicted(missed, outline, form, blur):
-    """Whether beams that met nothing lie well inside the outline: then something out of sight
-    stood in front, and they say nothing.
-    """
+    """True if beams without a return are well inside the outline: an unseen obstacle hides it."""
     inside = (
         distance_inside(missed, outline.row, form) > 3 * blur + SETTINGS.rough_blur * outline.size
     )
@@ -199,8 +197,8 @@ def _contradicted(missed, outline, form, blur):
 
 
 def _size(seed, size, footprint):
-    """What is known of the outline's size: the beam's width moves it to and fro."""
-    if size is None and seed.mesh:  # a hole is smaller than the gap by less than the mesh
+    """Prior of the outline's size, which the beam's width makes larger or smaller."""
+    if size is None and seed.mesh:  # a hole is smaller than the gap by less than the spacing
         low = max(seed.extent - 2 * seed.mesh, seed.extent / 2)
         return Size((low + seed.extent) / 2, np.inf, low, seed.extent + seed.mesh / 2)
     if size is None:
@@ -212,22 +210,21 @@ def _size(seed, size, footprint):
 
 
 def _dark_inside(points, state, outline):
-    """Whether what lies about the centre of a disc is dark: then it is a ring."""
+    """True if the center of a disc is dark, so that it is a ring."""
     about = np.linalg.norm(points - outline.centre, axis=1) < SETTINGS.core * outline.size
     return (about & (state == DARK)).sum() > max(3, 0.5 * about.sum())
 
 
 def _with_threshold(intensity, beams, bright, outside, seed):
-    """The beams with their state by a threshold, and the seed with it: half way between bright
-    and dark.
+    """Set the state of beams, and the seed, by a threshold half way between bright and dark.
 
-    bright are intensities on the target, outside tells which beams certainly aren't; where none
-    of these returned from the plane, half as bright is dark, and where they are nearly as bright,
-    the threshold is the seed's own.
+    bright are intensities on the target, outside flags beams that are certainly not on it. If none
+    of these returned from the plane, dark is half of bright. If they are nearly as bright, the
+    threshold of the seed is used.
     """
     points, state, rows = beams
     dark = intensity[rows[outside & (state != MISS)]]
-    # the brighter of what lies outside: beside a dark board, the wall that it hangs on
+    # the brighter surface outside: next to a dark board, the wall behind it
     if len(dark) >= SETTINGS.smallest_count / 4:
         dark = np.percentile(dark, 90)
     else:
@@ -241,30 +238,30 @@ def _with_threshold(intensity, beams, bright, outside, seed):
 
 
 def _sight(echoes, fit):
-    """Distance (m) of what was seen on the target, and the cosine of the angle of incidence."""
+    """Distance (m) of the visible part of the target, and cosine of the angle of incidence."""
     sight = echoes.sight(fit.beams[2][fit.on_target]).mean(axis=0)
     distance = np.linalg.norm(sight)
     return distance, abs(sight @ fit.seed.plane.axes[2]) / distance
 
 
 def _blur(echoes, fit, scanner):
-    """One sigma (m) of a beam's place across the outline, and that of the outline's size.
+    """One sigma (m) of a beam's position across the outline, and of the outline's size.
 
-    From angle noise and the beam's own width. A beam counts as bright from half its width on, and
-    how exactly half is as good as intensities repeat; at edges of plates nobody knows the share
-    that returns, but it is the same all round.
+    They follow from angle noise and beam width. A beam counts as bright from half of its width, and
+    the accuracy of this half is the repeatability of intensities. At edges of plates the returning
+    share is unknown, but it is the same all around.
     """
     _, state, rows = fit.beams
     on_target = fit.on_target
     distance, cosine = _sight(echoes, fit)
-    slant = np.sqrt((1 + 1 / cosine**2) / 2)  # both ways in the plane, on average
+    slant = np.sqrt((1 + 1 / cosine**2) / 2)  # both directions in the plane, on average
     beam = distance * SETTINGS.divergence / 4 * slant
     intensity = echoes.intensity[rows[on_target & (state == BRIGHT)]].astype(float)
     speckle = SETTINGS.intensity_spread
     if len(intensity) > 5 and not fit.seed.by_edges:
         spread = 0.74 * np.subtract(*np.percentile(intensity, [75, 25]))
         speckle = float(np.clip(spread / max(np.median(intensity), 1e-9), speckle / 4, 0.5))
-    half = np.sqrt(np.pi / 2)  # sigmas of a beam per unit of speckle, by its slope at half power
+    half = np.sqrt(np.pi / 2)  # sigmas of a beam per unit of speckle, from its slope at half power
     angle = distance * scanner.angle_noise * slant
     blur = np.linalg.norm([angle, half * speckle * beam, SETTINGS.rounding])
     return float(blur), float(beam)
@@ -290,9 +287,9 @@ def assess(
     seed : Seed
     echoes : Echoes
     blur : float
-        One sigma of a beam's place. Units: m.
+        One sigma of a beam's position. Units: m.
     hidden : bool
-        Whether something out of sight is thought to hide a part: then all the rest must fit.
+        True if an unseen obstacle is assumed to hide a part; then all the rest must fit.
 
     Returns
     -------
@@ -312,7 +309,7 @@ def assess(
     if hidden:
         least_overlap = SETTINGS.close_overlap
     overlap = outline.overlap
-    if kind == "hole" and marked.sum() < 5:  # nothing behind it: all that counts is the board
+    if kind == "hole" and marked.sum() < 5:  # nothing behind it: only the board counts
         overlap = 1.0 - (inside & ~marked).sum() / max(len(points), 1)
     contrast = 1.0
     if not seed.by_edges:
@@ -345,7 +342,7 @@ def assess(
 
 
 def _support(points, marked, outline, form, kind, blur):
-    """Share of the outline with beams on either side of it near by; of a hole's, on the board."""
+    """Share of the outline with nearby beams on both sides; for a hole, on the board."""
     within = points[marked]
     beyond = points[~marked]
     if kind == "hole":
@@ -361,7 +358,7 @@ def _support(points, marked, outline, form, kind, blur):
 
 
 def _rim(outline, form):
-    """Places (k, 2) along an outline."""
+    """Positions (k, 2) along an outline."""
     angle = 2 * np.pi * (np.arange(SETTINGS.rim_places) + 0.5) / SETTINGS.rim_places
     ring = np.column_stack([np.cos(angle), np.sin(angle)])
     if form == ROUND:
@@ -373,8 +370,8 @@ def _rim(outline, form):
 
 
 def _spacing(within, outline, form, kind):
-    """Distance (m) from a place on the target to the nearest beam, where it is seen best."""
-    wide = 1.8 if kind == "hole" else 1.0  # sizes, with the board about a hole
+    """Distance (m) from a position on the target to the nearest beam, in its best visible part."""
+    wide = 1.8 if kind == "hole" else 1.0  # sizes, with the board around a hole
     places = quasi_random(4 * SETTINGS.rim_places, 2) - 0.5
     places = outline.centre + wide * outline.size * places
     on_target = (distance_inside(places, outline.row, form) > 0) == (kind != "hole")
@@ -382,7 +379,7 @@ def _spacing(within, outline, form, kind):
 
 
 def _share_of_right_colour(points, state, outline):
-    """Share of the beams on a checkerboard whose colour is right, of the worse colour."""
+    """Share of the beams on a checkerboard with the right color, for the worse color."""
     on_board = (distance_inside(points, outline.row, CHECKERED) > 0) & (state != MISS)
     white = distance_inside(points[on_board], outline.row, WHITE) > 0
     bright = state[on_board] == BRIGHT
@@ -392,7 +389,7 @@ def _share_of_right_colour(points, state, outline):
 
 
 def _contrast(intensity, bright):
-    """Difference over sum of typical intensities, bright and dark; 1 where nothing is dark."""
+    """Difference over sum of typical intensities, bright and dark; 1 if nothing is dark."""
     if not bright.any() or (~bright).sum() < 5:
         return float(bright.any())
     light = np.median(intensity[bright])

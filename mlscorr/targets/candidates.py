@@ -1,6 +1,6 @@
-"""Pass 1 over the cloud: the points near each control point, whatever the file's size.
+"""First pass over the cloud: the points near each control point, for files of any size.
 
-Control points stand in balls; a raster of what reaches where finds the points of a chunk in each.
+Each control point has a ball; a raster of the balls finds the points of a chunk in each.
 """
 
 from collections.abc import Callable
@@ -18,21 +18,21 @@ NO_POINTS = PointCloud(np.empty((0, 3)), np.empty(0), np.empty(0, np.uint16))
 
 @dataclass(frozen=True)
 class Candidates:
-    """Points near control points that are kept, and the passes of the clouds.
+    """Selected points near control points, and the passes of the clouds.
 
     Parameters
     ----------
     cloud : PointCloud
-        On targets, once these are matched.
+        Points on targets, once these are matched.
     pass_number : (n,) int array
-        Of each point. A pass starts with each file and at each gap of the trajectory; passes count
-        from 1 in time.
+        Pass of each point. A pass starts with each file and at each gap of the trajectory; passes
+        are numbered from 1 in order of time.
     unplaced : PointCloud
-        Those that have no pose.
+        Points without a pose.
     passes : dict
-        Numbers of passes by (number of the file, segment of the trajectory).
+        Numbers of passes by (index of the file, segment of the trajectory).
     starts : dict
-        When these begin, likewise. Units: s.
+        Start of these, with the same keys. Units: s.
     seconds : (k,) int array
         Whole seconds of gps_time with points of the clouds.
     """
@@ -46,9 +46,10 @@ class Candidates:
 
 
 def search_radius(survey: Survey, points: ControlPoints) -> np.ndarray:
-    """Radius (n,) about surveyed points in which their images and edges must lie. Units: m.
+    """Radius (n,) around surveyed points that contains their targets with edges. Units: m.
 
-    The survey's, the target's own half diagonal, and as much for what lies about its edges.
+    It is the sum of the survey's radius, the target's half diagonal, and the same again for the
+    area around its edges.
 
     Parameters
     ----------
@@ -66,23 +67,23 @@ def collect(
     settled: Callable,
     progress: Callable,
 ) -> Candidates:
-    """Stream a survey's cloud files and hand on the points near each of its surveyed points.
+    """Stream a survey's cloud files and pass on the points near each of its surveyed points.
 
-    Memory does not grow with a file, as long as its points come about in order of time: a surveyed
-    point that was passed has its points handed on where many are held.
+    Memory does not grow with a file if its points are roughly in order of time: when many points
+    are in memory, those of surveyed points already passed are processed.
 
     Parameters
     ----------
     survey : Survey
     read : function of a CloudFile
-        Gives an iterator of PointCloud.
+        Returns an iterator of PointCloud.
     fit : function
-        ``fit(file, index, cloud)`` is given points near a surveyed point, from there (m), by the
-        numbers of the file and of this point.
+        ``fit(file, index, cloud)`` receives points relative to a surveyed point (m), with the
+        indices of the file and of this point.
     count : function of a PointCloud
-        Is given the points near surveyed points that have a pose, as they are read.
+        Receives the points with a pose near surveyed points, as they are read.
     settled : function
-        ``settled(since)`` follows some calls of fit: what is still to come of the file is not older
+        ``settled(since)`` follows some calls of fit: the remaining points of the file are not older
         than since (s).
     progress : function of a number of points
     """
@@ -118,7 +119,7 @@ def collect(
                 hand_on(number, held, latest - MATCHING.visit_gap, latest)
                 limit = max(IO.chunk_points, 2 * len(held))
             progress(len(chunk))
-            del chunk, segment, rows, has_pose, placed  # large, and needed no more
+            del chunk, segment, rows, has_pose, placed  # large, and not needed any more
         hand_on(number, held, np.inf, np.inf)
     cloud = PointCloud.concatenate(unplaced)
     passes = number_passes(starts)
@@ -127,24 +128,26 @@ def collect(
 
 
 def _whole_seconds(gps_time):
-    """The seconds with points (k,): sorted where they change, as neighbours mostly share them."""
+    """Seconds with points (k,); only changes are sorted, as adjacent points mostly share a
+    second.
+    """
     seconds = np.floor(gps_time).astype(int)
     return np.unique(seconds[np.flatnonzero(np.diff(seconds, prepend=-1))])
 
 
 def number_passes(starts: dict[tuple[int, int], float]) -> dict[tuple[int, int], int]:
-    """Numbers of passes from 1 in time, by (number of the file, segment of the trajectory).
+    """Number passes from 1 in order of time, by (index of the file, segment of the trajectory).
 
     Parameters
     ----------
     starts : dict
-        When each begins. Units: s.
+        Start of each pass. Units: s.
     """
     return {key: i for i, key in enumerate(sorted(starts, key=starts.get), start=1)}
 
 
 class Neighbourhoods:
-    """Balls about places: a raster of what reaches their squares first, then exact distances.
+    """Balls around positions: a raster of their bounding squares first, then exact distances.
 
     Parameters
     ----------
@@ -157,7 +160,7 @@ class Neighbourhoods:
     def __init__(self, position: np.ndarray, radius: np.ndarray):
         self.position = np.ascontiguousarray(position, float)
         self.radius = radius
-        margin = radius[:, None] * (1 + 1e-9)  # distances alone decide, not what is rounded here
+        margin = radius[:, None] * (1 + 1e-9)  # distances decide, not this rounding
         ends = [self.position[:, :2] + sign * margin for sign in (-1, 1)]
         low = ends[0].min(axis=0, initial=np.inf)
         extent = ends[1].max(axis=0, initial=-np.inf) - low
@@ -170,7 +173,7 @@ class Neighbourhoods:
         return Neighbourhoods(self.position[numbers], self.radius[numbers])
 
     def contains(self, xyz: np.ndarray) -> np.ndarray:
-        """Rows (k,) of the points in any ball, in order.
+        """Return the sorted rows (k,) of the points in any ball.
 
         Parameters
         ----------
@@ -180,7 +183,7 @@ class Neighbourhoods:
         return np.flatnonzero(np.bincount(np.concatenate([np.empty(0, int), *self.each(xyz)])))
 
     def each(self, xyz: np.ndarray) -> list[np.ndarray]:
-        """Rows of the points within each ball, in order.
+        """Return the sorted rows of the points within each ball.
 
         Parameters
         ----------
@@ -200,7 +203,7 @@ class Neighbourhoods:
 
 
 def _reaching(first, last, shape):
-    """Numbers of the balls that reach each cell, cell by cell, and where those of a cell start."""
+    """Numbers of the balls that overlap each cell, cell by cell, and start of each cell."""
     cells = [
         np.arange(x, east + 1)[:, None] * shape[1] + np.arange(y, north + 1)
         for (x, y), (east, north) in zip(first, last, strict=True)
@@ -213,8 +216,8 @@ def _reaching(first, last, shape):
 
 @loop
 def _enter(xyz, raster, position, squares, free, rows):
-    """Enter the row of each point at the free place of each ball it is in, or count them alone
-    where there is no room.
+    """Store the row of each point for each ball that contains it, or only count if there is no
+    room.
     """
     low, edge, shape, starts, balls = raster
     for i in range(len(xyz)):
@@ -254,7 +257,7 @@ class PointsInBalls:
         return sum(len(part) for _, part, _ in self._parts)
 
     def add(self, cloud: PointCloud) -> None:
-        """Hold points, each in a ball at least."""
+        """Store points, each in at least one ball."""
         self._read += 1
         counts = np.zeros(len(cloud), np.uint16)
         for ball, rows in enumerate(self._balls.each(cloud.xyz)):
@@ -266,21 +269,22 @@ class PointsInBalls:
         self._parts.append((self._read, cloud, counts))
 
     def since(self) -> float:
-        """Time of the oldest point. Units: s."""
+        """Return the time of the oldest point. Units: s."""
         return float(self._first.min(initial=np.inf))
 
     def passed(self, before: float) -> np.ndarray:
-        """Numbers (k,) of the balls with points of which none is later than a time (s).
+        """Numbers (k,) of the balls whose points are all before a time (s).
 
-        Those of fewest points come first: when the largest is taken, little else is held.
+        Those with the fewest points come first, so that little else is stored when the largest is
+        taken.
         """
         numbers = np.flatnonzero((self._last > -np.inf) & (self._last < before))
         return numbers[np.argsort(self._size[numbers], kind="stable")]
 
     def take(self, number: int) -> PointCloud:
-        """Points in a ball from its middle (m), as they were read.
+        """Take the points in a ball, relative to its middle (m), in reading order.
 
-        Those that no other ball waits for are let go of part by part, as dense balls are large.
+        Points that no other ball needs are released part by part, because dense balls are large.
         """
         ball = self._balls[np.array([number])]
         size = self._size[number]

@@ -1,7 +1,7 @@
-"""Points of a cloud -> pieces by pass and visit -> targets as fitted -> observations.
+"""Extraction: points of a cloud -> pieces by pass and visit -> fitted targets -> observations.
 
-Near control the kind and size of a target are known; without it a whole cloud is searched for
-whatever looks like one, while it streams.
+Near control, the kind and size of a target are known. Without control, the whole cloud is searched
+for target-like objects while it streams.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -19,7 +19,7 @@ from mlscorr.targets.scanner_path import ScannerPath, split_visits
 from mlscorr.targets.settings import SETTINGS
 from mlscorr.targets.shapes import BY_EDGES
 
-PassTarget = tuple[int, FittedTarget]  # number of a pass, or of its segment, and a target of it
+PassTarget = tuple[int, FittedTarget]  # number of a pass, or of its segment, and a target in it
 
 
 def fit_near_control(
@@ -30,27 +30,27 @@ def fit_near_control(
     Parameters
     ----------
     index : int
-        Of the surveyed point, which says where to look and for what.
+        Index of the surveyed point, which gives position, kind and size.
     cloud : PointCloud
-        Within its search radius, its places from there. Units: m.
+        Points within its search radius, relative to it. Units: m.
     survey : Survey
-        Its scanner's noise blurs the outline, and its lever arm tells where the beams came from.
+        Scanner noise blurs the outline, and the lever arm gives the origin of the beams.
     rng : numpy.random.Generator
         For the random samples of the flat patches.
 
     Returns
     -------
     list of (segment, FittedTarget)
-        Of one target several fits, by what was looked at.
+        May contain several fits of one target.
     """
     surveyed = survey.surveyed
     place = surveyed.position[index]
     shape = surveyed.kind[index], float(surveyed.size[index])
-    seed = rng.integers(2**63)  # alike for each look: none needs another
+    seed = rng.integers(2**63)  # the same for each search, so that they are independent
     by_edges = shape[0] in BY_EDGES or why_useless(cloud.intensity) is not None
     whole = search_radius(survey, surveyed)[index]
     radii = [whole]
-    if by_edges:  # of a small plate, flat patches of streets and walls farther off come first
+    if by_edges:  # flat patches of distant streets and walls have more points than a small plate
         radii.insert(0, min(SETTINGS.near_radius + shape[1] * np.sqrt(2), whole))
     targets: list[PassTarget] = []
     for radius in dict.fromkeys(radii):
@@ -73,7 +73,7 @@ def fit_near_control(
 
 
 def _as_without_control(visit, place, survey, shape, rng, known):
-    """FittedTargets that a search of the whole cloud finds in a visit of a place."""
+    """FittedTargets that a search of the whole cloud finds in a visit of a position."""
     visit = replace(visit, xyz=visit.xyz + place)
     return [
         target
@@ -83,7 +83,7 @@ def _as_without_control(visit, place, survey, shape, rng, known):
 
 
 def _with_motion(targets, survey):
-    """The targets with the motion of the POS error in their covariances."""
+    """Add the motion of the POS error to the covariances of targets."""
     time, duration = [[getattr(t, name) for _, t in targets] for name in ("gps_time", "duration")]
     motion = PosErrors.stated(survey.trajectory, survey.pos).motion_covariance(time, duration)
     return [
@@ -93,7 +93,7 @@ def _with_motion(targets, survey):
 
 
 def as_observations(targets: Sequence[PassTarget]) -> TargetObservations:
-    """Targets as observations without names, in their order.
+    """Convert targets to observations without names, in their order.
 
     Parameters
     ----------
@@ -120,25 +120,25 @@ def search_targets(
     shapes: Sequence[tuple[str, float | None]],
     rng: np.random.Generator,
 ) -> Iterator[tuple[PointCloud, list[FittedTarget]]]:
-    """Fit target-like objects in the chunks of one cloud file, while they pass through.
+    """Fit target-like objects in the chunks of one cloud file while it streams.
 
-    Memory is one chunk and a quarter, whatever the intensities are. Where points come in order of
+    Memory is one and a quarter chunks, regardless of the intensities. If points are in order of
     time, the last second of a chunk is searched again with the next.
 
     Parameters
     ----------
     chunks : iterable of PointCloud
     survey : Survey
-        Its trajectory, lever arm and scanner.
+        Trajectory, lever arm and scanner are used.
     shapes : sequence of (kind, size or None)
-        As fit_targets takes them.
+        See fit_targets.
     rng : numpy.random.Generator
 
     Yields
     ------
     chunk : PointCloud
     targets : list of FittedTarget
-        One may be in the lists of two chunks.
+        A target may be in the lists of two chunks.
     """
     carried = None
     for chunk in chunks:
@@ -154,7 +154,7 @@ def search_targets(
 
 
 def _end_of(chunk):
-    """The end of a chunk, at most a quarter of it: a scanner passes a target within a second."""
+    """End of a chunk, at most a quarter of it: a scanner passes a target within a second."""
     first = int((1.0 - SETTINGS.largest_carry) * len(chunk))
     return chunk[first:][chunk.gps_time[first:] > chunk.gps_time.max() - MATCHING.visit_gap / 2]
 
@@ -162,20 +162,20 @@ def _end_of(chunk):
 def pieces(
     cloud: PointCloud, survey: Survey
 ) -> Iterator[tuple[PointCloud, ScannerPath, BrightRegion]]:
-    """What lies about each bright region, by pass and visit.
+    """Yield the surroundings of each bright region, by pass and visit.
 
     Parameters
     ----------
     cloud : PointCloud
     survey : Survey
-        Its trajectory and lever arm.
+        Trajectory and lever arm are used.
     """
     regions = bright_regions(cloud.xyz, cloud.intensity)[: SETTINGS.largest_fits]
     centre = np.array([region.centre for region in regions]).reshape(-1, 3)
-    radius = 2 * np.array([region.radius for region in regions])  # what lies behind its edges
+    radius = 2 * np.array([region.radius for region in regions])  # with the area behind its edges
     for region, rows in zip(regions, Neighbourhoods(centre, radius).each(cloud.xyz), strict=True):
         for _, visit in split_visits(cloud[rows], survey):
-            surplus = max(0, len(visit) - SETTINGS.piece_points)  # of a stop in front of it
+            surplus = max(0, len(visit) - SETTINGS.piece_points)  # from a stop in front of it
             piece = visit[surplus // 2 : len(visit) - (surplus + 1) // 2]
             yield piece, ScannerPath.of(survey, piece.gps_time), region
 
@@ -189,14 +189,14 @@ def fit_piece(
     rng: np.random.Generator,
     known: Sequence[FittedTarget] = (),
 ) -> list[FittedTarget]:
-    """The FittedTarget of the shape that fits a region best, each fitted to the end, in a list.
+    """Return the FittedTarget of the best shape for a region, as a list.
 
     Parameters
     ----------
     cloud, path, region
-        A piece as of ``pieces``.
+        A piece from ``pieces``.
     shapes, scanner, rng, known
-        As fit_targets takes them.
+        See fit_targets.
     """
     targets = [
         target

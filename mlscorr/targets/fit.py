@@ -1,4 +1,4 @@
-"""Targets of one piece of cloud: what extraction near control and search without it both call."""
+"""Targets in one piece of cloud, for extraction near control and for search without it."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -21,16 +21,16 @@ from mlscorr.targets.shapes import BY_EDGES
 
 @dataclass(frozen=True)
 class TargetView:
-    """What a figure of one target shows, in its plane; (u, v) from an arbitrary origin, in m.
+    """Data for a figure of one target, in its plane; (u, v) from an arbitrary origin, in m.
 
     Parameters
     ----------
     points : (k, 2) array
-        Where the beams near the target crossed its plane.
+        Crossings of the beams near the target with its plane.
     state : (k,) int array
-        1 bright, 0 dark, -1 went by it.
+        1 bright, 0 dark, -1 passed by.
     outline : Outline
-        As fitted, larger than the size where the disc blooms.
+        Fitted outline, larger than the size if the disc blooms.
     axes : (2, 3) array
         Map directions of u and v.
     """
@@ -43,7 +43,7 @@ class TargetView:
 
 @dataclass(frozen=True)
 class Centre:
-    """Where and when a beam meets the centre of an outline in a plane.
+    """Position and time at which a beam meets the center of an outline in a plane.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class Centre:
     duration : float
         Standard deviation of the points' times. Units: s.
     normal : (3,) array
-        Towards the scanner.
+        Toward the scanner.
     """
 
     position: np.ndarray
@@ -68,9 +68,9 @@ class Centre:
 
 @dataclass(frozen=True)
 class FittedTarget(Centre):
-    """One target in one piece of cloud: what a row of TargetObservations holds, and more.
+    """One target in one piece of cloud: the data of a row of TargetObservations, and more.
 
-    Its position is that in the map; its covariance is without the motion of the POS error.
+    The position is in map coordinates; the covariance does not include the motion of the POS error.
 
     Parameters
     ----------
@@ -78,11 +78,11 @@ class FittedTarget(Centre):
     size, size_sigma : float
         As given (sigma 0), or estimated. Units: m.
     points : int
-        Number of points on the target; about a hole, on the board around it.
+        Number of points on the target; for a hole, on the board around it.
     score : float
-        How target-like it is, 0 to 1: overlap, support of the outline, contrast and flatness.
+        Likeness to a target, 0 to 1, from overlap, support of the outline, contrast and flatness.
     cloud : PointCloud
-        These points.
+        Points on the target.
     view : TargetView
     """
 
@@ -96,11 +96,11 @@ class FittedTarget(Centre):
 
     @property
     def outline(self) -> Outline:
-        """As fitted."""
+        """Fitted outline."""
         return self.view.outline
 
     def overlaps(self, other: "FittedTarget") -> bool:
-        """Whether two fits are one target at one visit: less than half a target apart.
+        """True if two fits are one target at one visit: less than half a target apart.
 
         Parameters
         ----------
@@ -125,27 +125,27 @@ def fit_targets(
     Parameters
     ----------
     cloud : PointCloud
-        A few metres of cloud.
+        A few meters of cloud.
     path : ScannerPath
-        While they were measured.
+        Path while the points were measured.
     shapes : sequence of (kind, size or None)
-        What to look for; where the size (m) is None it is estimated.
+        Shapes to search for; a size (m) of None is estimated.
     scanner : Scanner
-        Noise that blurs the outline.
+        Its noise blurs the outline.
     rng : numpy.random.Generator
-        For the random samples in which flat patches are looked for.
+        For the random samples of the flat patches.
     region : BrightRegion, optional
-        The only one to look at.
+        Restricts the search to this region.
     origin : (3,) array, optional
-        What the places of the cloud are counted from; 0 by default. Units: m.
+        Origin of the cloud's coordinates; 0 by default. Units: m.
     known : sequence of FittedTarget
-        Of this visit already: where a good fit is of them, none is made.
+        Targets already found in this visit; no new fit is made where one of them is good.
 
     Returns
     -------
     list of FittedTarget
-        Best first; no two at the same place. Where the intensity is of no use, plates that stand
-        free are found by their edges.
+        Sorted by decreasing score, without two at the same position. If the intensity is useless,
+        free-standing plates are found by their edges.
     """
     if len(cloud) < SETTINGS.smallest_count:
         return []
@@ -177,12 +177,12 @@ def fit_targets(
 
 
 def why_useless(intensity: np.ndarray) -> str | None:
-    """Sentence for intensities that tell no bright target; None where they can.
+    """Sentence for intensities that do not show bright targets; None if they do.
 
     Parameters
     ----------
     intensity : (n,) array
-        8 bits in 16 are no reason: only ratios count.
+        8 bits stored in 16 are no reason, because only ratios count.
 
     >>> import numpy as np
     >>> why_useless(np.zeros(1000))
@@ -206,10 +206,10 @@ def fit_seeds(
     known: Sequence[FittedTarget],
     scanner: Scanner,
 ) -> list[ShapeFit]:
-    """Exact fits of seeds, each where none is good already.
+    """Exact fits of seeds, without those that a good fit already covers.
 
-    A rough fit that is refused in the end, as that of a single scan line, settles nothing: what
-    waited for it is looked at again.
+    If the exact fit refuses a rough fit, such as one of a single scan line, the seeds that waited
+    for it are tried again.
 
     Parameters
     ----------
@@ -242,10 +242,10 @@ def fit_seeds(
 
 
 def distinct(targets: Iterable[FittedTarget]) -> list[FittedTarget]:
-    """The best target of each place and visit, in order of time.
+    """Best target of each position and visit, in order of time.
 
-    Where two are the same, the one with more points is kept: the edge of a
-    piece cut the other.
+    Of two fits of the same target, the one with more points is kept, because the edge of a piece
+    cut the other.
 
     Parameters
     ----------
@@ -261,7 +261,9 @@ def distinct(targets: Iterable[FittedTarget]) -> list[FittedTarget]:
 
 
 def _is_settled(fit, seed, kind, size):
-    """Whether a good fit of the same shape is where a seed is: another level tells nothing new."""
+    """True if a good fit of the same shape covers a seed, so that another level gives nothing
+    new.
+    """
     if (fit.kind, fit.size) != (kind, size) or fit.outline.overlap < SETTINGS.close_overlap:
         return False
     middle = seed.plane.origin + seed.middle @ seed.plane.axes[:2]
@@ -269,7 +271,7 @@ def _is_settled(fit, seed, kind, size):
 
 
 def _best(fits):
-    """The best fit at each place, best first: half a target apart or less is one place."""
+    """Best fit at each position, sorted by score; up to half a target apart is one position."""
     best: list[ShapeFit] = []
     for fit in sorted(fits, key=lambda fit: -fit.assessment.rank):
         apart = [np.linalg.norm(fit.position - other.position) for other in best]
@@ -280,7 +282,9 @@ def _best(fits):
 
 
 def _as_target(echoes, fit, origin):
-    """The fit in the map: centre, covariance, normal towards the scanner, time at the centre."""
+    """Convert a fit to the map: center, covariance, normal toward the scanner, time at the
+    center.
+    """
     points, state, rows = fit.beams
     plane = fit.seed.plane
     outline = fit.outline
@@ -305,7 +309,7 @@ def _as_target(echoes, fit, origin):
 
 
 def centre_of(echoes: Echoes, plane: Plane, outline: Outline, rows: np.ndarray) -> Centre:
-    """Centre of an outline in space from the points on the target.
+    """Center of an outline in space from the points on the target.
 
     Parameters
     ----------
@@ -315,9 +319,9 @@ def centre_of(echoes: Echoes, plane: Plane, outline: Outline, rows: np.ndarray) 
     rows : (k,) int array
         Points on the target.
 
-    Height and time there follow by regression, as the points may lie on one side of it. A plane
-    too far moves the centre along the beam. Range noise may be correlated from point to point,
-    which plain sigmas of a fit overlook: the residuals tell by how much.
+    Height and time at the center follow by regression, because the points may be on one side of it.
+    A plane that is too far moves the center along the beam. Range noise may be correlated from
+    point to point, which simple sigmas of a fit ignore; the residuals show by how much.
     """
     crossing = plane.crossing(echoes.xyz[rows], echoes.sight(rows))
     weights = np.linalg.pinv(np.column_stack([np.ones(len(rows)), crossing - outline.centre]))[0]
@@ -332,7 +336,7 @@ def centre_of(echoes: Echoes, plane: Plane, outline: Outline, rows: np.ndarray) 
     normal = plane.axes[2]
     if beam[2] > 0:
         normal = -normal
-    floor = (SETTINGS.rounding / 3) ** 2  # what rounding leaves in a mean of many points
+    floor = (SETTINGS.rounding / 3) ** 2  # rounding that remains in a mean of many points
     return Centre(
         position=plane.origin + outline.centre @ plane.axes[:2],
         covariance=plane.axes.T @ covariance @ plane.axes + floor * np.eye(3),
@@ -343,9 +347,9 @@ def centre_of(echoes: Echoes, plane: Plane, outline: Outline, rows: np.ndarray) 
 
 
 def _correlation_factor(residual):
-    """By how much correlation from point to point raises the variance of a mean, at least 1.
+    """Factor by which correlation from point to point increases the variance of a mean, at least 1.
 
-    Source: 1 + 2 sum of the autocorrelation up to where it is lost in its own noise.
+    It is 1 + 2 times the sum of the autocorrelation, up to the lag where noise dominates.
     """
     n = len(residual)
     centred = residual - residual.mean()

@@ -1,8 +1,8 @@
-"""Compact bright regions of a chunk of cloud: where targets may be when nobody says where.
+"""Compact bright regions of a chunk of cloud: possible targets without control.
 
-A target stands out against what surrounds it, whatever the range does to all intensities there.
-So levels are relative to the darker part of the neighbourhood, and connected regions at every half
-octave above it are looked at (a component tree; Najman and Couprie 2006).
+A target is brighter than its surroundings, whatever the effect of range on all intensities there.
+Levels are therefore relative to the darker part of the neighborhood, and connected regions at every
+half octave above it are tested (a component tree; Najman and Couprie 2006).
 """
 
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ LEVELS = OCTAVE * np.iinfo(np.uint16).bits
 
 @dataclass(frozen=True)
 class BrightRegion:
-    """A bright region of a cloud.
+    """Bright region of a cloud.
 
     Parameters
     ----------
@@ -34,9 +34,9 @@ class BrightRegion:
     radius : float
         Half its extent. Units: m.
     threshold : float
-        The least intensity of its points.
+        Smallest intensity of its points.
     likeness : float
-        Jaccard index of its points and those of the shape that is most like it.
+        Jaccard index of its points and those of the most similar shape.
     """
 
     centre: np.ndarray
@@ -46,23 +46,23 @@ class BrightRegion:
 
 
 def bright_regions(xyz: np.ndarray, intensity: np.ndarray) -> list[BrightRegion]:
-    """Flat regions of 0.1 to 1.5 m, brighter than their neighbourhood and of a target's shape.
+    """Flat regions of 0.1 to 1.5 m, brighter than their neighborhood and of a target's shape.
 
     Parameters
     ----------
     xyz : (n, 3) array
         In any order. Units: m.
     intensity : (n,) array
-        Of any positive scale; whatever range does to it, it does to the neighbourhood too.
+        On any positive scale; range affects it and the neighborhood alike.
 
     Returns
     -------
     list of BrightRegion
-        The best first, of those at one place only the best.
+        Sorted by likeness; only the best at each position.
     """
     low = np.array([column.min() for column in xyz.T])  # faster than along the short axis
     level = _levels(intensity)
-    edge = 2 * SETTINGS.largest_size / 3  # of a third of a neighbourhood
+    edge = 2 * SETTINGS.largest_size / 3  # one third of a neighborhood
     cell, keys_of, keys, number = number_voxels(xyz, low, edge)
     bright = np.flatnonzero(level > _background(cell, keys_of, keys, number, level)[cell])
     thick = SETTINGS.thickness
@@ -78,7 +78,7 @@ def bright_regions(xyz: np.ndarray, intensity: np.ndarray) -> list[BrightRegion]
 
 
 def _levels(intensity):
-    """Intensity (n,) in half octaves: (n,) small integers, all at least 0."""
+    """Intensity (n,) in half octaves, as small integers that are at least 0."""
     steps = np.log2(np.maximum(np.arange(1 << 16), 1)) * OCTAVE
     return np.floor(steps).astype(np.int8)[np.asarray(intensity).astype(np.uint16)]
 
@@ -107,16 +107,16 @@ def _background(cell, keys_of, keys, number, level):
         while below + around[step] < half:
             below += around[step]
             step += 1
-        # a road or wall passes through 9 of the 27 cells; a plate in the air is all there is
+        # a road or wall passes through 9 of the 27 cells; a plate in the air fills its cells alone
         dark[c] = step if occupied >= 9 else -1
     return dark
 
 
 def _component_tree(local, level, edge, limits):
-    """Components (k, 17) of bright points (n, 3) at each level, those that may be a target.
+    """Components (k, 17) of bright points (n, 3) at each level that may be a target.
 
     Columns: level, points, low (3), high (3), sum (3), sum of products (xx, yy, zz, xy, xz, yz).
-    Their _moments come too.
+    Their _moments are also returned.
     """
     count, extent, thick, ratio = limits
     voxel, keys_of, keys, number = number_voxels(local, np.zeros(3), edge)
@@ -153,9 +153,9 @@ def _moments(table):
 
 @loop
 def _joined(table, brightest, order, keys_of, keys, number, smallest, largest):
-    """Rows (k, 17) of the components of voxels, of enough points and not too large, at each level.
+    """Rows (k, 17) of the components of voxels at each level, limited in points and size.
 
-    A component that a level adds to has a voxel of that level, which no other one has.
+    A component that grows at a level has a voxel of that level, which no other one has.
     """
     n = len(order)
     parent = np.full(n, -1)
@@ -208,10 +208,9 @@ def _join(parent, table, voxel, beside):
 
 @loop
 def _likeness(levels, moments, xyz, low, level, grid, shape, largest):
-    """How far each component agrees with a disc, a square or a checkerboard, and the level from
-    which it does best: (k, 2).
+    """Likeness of components to a disc, square or checkerboard, and its best level: (k, 2).
 
-    grid holds the rows of the points (n, 3) sorted by cells, and the cells' hash table.
+    grid has the rows of the points (n, 3) sorted by cells, and the cells' hash table.
     """
     order, starts, keys, number, edge = grid
     thick, end, border, ratio, directions = shape
@@ -251,10 +250,10 @@ def _likeness(levels, moments, xyz, low, level, grid, shape, largest):
 
 
 def _as_regions(table, likeness, level, low):
-    """Regions of components that are like a target, the best of each place.
+    """Regions of target-like components, the best at each position.
 
-    Of a disc on a board in the air, both are; it is the disc that was surveyed, so that what is
-    four times as bright within another takes its place.
+    A disc on a board in the air gives two, of which the disc was surveyed. A region within another
+    that is four times as bright therefore replaces it.
     """
     radius = np.linalg.norm(table[:, 5:8] - table[:, 2:5], axis=1) / 2
     middle = (table[:, 5:8] + table[:, 2:5]) / 2
@@ -275,19 +274,19 @@ def _as_regions(table, likeness, level, low):
 def jaccard_index(
     uv: np.ndarray, bright: np.ndarray, longest: float, largest_ratio: float, directions: int
 ) -> float:
-    """Largest share of common points of the bright ones and those in a shape that spans them.
+    """Jaccard index of the bright points and those in a shape around them, for the best shape.
 
     Parameters
     ----------
     uv : (n, 2) array
-        Places in a plane. Units: m.
+        Positions in a plane. Units: m.
     bright : (n,) bool array
     longest : float
-        The shape spans those that are no farther from the middle. Units: m.
+        The shape spans points up to this distance from the middle. Units: m.
     largest_ratio : float
-        Of its length and width.
+        Largest ratio of length to width.
     directions : int
-        In which it is measured.
+        Number of directions tested.
     """
     spanned = np.empty(len(uv), np.bool_)
     for i in range(len(uv)):
@@ -307,8 +306,9 @@ def jaccard_index(
     height = high_y - low_y
     first = 0
     if max(width, height) > largest_ratio * min(width, height):
-        # the white quadrants of a checkerboard fill the rectangle along their diagonal, which is
-        # as small as their own; what fills a rectangle needs twice of it when turned by 45 deg
+        # the white quadrants of a checkerboard fill the rectangle along their diagonal, which is as
+        # small as their own; other shapes that fill a rectangle need twice its area when turned by
+        # 45 deg
         turn = turn + np.pi / 4
         first = 2
         low_x, high_x, low_y, high_y = _extent(uv, spanned, turn)

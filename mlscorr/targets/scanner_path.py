@@ -1,4 +1,4 @@
-"""Where the scanner was, and when it came by: one observation of a target for each visit of it."""
+"""Path of the scanner, and visits of a position: one observation of a target for each visit."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from mlscorr.targets.settings import SETTINGS
 
 @dataclass(frozen=True)
 class ScannerPath:
-    """Places of a scanner, between which it moved evenly: exact enough for directions.
+    """Positions of a scanner, with uniform motion between them, accurate enough for directions.
 
     Parameters
     ----------
     gps_time : (k,) array
-        Two at least, in order. Units: s.
+        At least two, sorted. Units: s.
     position : (k, 3) array
         Units: m.
 
@@ -34,14 +34,14 @@ class ScannerPath:
 
     @classmethod
     def of(cls, survey: Survey, gps_time: np.ndarray) -> ScannerPath:
-        """The path at the epochs of a survey's trajectory about times.
+        """Make the path from the epochs of a survey's trajectory around given times.
 
         Parameters
         ----------
         survey : Survey
-            Its trajectory and lever arm.
+            Trajectory and lever arm are used.
         gps_time : (n,) array
-            One at least. Units: s.
+            At least one. Units: s.
         """
         trajectory = survey.trajectory
         time = survey.trajectory.gps_time
@@ -52,30 +52,30 @@ class ScannerPath:
         return cls(time[epochs], trajectory.position[epochs] + arm)
 
     def at(self, gps_time: np.ndarray) -> np.ndarray:
-        """Places (n, 3) at times (n,) in s. Units: m."""
+        """Return positions (n, 3) at times (n,) in s. Units: m."""
         return np.column_stack([np.interp(gps_time, self.gps_time, p) for p in self.position.T])
 
     def seen_from(self, origin: np.ndarray) -> ScannerPath:
-        """The path in coordinates from an origin (3,) in m."""
+        """Return the path in coordinates relative to an origin (3,) in m."""
         return ScannerPath(self.gps_time, self.position - origin)
 
 
 def split_visits(cloud: PointCloud, survey: Survey) -> list[tuple[int, PointCloud]]:
-    """Visits of a place.
+    """Split a cloud into visits of a position.
 
     Parameters
     ----------
     cloud : PointCloud
     survey : Survey
-        Its trajectory and lever arm.
+        Trajectory and lever arm are used.
 
     Returns
     -------
     list of (segment of the trajectory, PointCloud)
-        The points of each visit, in time; those without a pose in none. Of a cloud in order of
-        time these are views.
+        Points of each visit, sorted by time, without those that have no pose. They are views if the
+        cloud is sorted by time.
 
-    A pause of two seconds parts two visits, and so does a turn back (a U-turn before a target); a
+    A pause of two seconds separates visits, and so does a reversal (a U-turn before a target); a
     stop is one visit.
     """
     time = cloud.gps_time
@@ -91,7 +91,7 @@ def split_visits(cloud: PointCloud, survey: Survey) -> list[tuple[int, PointClou
 
 
 def _visits(cloud, survey):
-    """The points in order of time of each visit, of those of a segment of the trajectory."""
+    """Points of each visit in order of time, within a segment of the trajectory."""
     time = cloud.gps_time
     ends = np.unique([0, *(np.flatnonzero(np.diff(time) > MATCHING.visit_gap) + 1), len(time)])
     turns = [first + _turns(time[first:last], survey) for first, last in pairwise(ends)]
@@ -100,7 +100,7 @@ def _visits(cloud, survey):
 
 
 def _turns(gps_time, survey):
-    """Rows at which the vehicle turned back against the way it came."""
+    """Rows at which the vehicle reversed its direction."""
     scanner = ScannerPath.of(survey, gps_time)
     path = scanner.position
     marks = _each_step(path, SETTINGS.turn_step)
@@ -117,7 +117,7 @@ def _turns(gps_time, survey):
 
 
 def _each_step(path, step):
-    """Rows (k,) of a path, of which each is the first farther than a step from the one before."""
+    """Rows (k,) of a path, each the first that is farther than a step from the previous one."""
     places = path[:, :2].tolist()
     marks = [0]
     for row, place in enumerate(places):

@@ -1,7 +1,7 @@
-"""Shapes of targets: which side of its outline a beam that crossed its plane should tell.
+"""Shapes of targets: the side of the outline on which a beam is expected to fall.
 
-A trial outline is a row of u, v (centre, m), turn (rad), size (m) and inner (share of the size
-that a ring's dark inner disc takes, 0 for none).
+A trial outline is a row of u, v (center, m), turn (rad), size (m) and inner (dark inner disc of a
+ring as a share of the size, 0 for none).
 """
 
 from functools import cache
@@ -12,11 +12,11 @@ from scipy.special import ndtr
 from mlscorr.compiled_loops import loop
 from mlscorr.targets.settings import SETTINGS
 
-# what a beam did at the plane: went by, met dark, met bright
+# state of a beam at the plane: passed by, dark, bright
 MISS = -1
 DARK = 0
 BRIGHT = 1
-ROUND, SQUARE, CHECKERED, WHITE = range(4)  # WHITE: a checkerboard's, endless
+ROUND, SQUARE, CHECKERED, WHITE = range(4)  # WHITE: a checkerboard's, unbounded
 FORMS = {
     "circle": ROUND,
     "hole": ROUND,
@@ -25,9 +25,9 @@ FORMS = {
     "checkerboard": CHECKERED,
 }
 PERIOD = {"square": np.pi / 2, "board": np.pi / 2, "checkerboard": np.pi}  # of turn; rad
-BY_EDGES = ("hole", "board")  # told by where beams pass, not by intensity
-TABLE_SIGMAS = 5.0  # from the outline, beyond which a beam's place tells no more
-TABLE_STEPS = 200  # a sigma: the tables are exact to 5e-6 between them
+BY_EDGES = ("hole", "board")  # recognized by passing beams, not by intensity
+TABLE_SIGMAS = 5.0  # from the outline, beyond which a beam's position gives no more information
+TABLE_STEPS = 200  # steps per sigma: the tables are accurate to 5e-6 between them
 
 
 def diameter(kind: str, size: float) -> float:
@@ -45,7 +45,7 @@ def diameter(kind: str, size: float) -> float:
 
 
 def sides(state: np.ndarray, kind: str, by_edges: bool) -> np.ndarray:
-    """Side (n,) that each beam tells: 1 inside, -1 outside; a checkerboard's state stays as is.
+    """Side (n,) of each beam: 1 inside, -1 outside; a checkerboard keeps the state.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def sides(state: np.ndarray, kind: str, by_edges: bool) -> np.ndarray:
         BRIGHT, DARK or MISS.
     kind : str
     by_edges : bool
-        Whether intensity tells nothing.
+        True if intensity gives no information.
     """
     if kind == "checkerboard" and not by_edges:
         return state.astype(np.int8)
@@ -67,13 +67,13 @@ def sides(state: np.ndarray, kind: str, by_edges: bool) -> np.ndarray:
 
 
 def form_of(kind: str, by_edges: bool) -> int:
-    """Form that the likelihood uses: by its edges, a checkerboard is a square like others.
+    """Form used by the likelihood; by its edges, a checkerboard is a square like others.
 
     Parameters
     ----------
     kind : str
     by_edges : bool
-        Whether intensity tells nothing.
+        True if intensity gives no information.
     """
     if kind == "checkerboard" and by_edges:
         return SQUARE
@@ -82,7 +82,7 @@ def form_of(kind: str, by_edges: bool) -> int:
 
 @loop
 def _within(x, y, half, inner, form):
-    """Distance (m) inside the outline of a place in the shape's own axes, negative outside."""
+    """Distance (m) inside the outline of a position in the shape's own axes, negative outside."""
     if form == WHITE:
         if x * y > 0:
             return min(abs(x), abs(y))
@@ -104,9 +104,9 @@ def distance_inside(points: np.ndarray, outline: np.ndarray, form: int) -> np.nd
     points : (n, 2) array
         Units: m.
     outline : (5,) array
-        As a row of trial outlines.
+        A row of trial outlines.
     form : int
-        WHITE asks for the distance from a checkerboard's crossing lines, positive on white.
+        WHITE gives the distance from a checkerboard's crossing lines, positive on white.
     """
     cos = np.cos(outline[2])
     sin = np.sin(outline[2])
@@ -122,7 +122,9 @@ def distance_inside(points: np.ndarray, outline: np.ndarray, form: int) -> np.nd
 
 @cache
 def _tables(wrong):
-    """Probability that a beam tells inside, at steps of a sigma about the outline, and its log."""
+    """Probability that a beam falls inside, at fractions of sigma around the outline, and its
+    log.
+    """
     z = np.arange(-TABLE_SIGMAS * TABLE_STEPS, TABLE_SIGMAS * TABLE_STEPS + 2) / TABLE_STEPS
     share = wrong + (1 - 2 * wrong) * ndtr(z)
     return share, np.log(share)
@@ -130,12 +132,14 @@ def _tables(wrong):
 
 @loop
 def _from_table(table, distance, width):
-    """Value at a distance inside the outline: quick where it is constant, nearly everywhere."""
+    """Value at a distance inside the outline; fast where it is constant, which is nearly
+    everywhere.
+    """
     if distance > TABLE_SIGMAS * width:
         return table[-2]
     if distance < -TABLE_SIGMAS * width:
         return table[0]
-    if np.isnan(distance):  # of a beam along the plane
+    if np.isnan(distance):  # of a beam parallel to the plane
         return distance
     place = (distance / width + TABLE_SIGMAS) * TABLE_STEPS
     entry = int(place)
@@ -145,7 +149,7 @@ def _from_table(table, distance, width):
 def log_likelihood(
     points: np.ndarray, side: np.ndarray, outlines: np.ndarray, form: int, width: float
 ) -> np.ndarray:
-    """Log likelihood (c,) of trial outlines by the beams' places and sides.
+    """Log likelihood (c,) of trial outlines, given the beams' positions and sides.
 
     Parameters
     ----------
@@ -155,11 +159,11 @@ def log_likelihood(
     outlines : (c, 5) array
     form : int
     width : float
-        One sigma of a beam's place. Units: m.
+        One sigma of a beam's position. Units: m.
 
-    Source: Bernoulli, each point inside or outside with a probability that falls across the
-    outline as a normal distribution of this width. A checkerboard's sides are states: beside the
-    board bright and dark are equally likely, on it no beam passes.
+    The model is Bernoulli: each point is inside or outside with a probability that decreases across
+    the outline as a normal distribution of this width. A checkerboard's sides are states: next to
+    the board bright and dark are equally likely, and no beam passes through it.
     """
     return _log_likelihood(points, side, outlines, form, width, *_tables(SETTINGS.wrong_side))
 

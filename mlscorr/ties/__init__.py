@@ -1,6 +1,7 @@
-"""What two passes both saw: pairs of features, which agree, and what they correct.
+"""Tie features in overlaps: pairs of features, their agreement, and the resulting correction.
 
-Pairs and corrections come in turn: what the first pairs correct shows which are pairs at all.
+Pairing and correction alternate: the correction from the first pairs shows which further pairs are
+valid.
 """
 
 from mlscorr.ties._tied_mounting import coarse_mounting, remounted, tie_mounting

@@ -1,4 +1,4 @@
-"""Mountings by ties: paired while these may be wrong by degrees, and paired again, ever nearer."""
+"""Calibration of mountings by ties, starting from errors of degrees, with repeated pairing."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -27,20 +27,20 @@ from mlscorr.ties.thinning import some_blocks
 def tie_mounting(
     survey: Survey, calibration: Calibration, matched: Matched, features: TieFeatures
 ) -> Calibration:
-    """The calibration with the ties of a survey; the same where nothing was seen twice.
+    """Return the calibration with the ties of a survey, or unchanged if there is no overlap.
 
-    Mountings that put the planes of all visits on each other are looked for as far from the
-    calibrated ones as their sigmas allow. Then pairs are made as far apart as the POS allows, and
-    half as far with each correction that they give, down to the scatter of what is left of them.
+    Mountings that align the planes of all visits are searched within the sigmas of the calibrated
+    ones. Then features are paired within the gate that the POS allows, which is halved with each
+    correction, down to the scatter of the residuals.
 
     Parameters
     ----------
     survey : Survey
-        Its search radius is the limit.
+        The search radius is the limit.
     calibration : Calibration
-        By control points alone, or what is believed of the mountings.
+        From control points only, or the prior of the mountings.
     matched : Matched
-        These points.
+        Matched control points.
     features : TieFeatures
     """
     recorded = calibration.recorded
@@ -49,7 +49,7 @@ def tie_mounting(
     trajectory = calibration.trajectory
     views = (features.centre, features.gps_time, features.scanner)
 
-    # Coarsely: mountings within their sigmas that put the planes of all visits on each other
+    # Coarse: mountings within their sigmas that align the planes of all visits
     sigma = placed_sigma(drift, survey.with_mountings(mountings), features)
     radius = min(widest_gate(sigma), survey.search_radius)
     moved = remounted(features, trajectory, recorded, mountings)
@@ -58,7 +58,7 @@ def tie_mounting(
     start = coarse_mounting(moved, trajectory, mountings, sigma, radius)
     corrections = mounted_corrections(drift, recorded, start)
 
-    # Finely: ties about what the corrections make of each place, within ever nearer gates
+    # Fine: ties after the corrections of each position, within ever narrower gates
     def corrected(place, gps_time):
         return place + increments_by_scanner(corrections, place, gps_time, features.scanner)
 
@@ -86,25 +86,25 @@ def coarse_mounting(
     sigma: np.ndarray,
     radius: float,
 ) -> tuple[Mounting, ...]:
-    """Mountings of k scanners that put the planes of all visits on each other.
+    """Mountings of k scanners that align the planes of all visits.
 
     One lever arm and one boresight of each scanner for the whole survey, and a shift of each pass,
-    are looked for together: a shift of each stretch of time would take up what a boresight does,
-    and leave it half unexplained. A scanner that sees nothing twice is held by what others see. All
-    parallel planes within a radius pull, with weights (Geman-McClure) whose width halves, and are
-    paired anew each time. It is a start for pair_features, no more.
+    are estimated together. A shift of each interval of time would absorb half of a boresight error.
+    A scanner without an overlap of its own is constrained by the other scanners. All parallel
+    planes within a radius contribute, with weights (Geman-McClure) whose width is halved in each
+    iteration, and are paired again each time. The result is only a start for pair_features.
 
     Parameters
     ----------
     features : TieFeatures
-        As georeferenced with the recorded mountings.
+        Georeferenced with the recorded mountings.
     trajectory : Trajectory
     mountings : sequence of Mounting
-        As recorded, with the covariance of what is known of each.
+        Recorded mountings, with the prior covariance of each.
     sigma : (n,) array
-        One sigma of the features' places by the POS. Units: m.
+        One sigma of the features' positions due to the POS. Units: m.
     radius : float
-        Of the search. Units: m.
+        Search radius. Units: m.
     """
     count = len(mountings)
     planes = some_blocks(features[features.kind == "plane"], count * SETTINGS.coarse_features)
@@ -154,14 +154,14 @@ def remounted(
     recorded: Sequence[Mounting],
     mountings: Sequence[Mounting],
 ) -> TieFeatures:
-    """Features as other mountings give them: their places and directions  (Eq. 1).
+    """Return features recomputed for other mountings: positions and directions  (Eq. 1).
 
     Parameters
     ----------
     features : TieFeatures
     trajectory : Trajectory
     recorded, mountings : sequence of Mounting
-        Of each scanner: that of the features, and the other.
+        Of each scanner: the mounting behind the features, and the other one.
     """
 
     def move(place, gps_time):
@@ -175,14 +175,14 @@ def remounted(
 def turned_directions(features: TieFeatures, move: Callable) -> np.ndarray:
     """Directions (n, 3) of features whose points are moved, each by its own time.
 
-    A wall that a line scanner passes keeps the direction of the way, whatever the boresight: what
-    turns is the scan line.
+    A wall that a line scanner passes keeps its direction along the path, whatever the boresight;
+    only the scan line turns.
 
     Parameters
     ----------
     features : TieFeatures
     move : function of places (n, 3) and times (n,)
-        Gives places. Units: m, s.
+        Returns positions. Units: m, s.
     """
     axis = features.direction
     rows = np.arange(len(features))
@@ -204,7 +204,9 @@ def turned_directions(features: TieFeatures, move: Callable) -> np.ndarray:
 
 
 def _design(features, trajectory, mountings, passes, pairs, normal):
-    """Rows of pairs: n (first - second) of the k mountings and of p passes' shifts (6 k + 3 p)."""
+    """Rows of pairs: n (first - second) of the k mountings and of the shifts of p passes (6 k +
+    3 p).
+    """
     first = 2 * len(mountings)
     numbered = dict(enumerate(mountings))
     rows = np.zeros((len(pairs), first + len(passes), 3))

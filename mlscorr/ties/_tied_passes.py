@@ -1,4 +1,4 @@
-"""Passes of a drive brought together: ties are paired, corrected, and paired again, ever nearer."""
+"""Ties between the passes of a drive: pairing and correction within narrowing gates."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -22,21 +22,22 @@ from mlscorr.ties.thinning import thinned_ties
 
 
 def tie_passes(survey: Survey, estimate: Estimate, features: TieFeatures) -> Estimate:
-    """The estimate with the ties of a survey; the same with the reason where nothing is tied.
+    """Return the estimate with the ties of a survey, or with the reason if there are none.
 
-    Pairs are looked for as far apart as the sigmas of the estimate allow; with each correction that
-    they make, within the geometric mean of that and of the scatter of what is left of them, half as
-    far at most, down to that scatter: at once, where a round left hardly less than that before.
+    The first gate follows from the sigmas of the estimate. After each correction, the gate becomes
+    the geometric mean of itself and the scatter of the residuals, at most half of itself, down to
+    that scatter. If an iteration hardly reduces the residuals, the gate drops to the scatter at
+    once.
 
     Parameters
     ----------
     survey : Survey
-        Its search radius is the limit.
+        The search radius is the limit.
     estimate : Estimate
-        By control points alone.
+        From control points only.
     features : TieFeatures
     """
-    mountings = ()  # that are open: those of several scanners, of which ties tell
+    mountings = ()  # unknown mountings: those of several scanners, which ties determine
     if survey.scanners and None not in survey.mountings:
         mountings = survey.mountings
     sigma = placed_sigma(estimate.correction, survey, features)
@@ -48,14 +49,15 @@ def tie_passes(survey: Survey, estimate: Estimate, features: TieFeatures) -> Est
     limit = 0.0
     while True:
         pairs = pair_features(features, moved, sigma, radius, pause=pause)
-        if not mountings:  # two scanners tell of their mountings, not of the drift
+        if not mountings:  # two scanners give information on their mountings, not on the drift
             pairs = pairs[pairs.scanner[:, 0] == pairs.scanner[:, 1]]
         ties = agreeing_ties(pairs, moved)
         if len(ties) == 0 and not estimate.untied:
             estimate = _untied(estimate, features, radius)
         is_last = len(ties) == 0 or radius <= limit
         if is_last and least < pause:
-            # visits come first: metres apart, they had no tie within the gates of a single one
+            # visits come first: with meters between them, they had no tie within the gates of a
+            # single one
             pause = least
             mountings = (survey.assumed_mounting,)
             continue
@@ -66,7 +68,7 @@ def tie_passes(survey: Survey, estimate: Estimate, features: TieFeatures) -> Est
             noted = replace(estimate, notes=(*estimate.notes, *unheld))
             return with_ties(noted, ties, mountings, survey.included)
 
-        half = thinned_ties(ties, SETTINGS.ties // 2)  # shows as well how near partners are
+        half = thinned_ties(ties, SETTINGS.ties // 2)  # also shows how near partners are
         correction = previewed_correction(estimate, half, mountings)
         moved = correction.increments(features.centre, features.gps_time)[0]
         before = limit
@@ -79,7 +81,9 @@ def tie_passes(survey: Survey, estimate: Estimate, features: TieFeatures) -> Est
 
 
 def _untied(estimate: Estimate, features: TieFeatures, radius: float) -> Estimate:
-    """The estimate with the reason why nothing is tied, a warning where something should be."""
+    """Return the estimate with the reason why nothing is tied, a warning if there should be
+    ties.
+    """
     cells = np.floor(features.centre / radius)
     cell = np.unique(cells, axis=0, return_inverse=True)[1].ravel()
     first, last = time_spans(cell, features.gps_time)
@@ -107,12 +111,14 @@ def _noted(sentence):
 
 
 def _unheld(estimate: Estimate, features: TieFeatures, ties: Ties) -> Iterator[Statement]:
-    """Statements on passes between which neither ties nor control of both hold a direction."""
+    """Yield statements on passes with a direction that neither ties nor common control
+    constrain.
+    """
     control = estimate.adjustment.observed
     first, last = time_spans(features.pass_number, features.gps_time)
 
     for part, axis in unheld_directions(ties):
-        if np.median(np.diff(part.gps_time)) < SETTINGS.pause:  # of one pass: the POS holds it
+        if np.median(np.diff(part.gps_time)) < SETTINGS.pause:  # of one pass: the POS constrains it
             continue
         spans = zip(first[part.pass_number[0]], last[part.pass_number[0]], strict=True)
         if not all(((control >= begin) & (control <= end)).any() for begin, end in spans):

@@ -1,6 +1,6 @@
-"""Ties that agree with their neighbours, how much a second of them is believed, what they hold.
+"""Agreement of ties with their neighbors, their weights in time, and the directions they constrain.
 
-And their gates: the distance of two views of one thing, by stated sigmas, then by residuals.
+Also gates: the largest distance of two views of a feature, from stated sigmas, then from residuals.
 """
 
 from collections.abc import Iterator
@@ -15,34 +15,34 @@ from mlscorr.surfaces import SETTINGS as SURFACES
 from mlscorr.survey import Survey, TieFeatures, Ties
 from mlscorr.ties.settings import SETTINGS
 
-NORMAL_SCATTER = 1.4826  # a normal distribution's sigma over its median absolute deviation
+NORMAL_SCATTER = 1.4826  # sigma of a normal distribution over its median absolute deviation
 
 
 def residuals(ties: Ties, correction: np.ndarray) -> np.ndarray:
-    """What a correction leaves of the misclosures (n,). Units: m.
+    """Residuals (n,) of the misclosures after a correction. Units: m.
 
     Parameters
     ----------
     ties : Ties
     correction : (m, 3) array
-        Of all features, as pair_features takes it. Units: m.
+        Of all features; see pair_features. Units: m.
     """
     change = correction[ties.feature[:, 0]] - correction[ties.feature[:, 1]]
     return ties.misclosure - np.einsum("ni,ni->n", ties.direction, change)
 
 
 def consistent_ties(ties: Ties, correction: np.ndarray) -> np.ndarray:
-    """Which ties agree with those near them in both times whose direction is about parallel.
+    """Flag (n,) of ties that agree with nearly parallel ties close to them at both times.
 
-    A tie is refused that lies farther from the median of its neighbours than gate_sigmas of their
-    scatter and its own noise: a car that left, another wall. Where fewer than five are near, none
-    can be refused.
+    A tie is refused if it differs from the median of its neighbors by more than gate_sigmas of
+    their scatter and its own noise, such as a parked car or another wall. With fewer than five
+    neighbors, none is refused.
 
     Parameters
     ----------
     ties : Ties
     correction : (m, 3) array
-        Of all features; what it leaves varies less from tie to tie. Units: m.
+        Of all features; the residuals vary less from tie to tie. Units: m.
 
     Returns
     -------
@@ -50,10 +50,10 @@ def consistent_ties(ties: Ties, correction: np.ndarray) -> np.ndarray:
     """
     if len(ties) == 0:
         return np.zeros(0, bool)
-    order = np.argsort(ties.gps_time[:, 0])  # whose neighbours lie side by side in memory too
+    order = np.argsort(ties.gps_time[:, 0])  # so that neighbors are adjacent in memory, too
     left = residuals(ties, correction)[order]
     variance = ties.variance[order]
-    # a direction and its opposite are the same, with the other sign; pass pairs are apart in time
+    # opposite directions are the same, with the other sign; pairs of passes are separated in time
     points = np.column_stack([ties.gps_time / SETTINGS.agreement_interval, 2 * ties.direction])[
         order
     ]
@@ -64,7 +64,7 @@ def consistent_ties(ties: Ties, correction: np.ndarray) -> np.ndarray:
         points, range(1, count + 1), distance_upper_bound=1.0
     )
     votes = values[rows]
-    votes[rows == np.arange(len(ties))[:, None]] = np.nan  # its own
+    votes[rows == np.arange(len(ties))[:, None]] = np.nan  # its own vote
     judged = np.isfinite(votes).sum(axis=1) >= 5
     agree = np.ones(len(ties), bool)
     middle = np.nanmedian(votes[judged], axis=1)
@@ -75,16 +75,16 @@ def consistent_ties(ties: Ties, correction: np.ndarray) -> np.ndarray:
 
 
 def information(ties: Ties, group: np.ndarray) -> np.ndarray:
-    """Information sum of n n' / variance of groups of ties (g, 3, 3). Units: 1/m^2.
+    """Information matrices of groups of ties (g, 3, 3): sum of n n' / variance. Units: 1/m^2.
 
-    Its eigenvectors are the directions in which the ties of a group hold a shift between both
-    times; the weakest is what they hold least.
+    The eigenvectors are the directions in which the ties of a group constrain a shift between both
+    times, and the smallest eigenvalue belongs to the weakest.
 
     Parameters
     ----------
     ties : Ties
     group : (n,) int array
-        Number of each tie's group, from 0.
+        Index of each tie's group, from 0.
     """
     total = np.zeros((group.max(initial=-1) + 1, 3, 3))
     rows = ties.direction / ties.sigma[:, None]
@@ -93,12 +93,13 @@ def information(ties: Ties, group: np.ndarray) -> np.ndarray:
 
 
 def unheld_directions(ties: Ties) -> Iterator[tuple[Ties, np.ndarray]]:
-    """The ties of each two passes that hold no shift between them along an axis, and it (3,).
+    """Yield the ties of each two passes that leave a shift along an axis (3,) open, with it.
 
-    Those of whole stretches, where these are more than half of all: drift changes from one to the
-    next, so that a single wall across the way holds the one where it stands, and a bend is no wall
-    across. In a tunnel normals stand across the way but for their noise, which seems to hold it:
-    only those count that lean by more than two parallel ones may differ.
+    Intervals of time are judged separately, and reported if they are more than half of all. Drift
+    changes between intervals, so a single wall across the path constrains only its own interval,
+    and a bend in the path does not replace such a wall. In a tunnel, normals are perpendicular to
+    the path except for noise, so only those count that deviate by more than two parallel normals
+    may differ.
 
     Parameters
     ----------
@@ -119,12 +120,12 @@ def unheld_directions(ties: Ties) -> Iterator[tuple[Ties, np.ndarray]]:
 
 
 def unheld_sentence(ties: Ties, axis: np.ndarray) -> str:
-    """A sentence on two passes whose ties leave an axis (3,) unheld.
+    """Return a sentence on two passes with an axis (3,) that their ties do not constrain.
 
     Parameters
     ----------
     ties : Ties
-        Of two passes, those that leave it.
+        Ties of the two passes.
     axis : (3,) array
         Unit vector.
     """
@@ -138,11 +139,11 @@ def unheld_sentence(ties: Ties, axis: np.ndarray) -> str:
 
 
 def weigh_by_time(ties: Ties) -> Ties:
-    """Ties with variances so large that those of a second are together no better than a sigma.
+    """Increase variances of ties so that together, the ties of a second are no better than a limit.
 
-    What thousands of them share, roughness or angles of the scanner, is in no variance of a single
-    tie: as independent rows they would outweigh control. Where many hold a direction, each of them
-    counts the less; what few ties hold keeps its weight.
+    Errors shared by thousands of ties, from roughness or scanner angles, are not part of the
+    variance of a single tie. As independent rows, ties would outweigh control. If many constrain a
+    direction, each counts less; a direction with few ties keeps its weight.
 
     Parameters
     ----------
@@ -158,28 +159,28 @@ def weigh_by_time(ties: Ties) -> Ties:
 
 
 def group_by_time(ties: Ties, side: int, duration: float) -> np.ndarray:
-    """Number (n,) of each tie's pair of passes and stretch of time, from 0, in their order.
+    """Index (n,) of each tie's pair of passes and interval of time, from 0, in their order.
 
     Parameters
     ----------
     ties : Ties
     side : int
-        Whose time counts: 0 for the earlier view, 1 for the later.
+        Side whose time counts: 0 for the earlier view, 1 for the later.
     duration : float
-        Of a stretch. Units: s.
+        Of an interval. Units: s.
     """
     keys = np.column_stack([ties.pass_number, np.floor(ties.gps_time[:, side] / duration)])
     return np.unique(keys, axis=0, return_inverse=True)[1].ravel()
 
 
 def placed_sigma(correction: Correction, survey: Survey, features: TieFeatures) -> np.ndarray:
-    """One sigma (n,) of the places of features along any axis, after a correction. Units: m.
+    """One sigma (n,) of the positions of features along any axis, after a correction. Units: m.
 
     Parameters
     ----------
     correction : Correction
     survey : Survey
-        Its mountings with the covariance of what is open in them.
+        With mountings and their covariances.
     features : TieFeatures
     """
     sigma = np.empty(len(features))
@@ -190,7 +191,7 @@ def placed_sigma(correction: Correction, survey: Survey, features: TieFeatures) 
 
 
 def widest_gate(sigma: np.ndarray) -> float:
-    """Largest distance of two features whose places have sigmas (n,). Units: m.
+    """Largest distance of two features whose positions have sigmas (n,). Units: m.
 
     Parameters
     ----------
@@ -201,13 +202,13 @@ def widest_gate(sigma: np.ndarray) -> float:
 
 
 def narrowest_gate(ties: Ties, moved: np.ndarray) -> float:
-    """Largest distance of two features by the scatter of residuals of ties. Units: m.
+    """Largest distance of two features, from the scatter of the residuals of ties. Units: m.
 
     Parameters
     ----------
     ties : Ties
     moved : (m, 3) array
-        What the correction adds to each feature. Units: m.
+        Correction of each feature. Units: m.
     """
     scatter = NORMAL_SCATTER * float(np.median(np.abs(residuals(ties, moved))))
     return SETTINGS.gate_sigmas * max(scatter, SETTINGS.best_second)

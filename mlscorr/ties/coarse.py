@@ -1,4 +1,4 @@
-"""How metres of misfit between passes are found before anything is known of them."""
+"""Coarse search for meters of misclosure between passes, without prior information."""
 
 from dataclasses import dataclass
 
@@ -13,16 +13,16 @@ from mlscorr.ties.settings import SETTINGS
 
 @dataclass(frozen=True)
 class Votes:
-    """Parallel planes of a stretch and of passes before it, n pairs.
+    """Parallel planes of an interval of time and of earlier passes, n pairs.
 
     Parameters
     ----------
     arm : (n, 3) array
-        From the middle of the stretch to its planes. Units: m.
+        From the middle of the interval to its planes. Units: m.
     normal : (n, 3) array
         Mean of both.
     misfit : (n,) array
-        Along the normal, earlier - stretch. Units: m.
+        Along the normal, earlier pass - interval. Units: m.
     """
 
     arm: np.ndarray
@@ -31,18 +31,18 @@ class Votes:
 
 
 def coarse_correction(features: TieFeatures, radius: float) -> np.ndarray:
-    """What puts each pass on those before it: a stiff motion of each stretch of time.
+    """Correction that aligns each pass with earlier ones: a rigid motion of each interval of time.
 
-    In a stretch all parallel planes within the radius vote for a shift along their normal; the
-    most votes of each direction start a motion (shift and small rotation) that is refined with
-    ever narrower weights. It is a start for pair_features, no more: the earliest pass stays, and
-    along a direction that no plane holds so do the others.
+    In an interval, all parallel planes within the radius vote for a shift along their normal. The
+    shift with the most votes in each direction starts a motion (shift and small rotation) that is
+    refined with ever narrower weights. The result is only a start for pair_features. The earliest
+    pass is not moved, nor are the others along a direction that no plane constrains.
 
     Parameters
     ----------
     features : TieFeatures
     radius : float
-        Of the search. Units: m.
+        Search radius. Units: m.
 
     Returns
     -------
@@ -85,7 +85,7 @@ def coarse_correction(features: TieFeatures, radius: float) -> np.ndarray:
 
 
 def _edges(place, margin=0.0):
-    """Lowest and highest coordinates (3,) of places (n, 3), and a margin around them."""
+    """Lowest and highest coordinates (3,) of positions (n, 3), with a margin."""
     return place.min(axis=0, initial=np.inf) - margin, place.max(axis=0, initial=-np.inf) + margin
 
 
@@ -114,7 +114,7 @@ def _votes(features, inside, before, tree, radius):
 
 
 def _motion(votes, radius):
-    """Shift and rotation (6,), m and rad, that most votes agree with."""
+    """Shift and rotation (6,), m and rad, with the most votes."""
     design = np.column_stack([votes.normal, np.cross(votes.arm, votes.normal)])
     prior = np.repeat([radius, SETTINGS.parallel], 3) ** -2.0
     motion = np.append(_most_votes(votes, radius), np.zeros(3))
@@ -130,9 +130,9 @@ def _motion(votes, radius):
 
 
 def _most_votes(votes, radius):
-    """The shift (3,) by the fullest bin of misfits of each class of directions. Units: m."""
+    """Shift (3,) from the fullest bin of misclosures in each class of directions. Units: m."""
     bins = direction_class(votes.normal)
-    opposite = bins > 13  # folded: a wall to the left and one to the right vote together
+    opposite = bins > 13  # folded: walls on the left and on the right vote together
     bins = np.where(opposite, 26 - bins, bins)
     sign = np.where(opposite, -1.0, 1.0)
     total = 1e-6 * np.eye(3)

@@ -1,4 +1,4 @@
-"""Which features of two visits are the same thing, given what is believed of their places."""
+"""Pairing of features of two visits, given the prior uncertainty of their positions."""
 
 from dataclasses import replace
 
@@ -12,7 +12,7 @@ from mlscorr.survey import PAINTED, TIE_KINDS, TieFeatures, Ties
 from mlscorr.ties.settings import SETTINGS
 
 _, POLE, LINE, DASH = range(len(TIE_KINDS))
-CELL_BITS = 21  # of a cell's number along one axis: a million to each side of the origin
+CELL_BITS = 21  # bits of a cell's index along one axis: a million to each side of the origin
 
 
 def pair_features(
@@ -23,36 +23,35 @@ def pair_features(
     turned: np.ndarray | None = None,
     pause: float = SETTINGS.pause,
 ) -> Ties:
-    """Ties between features of two visits, or of two scanners that saw a thing on the same pass.
+    """Make ties between features of two visits, or of two scanners in the same pass.
 
-    A feature has at most one partner in each other pass of each scanner, one in its own at another
-    visit, and one at this visit where that counts: the nearest whose direction is parallel, each
-    the other's. Two passes have none in a direction in which more than half as many pair when they
-    are displaced by two gates: those would be by chance; and paint has none where the next lane's
-    is near enough to be taken for it.
-    Call it again with a better correction, smaller sigma and radius.
+    A feature has at most one partner in each other pass of each scanner, one at another visit of
+    its own pass, and one at the same visit if those are allowed. Partners are mutual nearest
+    neighbors with parallel directions. Two passes get no ties in a direction in which a
+    displacement by two gates gives more than half as many pairs, because the pairs may then be due
+    to chance. Paint gets none if the paint of the next lane is close enough to be confused with it.
+    Call the function again with a better correction and a smaller sigma and radius.
 
     Parameters
     ----------
     features : TieFeatures
     correction : (n, 3) array
-        What is believed to be missing at each feature: corrected = centre + correction. Units: m.
+        Assumed correction of each feature: corrected = center + correction. Units: m.
     sigma : (n,) array
         One sigma of the correction, along any direction. Units: m.
     radius : float
-        Two features are no pair where they are farther apart than this, or than three sigmas of
-        the correction's difference, and their own noise explains, along a plane's normal or across
-        a pole. Units: m.
+        Largest distance of a pair. The distance along a plane's normal or across a pole must also
+        be within three sigmas of the correction's difference and of their own noise. Units: m.
     turned : (n, 3) array, optional
-        The features' directions as the correction turns them; as recorded by default.
+        The features' directions after the correction; as recorded by default.
     pause : float
-        Between two views of one scanner; below that of two visits, those of one visit count.
-        Units: s.
+        Smallest time between two views of one scanner; if shorter than between visits, views of one
+        visit count, too. Units: s.
 
     Returns
     -------
     Ties
-        Misclosures are of the recorded places, whatever the correction.
+        Misclosures refer to the recorded positions, whatever the correction.
     """
     if turned is None:
         present = features
@@ -69,7 +68,7 @@ def pair_features(
     is_pole = features.kind[pairs[:, 0]] == "pole"
     across = np.maximum((apart**2).sum(axis=1) - along**2, 0.0)
     lever = np.where(is_pole, along**2, across)
-    # each direction is taken to the middle between both centres
+    # each direction is transferred to the middle between both centers
     variance = features.variance[pairs].sum(axis=1) + lever * features.tilt[pairs].sum(axis=1) / 4
     variance += 2 * SETTINGS.surface_sigma**2
     sides = _across(direction[is_pole], _wall_normals(features, pairs, is_pole))
@@ -83,12 +82,12 @@ def pair_features(
 
 
 def _beyond_chance(features, search, pairs):
-    """Which pairs (k,) are no chance for the most part, as are all of both passes and a direction.
+    """Flag (k,) of pairs mostly not due to chance, judged for each two passes and direction.
 
-    Chance is judged within gates as wide as sigmas make them, whatever the radius, and displaced by
-    two of the widest near by, where no two views of one thing are a pair, however well the place of
-    one of them is known: nearer, a rough surface pairs with itself. The correction chose the place
-    where most agree: so of the displaced the fullest counts.
+    Chance pairs are counted within the gates from sigmas, whatever the radius, after a displacement
+    by two of the widest gates nearby. Two views of one feature are then never paired; with a
+    smaller displacement, a rough surface would pair with itself. The correction is where most pairs
+    agree, so the displacement with the most pairs counts.
     """
     correction, sigma, radius, _, pause = search
     radius = max(radius, SETTINGS.least_gate)
@@ -109,16 +108,16 @@ def _beyond_chance(features, search, pairs):
         own, row = np.unique(group(features, pairs), return_inverse=True)
         number, *by_chance = (_count(own, group(features, each)) for each in (here, *displaced))
         for scattered in by_chance:
-            # less what a count scatters by: three of four tell nothing
+            # minus the scatter of a count: three of four prove nothing
             is_chance |= (2 * (scattered - np.sqrt(scattered)) > number)[row]
     return ~is_chance
 
 
 def _is_unique(features, place, sigma):
-    """Whether nothing like a painted feature (n,) lies within two gates of it: lanes repeat.
+    """Flag (n,) of painted features with no similar one within two gates, because lanes repeat.
 
-    Gates are as wide as sigmas make them. Where they are wider than the least, two of them reach
-    over the next lane, and no paint is unique.
+    Gates follow from sigmas. If one is wider than the minimum, two gates reach over the next lane,
+    and no paint is unique.
     """
     width = 2 * np.sqrt(2) * SETTINGS.gate_sigmas * sigma
     is_painted = np.isin(features.kind, PAINTED)
@@ -141,7 +140,7 @@ def _is_unique(features, place, sigma):
 
 
 def _largest_near(place, sigma, edge):
-    """The largest sigma (n,) in each one's cell of an edge."""
+    """Largest sigma (n,) in each feature's cell with a given edge."""
     key = integer_hash(np.floor(place / edge).astype(np.int64))
     cell = np.unique(key, return_inverse=True)[1]
     largest = np.zeros(cell.max(initial=-1) + 1)
@@ -156,29 +155,32 @@ def _passes(features, pairs):
 
 
 def _partner_pass(features, own, partner):
-    """Pass (k,) of partners; zero, which is none, where a scanner sees a thing again at a visit."""
+    """Pass (k,) of partners; zero, which means none, if a scanner measures a feature again at a
+    visit.
+    """
     is_again = np.abs(features.gps_time[own] - features.gps_time[partner]) <= SETTINGS.pause
     is_again &= features.scanner[own] == features.scanner[partner]
     return np.where(is_again, 0, features.pass_number[partner])
 
 
 def _passes_and_direction(features, pairs):
-    """Number (k,) of both passes, the kind and the direction of pairs."""
+    """Number (k,) of the two passes, the kind and the direction of pairs."""
     bins = direction_class(features.direction[pairs[:, 0]])
     kind = kind_number(features)[pairs[:, 0]]
     return (_passes(features, pairs) * 14 + np.minimum(bins, 26 - bins)) * len(TIE_KINDS) + kind
 
 
 def _count(values, others):
-    """How often each of some values (n,) is among others (m,)."""
+    """Number of occurrences of some values (n,) among others (m,)."""
     others = np.sort(others)
     return others.searchsorted(values, "right") - others.searchsorted(values, "left")
 
 
 def _wall_normals(features, pairs, is_pole):
-    """Normals (n, 3) of the walls that were seen next to the poles of pairs; north without any.
+    """Normals (n, 3) of the walls measured next to the poles of pairs; north without any.
 
-    Along a wall and across it poles tell things apart: what walls hold better is weighed down.
+    Poles are split along and across the wall, because the direction that walls constrain better is
+    down-weighted.
     """
     first = features[pairs[:, 0]]
     walls = first[(first.kind == "plane") & (np.abs(first.direction[:, 2]) < 0.5)]
@@ -189,14 +191,14 @@ def _wall_normals(features, pairs, is_pole):
 
 
 def _across(axis, normal=(0.0, 1.0, 0.0)):
-    """Two unit vectors (n, 3) across axes and each other, the first of them along walls."""
+    """Two perpendicular unit vectors (n, 3) across axes, the first of them along walls."""
     side = np.cross(axis, normal)
     side /= np.linalg.norm(side, axis=1, keepdims=True)
     return side, np.cross(axis, side)
 
 
 def _directions(features, pairs):
-    """Directions (2, k, 3) of pairs, of paint those that point to the same side."""
+    """Directions (2, k, 3) of pairs; those of paint point to the same side."""
     first, second = features.direction[pairs.T]
     is_opposite = np.isin(features.kind[pairs[:, 0]], PAINTED)
     is_opposite &= np.einsum("ni,ni->n", first, second) < 0
@@ -204,7 +206,7 @@ def _directions(features, pairs):
 
 
 def _mutual(features, pairs, distance):
-    """Pairs (k, 2) of which each is the other's nearest in its pass, and at its visit."""
+    """Pairs (k, 2) of mutual nearest neighbors in their passes and at their visits."""
     pairs = pairs[np.argsort(distance, kind="stable")]
     nearest = np.ones(len(pairs), bool)
     for feature, partner in (pairs.T, pairs.T[::-1]):
@@ -225,18 +227,19 @@ def candidate_pairs(
     pause: float = SETTINGS.pause,
     angle: float = SETTINGS.parallel,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs (k, 2) of parallel features within their gates, and distances (k,) in such units.
+    """Pairs (k, 2) of parallel features within their gates, and distances (k,) in gates.
 
-    The earlier visit's stands first. Of each visit some nearest count, of either view.
+    The feature of the earlier visit comes first. From each visit, some nearest neighbors of either
+    view are considered.
 
     Parameters
     ----------
     features, correction, sigma, radius, pause
-        As of pair_features.
+        See pair_features.
     shift : (n, 3) array, optional
-        By which the later of two visits is displaced. Units: m.
+        Displacement of the later of two visits. Units: m.
     angle : float
-        Largest between directions: twice a boresight error and more, at first. Units: rad.
+        Largest angle between directions: at first, more than twice a boresight error. Units: rad.
     """
     place = features.centre + correction
     sigmas = SETTINGS.gate_sigmas
@@ -249,7 +252,8 @@ def candidate_pairs(
     features = features[order]
     place = place[order]
     sigma = sigma[order]
-    # directions that differ by the angle are as far apart as places may be; no pole is near a plane
+    # directions that differ by the angle are scaled to the largest distance; no pole is near a
+    # plane
     attitude = limit / (2 * np.sin(angle / 2)) * _attitude(features)
     points = np.column_stack([place, attitude])
     if shift is None:
@@ -287,7 +291,7 @@ def candidate_pairs(
 
 
 def visit_number(features: TieFeatures) -> np.ndarray:
-    """Number (n,) of the visit: a stretch of time of a pass, so that a loop counts as another.
+    """Index (n,) of the visit, an interval of time within a pass, so that a loop is another visit.
 
     Parameters
     ----------
@@ -300,9 +304,10 @@ def visit_number(features: TieFeatures) -> np.ndarray:
 
 
 def _attitude(features):
-    """Vectors (n, 3) that are near each other for parallel features of a kind: their directions.
+    """Vectors (n, 3) that are close for parallel features of a kind: their directions.
 
-    Paint has neither front nor back: half of the unit vector of twice its azimuth stands for it.
+    Paint has neither front nor back, and is represented by half of the unit vector of twice its
+    azimuth.
     """
     attitude = features.direction.copy()
     is_painted = np.isin(features.kind, PAINTED)
@@ -315,9 +320,9 @@ def _attitude(features):
 def _pairs_near(cells, edge, visit, number, side, views, limits):
     """Pairs within the limits, each as first * n + second, and their distances.
 
-    Views come in the order of the cells of an edge. Of each visit those of a number count that are
-    nearest to a view: of visits before where it is displaced to the side 1, of visits after where
-    to the side -1, else of all others; of its own visit in each case, beyond the pause.
+    Views are sorted by cells. From each visit, a given number of nearest views count: from earlier
+    visits if the displacement has side 1, from later visits if -1, otherwise from all others. Views
+    of the same visit always count, beyond the pause.
     """
     points = views[0]
     shift = views[1]
@@ -364,11 +369,11 @@ def _pairs_near(cells, edge, visit, number, side, views, limits):
 
 @loop
 def _distance(views, first, second, limits):
-    """Distance of a pair of features in units of gate and cell; infinite if it is none."""
+    """Distance of a pair of features in units of gate and cell; infinite if it is not a pair."""
     points, shift, direction, kinds, gps_time, scanner, extent, noise, variances = views
     radius, least_cosine, pause, edge, sigmas, surface_variance = limits
     seconds = abs(gps_time[first] - gps_time[second])
-    # a pass starts with each file too: tiles of one scanner see the street at one visit
+    # a pass also starts with each file: tiles of one scanner belong to one visit
     is_pair = seconds > pause or scanner[first] != scanner[second]
     kind = kinds[first]
     sign = 1.0
@@ -395,9 +400,9 @@ def _distance(views, first, second, limits):
     known = variances[first] + variances[second]
     own = noise[first] + noise[second] + surface_variance
     gate = min(radius, sigmas * np.sqrt(known + own))
-    if kind == POLE:  # however well places are known, what poles leave open doesn't shrink
+    if kind == POLE:  # the uncertainty of poles does not decrease with better positions
         gate = np.hypot(min(radius, sigmas * np.sqrt(known)), sigmas * np.sqrt(own))
-    # a dash as long as the other, to twice the sigma of its middle: else one was hidden in part
+    # dashes of equal length, to twice the sigma of the middle; otherwise one was partly hidden
     longer = np.sqrt(12.0) * abs(extent[first] - extent[second])
     sigma = 2.0 * np.sqrt(noise[first] + noise[second])
     unlike = kind == DASH and longer > sigmas * sigma

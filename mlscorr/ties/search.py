@@ -1,4 +1,4 @@
-"""Ties of a survey of which nothing is known but what its POS states."""
+"""Ties of a survey without other information than its POS."""
 
 from dataclasses import dataclass
 
@@ -22,18 +22,18 @@ from mlscorr.ties.thinning import thinned_ties
 
 @dataclass(frozen=True)
 class TieSearch:
-    """Ties that agree, and what was left of the rest.
+    """Ties that agree, and the refused ones.
 
     Parameters
     ----------
     ties : Ties
-        Weighed by time.
+        Weighted by time.
     refused : Ties
-        Those that contradict their neighbours in time.
+        Ties that contradict their neighbors in time.
     correction : (m, 3) array
-        Of each feature, that puts the passes coarsely on each other. Units: m.
+        Coarse correction of each feature that aligns the passes. Units: m.
     radius : float
-        Of the search. Units: m.
+        Search radius. Units: m.
     """
 
     ties: Ties
@@ -43,24 +43,24 @@ class TieSearch:
 
 
 def search_ties(survey: Survey, features: TieFeatures) -> TieSearch:
-    """Ties of a survey without control: coarsely first, then by what the POS states.
+    """Find ties of a survey without control: first coarsely, then within the stated POS sigmas.
 
     Parameters
     ----------
     survey : Survey
-        Its search radius is the limit.
+        The search radius is the limit.
     features : TieFeatures
     """
     sigma = feature_sigma(survey, features)
     radius = min(max(widest_gate(sigma), SETTINGS.least_gate), survey.search_radius)
     correction = coarse_correction(features, radius)
-    # what the first pairs, of visits, leave tells how near partners are
+    # residuals of the first pairs, of visits, show how near partners are
     for pause in (SETTINGS.pause, least_pause(survey, features)):
         ties = pair_features(features, correction, sigma, radius, pause=pause)
         agree = consistent_ties(ties, correction)
         left = np.abs(residuals(ties[agree], correction))
         is_pole = ties.kind[agree] == "pole"
-        of_pole = features.kind == "pole"  # farther apart along the way than walls tell
+        of_pole = features.kind == "pole"  # farther along the path than walls show
         for rows, narrowed in ((is_pole, of_pole), (~is_pole, ~of_pole)):
             if rows.any():
                 near = 2 * NORMAL_SCATTER * np.median(left[rows])
@@ -69,12 +69,12 @@ def search_ties(survey: Survey, features: TieFeatures) -> TieSearch:
 
 
 def least_pause(survey: Survey, features: TieFeatures) -> float:
-    """Seconds between two views of a thing by one scanner, from which on they are a tie.
+    """Minimum time in s between two views of a feature by one scanner that form a tie.
 
-    Those between visits; but a moment where the only scanner sees things again at a visit, in most
-    moments of it, as one that spins does. A profile scanner does so where it turns alone, which
-    tells too little of what its mounting lacks; several see what others saw; and of sessions
-    without a mounting nobody knows that they have the same.
+    It is the time between visits. It is one moment for a single scanner that measures features
+    again in most moments of a visit, as a rotating scanner does. A profile scanner repeats features
+    only in turns, which gives too little information on its mounting. With several scanners, views
+    of other scanners suffice. Sessions without a mounting may have different ones.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def least_pause(survey: Survey, features: TieFeatures) -> float:
 
 
 def agreeing_ties(ties: Ties, correction: np.ndarray) -> Ties:
-    """Those that agree with their neighbours, as many as are believed, with their weights.
+    """Ties that agree with their neighbors, thinned and weighted.
 
     Parameters
     ----------
@@ -109,9 +109,10 @@ def agreeing_ties(ties: Ties, correction: np.ndarray) -> Ties:
 
 
 def feature_sigma(survey: Survey, features: TieFeatures) -> np.ndarray:
-    """One sigma (n,) of the place of features, as the POS states it of position and attitude. m.
+    """One sigma (n,) of the positions of features, from the stated position and attitude sigmas. m.
 
-    Not below what makes the least gate: the mounting's error is not in the POS's sigma.
+    It is not below the value of the minimum gate, because the POS sigma does not include the
+    mounting's error.
 
     Parameters
     ----------

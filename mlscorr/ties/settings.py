@@ -14,12 +14,12 @@ class Settings:
     coarse_features: int = 6000  # for six unknowns of a mounting; more cost time alone
     # Pairs
     pause: float = PAUSE  # s between two visits of one pass
-    parallel: float = 0.14  # rad, 8 deg: normals of few points, and a boresight off by 4 deg
-    gate_sigmas: float = 3.0  # 3 in 1 000 normal errors lie beyond
-    least_gate: float = 2.0  # m: a boresight off by 2 deg, of both passes, 30 m away
-    neighbours: int = 16  # nearest features, or ties, that are weighed: a plane's within 2 m
-    surface_sigma: float = 0.002  # m: walls and roads are no planes
-    best_second: float = 0.005  # m per axis: thousands of ties share what none of them states
+    parallel: float = 0.14  # rad, 8 deg: normals of few points, and a boresight error of 4 deg
+    gate_sigmas: float = 3.0  # 3 in 1 000 normal errors are larger
+    least_gate: float = 2.0  # m: a boresight error of 2 deg, in both passes, at 30 m
+    neighbours: int = 16  # nearest features, or ties, considered: those of a plane within 2 m
+    surface_sigma: float = 0.002  # m: walls and roads are not exact planes
+    best_second: float = 0.005  # m per axis: thousands of ties share an unstated error
     # Agreement
     agreement_interval: float = 3.0  # s: over which a POS error is one shift
 

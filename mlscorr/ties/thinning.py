@@ -1,4 +1,4 @@
-"""Choices of ties, as many in each second and direction, and of features in some blocks."""
+"""Thinning of ties by second and direction, and of features by blocks."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from mlscorr.ties.settings import SETTINGS
 
 
 def some_blocks(features: TieFeatures, number: int) -> TieFeatures:
-    """About a number of features: all of some blocks of space, the same blocks in every pass.
+    """Select about a number of features: all in some blocks of space, the same in every pass.
 
     Parameters
     ----------
@@ -23,19 +23,19 @@ def some_blocks(features: TieFeatures, number: int) -> TieFeatures:
 
 
 def thinned_ties(ties: Ties, number: int = SETTINGS.ties) -> Ties:
-    """As many ties of each second of a pass, direction and other scanner as can tell anything.
+    """Thin ties to a useful number for each second of a pass, direction and other scanner.
 
-    A second of them is believed to SETTINGS.best_second only (``weigh_by_time``): more of them
-    would cost time alone. What m visits saw has m - 1 differences that tell something new, not
-    m (m - 1) / 2, so the earlier view has as many ties with all later visits together. Those stay
-    whose first place and later pass have the least of some random numbers, in the order of time,
-    in which they are solved twice as fast.
+    The ties of a second are limited to the accuracy SETTINGS.best_second (``weigh_by_time``), so
+    more of them would only cost time. A feature observed at m visits has m - 1 independent
+    differences, not m (m - 1) / 2, so the number holds for the earlier view with all later visits
+    together. The ties with the smallest random numbers of first position and later pass are kept,
+    sorted by time, which makes their solution twice as fast.
 
     Parameters
     ----------
     ties : Ties
     number : int
-        Of each second of a pass, direction and other scanner.
+        For each second of a pass, direction and other scanner.
     """
     ties = ties[np.argsort(ties.gps_time[:, 0], kind="stable")]
     moment = np.floor(ties.gps_time[:, 0] / SURFACES.moment).astype(np.int64)

@@ -1,4 +1,4 @@
-"""The simulator once more with the effect in it: how far the gap shrinks."""
+"""Second run of the simulator with the effect: reduction of the gap."""
 
 from mlscorr.gap.closure._systematic import LoneEffect, lone_effects
 from mlscorr.gap.closure.beams import Beams, collect_beams

@@ -1,11 +1,11 @@
-"""How far a shift shrinks: what sizes found without innovations take of their squares.
+"""Reduction of a shift: effect on squared innovations of sizes estimated without them.
 
-What stays is what the error of the size leaves, or, where chance rarely leaves as much, what the
-cause's own columns still explain of the rest. What any other block explains of it, known or
-unknown, counts by the probability that the cause isn't all: the evidence has weighed it already,
-and drift of another shape than V's looks like something, too. The gap before is what is taken away
-and what stays: no share of it is more than all. The gap that each effect leaves by itself is
-measured alike, in the rows in which it was found.
+The remaining gap is due to the error of the size or, if that is improbably large, it is the part of
+the rest that the cause's own columns still explain. The part explained by any other block, known or
+unknown, counts with the probability that the cause is not complete: the evidence has already
+weighed it, and drift with another shape than in V may mimic it. The gap before is the sum of the
+removed and the remaining part, so no share exceeds one. The remaining gap of each single effect is
+measured in the same way, in the rows in which it was found.
 """
 
 from __future__ import annotations
@@ -32,15 +32,15 @@ from mlscorr.gap.signatures import Signature
 
 
 def share_gone(before: float, after: float, chance: float = -np.inf) -> float:
-    """Share of a signed square that is gone, within [-1, 1]: negative where it grew.
+    """Removed share of a signed square, within [-1, 1]; negative if the square grew.
 
     Parameters
     ----------
     before, after : float
-        Negative where the simulator errs more than reality does.
+        Negative if the simulated errors exceed the real ones.
     chance : float
-        What is after it at least, but for one right simulator in forty: below it the simulator
-        has too much of the cause, which is a gap, too.
+        2.5 % quantile of the square after, for a correct simulator: below it the simulator has too
+        much of the cause, which is also a gap.
 
     >>> share_gone(100.0, 1.0), share_gone(100.0, -50.0, -60.0), share_gone(50.0, -100.0, -60.0)
     (0.99, 1.0, -0.5)
@@ -54,10 +54,10 @@ def share_gone(before: float, after: float, chance: float = -np.inf) -> float:
 
 
 def unit_square(observations: Observations, model: ErrorModel) -> float:
-    """Square of the length that a sum of squares of one has, spread over all rows. Units: m^2.
+    """Squared length for a sum of squares of one, averaged over all rows. Units: m^2.
 
-    The sigma is that of the median innovation; of planes of two passes that of the second look, as
-    the first one only says where the plane is.
+    The sigma is that of the median innovation; for planes of two passes that of the second view,
+    because the first one only defines the plane.
 
     Parameters
     ----------
@@ -72,8 +72,8 @@ def unit_square(observations: Observations, model: ErrorModel) -> float:
 
 @dataclass(frozen=True)
 class Squares:
-    """Squares before and after (2,), in each fold (f, 2), before by chance (k,), in m^2 or in the
-    square of the gap's unit; the share that is gone, and 95 % of it.
+    """Squares before and after (2,), in each fold (f, 2), and before by chance (k,), in m^2 or
+    in the squared unit of the gap; removed share, and its 95 % interval.
     """
 
     square: np.ndarray
@@ -85,19 +85,19 @@ class Squares:
 
 @dataclass(frozen=True)
 class SystematicGap:
-    """Innovations of observations, of what is predicted for each, and of what may explain them.
+    """Innovations of observations, of their predictions, and of possible explanations.
 
     Parameters
     ----------
     residual : (n,) array
     predicted : (n,) array
-        By the size that was found without each observation.
+        From the size estimated without each observation.
     own : (n, p) array
         Of the cause's columns.
     explanations : Explanations
     cross : CrossFit
     learned : (n,) bool array
-        Which observations sizes are found in.
+        True for observations used to estimate sizes.
     fold : (n,) int array
     unit : float
         Square of the length of a sum of squares of one. Units: m^2.
@@ -123,18 +123,18 @@ class SystematicGap:
         used: np.ndarray,
         among: np.ndarray,
     ) -> SystematicGap:
-        """Of some observations.
+        """Make the gap of some observations.
 
         Parameters
         ----------
         observations : Observations
         model : ErrorModel
         table : ColumnTable
-            Of innovations, of each observation.
+            Table of innovations of each observation.
         residual : (m,) array
         folds : Folds
         used, among : (m,) bool array
-            Rows in which sizes were found; that are looked at.
+            Rows used to estimate sizes; rows to evaluate.
         """
         keep = among[observations.row]
         row = observations.row[keep]
@@ -155,14 +155,14 @@ class SystematicGap:
         return cls(u[:, 0], predicted, own, explanations, cross, learned, fold, unit)
 
     def measure(self, rng: np.random.Generator, probability: float = 0.0) -> Squares:
-        """The gap before and after.
+        """Measure the gap before and after.
 
         Parameters
         ----------
         rng : numpy.random.Generator
             Draws replicas.
         probability : float
-            Of the cause, and nothing else.
+            Probability of the cause alone.
         """
         rest = self.residual - self.predicted
         tails = rest / np.sqrt(np.mean(rest**2))
@@ -172,7 +172,7 @@ class SystematicGap:
         limit = np.percentile(chance, SETTINGS.band[1])
         (largest,), (block,) = self.explanations.largest(rest[:, None])
         chance = self.unit * (chance - usual)
-        if not self.predicted.any():  # a signed gap, as it is
+        if not self.predicted.any():  # a signed gap, unchanged
             square = np.repeat(self.unit * (largest - usual), 2)
             return Squares(square, square[None], chance, 0.0, (0.0, 0.0))
         gone, own, off = self._own(drawn)
@@ -190,7 +190,9 @@ class SystematicGap:
         return Squares(square, self._folds(stays, left), chance, share_gone(*square), interval)
 
     def _interval(self, gone, own, other, off, probability):
-        """95 % of the share that is gone: with others, unless they are improbable, and without."""
+        """95 % interval of the removed share: with others, unless they are improbable, and
+        without.
+        """
         low, high = np.percentile(off, SETTINGS.band)
         largest = share_gone(max(gone + own, 0.0), own)
         if 1.0 - probability < 0.5 * (1.0 - SETTINGS.confidence):
@@ -201,11 +203,10 @@ class SystematicGap:
         return float(low), float(high)
 
     def _own(self, drawn):
-        """Squares that are gone, those that the cause's own columns leave, and by how much the
-        true share is off the stated one in replicas.
+        """Removed squares, those still explained by own columns, and share errors in replicas.
 
-        By its error the size leaves on average what it leaves in replicas; more, where the
-        columns explain more of the rest than of nearly all replicas'.
+        The error of the size leaves the average of the replicas, or more, if the columns explain
+        more of the rest than in nearly all replicas.
         """
         rest = self.residual - self.predicted
         signal = self.own @ self.cross.sizes(self.residual[self.learned, None])[-1]
@@ -224,7 +225,7 @@ class SystematicGap:
         return (self.residual**2 - rest**2).sum(), float(left), off
 
     def _explained_by_own(self, rest):
-        """Squares (k,) of columns (n, k) that the cause's columns explain, and what of these."""
+        """Squares (k,) of columns (n, k) explained by the cause's columns, and their fits."""
         normal = self.own.T @ self.own + np.eye(self.own.shape[1]) / SETTINGS.free_sigma**2
         fit = self.own @ np.linalg.solve(normal, self.own.T @ rest)
         return (rest**2 - (rest - fit) ** 2).sum(axis=0), fit
@@ -241,13 +242,13 @@ class SystematicGap:
 
 @dataclass(frozen=True)
 class LoneEffect:
-    """The systematic gap with one effect in the simulator, in the rows in which it was found.
+    """Systematic gap with one effect in the simulator, in the rows in which it was found.
 
     Parameters
     ----------
     effect : str
     probability : float
-        That it is the cause.
+        Probability that it is the cause.
     before, after : float
         Signed. Units: mm.
     """
@@ -262,7 +263,7 @@ class LoneEffect:
 def lone_effects(
     rows: Rows, signatures: Sequence[Signature], inference: Inference, rng: np.random.Generator
 ) -> tuple[LoneEffect, ...]:
-    """The gap with each effect that shifts rows, the one that leaves least first.
+    """Measure the gap with each effect that shifts rows, sorted by increasing remaining gap.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The pulses on which rows stand, to be fired again by rerun."""
+"""Pulses behind the rows, for replay in rerun."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -15,7 +15,7 @@ from mlscorr.survey import PointCloud, Survey
 
 @dataclass(frozen=True)
 class Beams:
-    """Pulses of a survey by views: one of each patch or target; two of a shared plane.
+    """Pulses of a survey by views: one for each patch or target; two for a shared plane.
 
     Parameters
     ----------
@@ -25,18 +25,18 @@ class Beams:
     item : (l,) int array
         Of Rows, for each view.
     gps_time : (l,) array
-        Of the item's rows: so that rows of another survey are told. Units: s.
+        Time of the item's rows, which identifies rows of another survey. Units: s.
     second : (l,) bool array
-        Whether it is a shared plane's second view.
+        True for a shared plane's second view.
     target : (l,) int array
-        Number of the board of a view of a target; -1 for patches.
+        Index of the board of a view of a target; -1 for patches.
     point, normal : (l, 3) array
-        Plane of a patch, about the origin (m), and its unit normal towards the scanner.
+        Plane of a patch, relative to the origin (m), and its unit normal toward the scanner.
     boards : Boards
-        Targets as they were observed, one for each view of them.
+        Targets as observed, one for each view of them.
     beyond, behind : (n,) array
-        Range over that of a target's plane (m), and intensity, of what a pulse about a target
-        meets without it; NaN where it meets nothing, and for patches.
+        Range beyond a target's plane (m), and intensity, of the background of a pulse near a
+        target; NaN without a background, and for patches.
     reference : MeshWorld or None
         The reference surface, about the origin.
     facet : (n,) int array
@@ -66,7 +66,7 @@ class Beams:
 
 @dataclass(frozen=True)
 class _Patch:
-    """A patch behind rows: their item, whether it was seen second, its normal and its points."""
+    """Patch behind rows: their item, flag of the second view, normal and points."""
 
     item: int
     second: bool
@@ -77,26 +77,26 @@ class _Patch:
 def collect_beams(
     survey: Survey, rows: Rows, finding: Any, patches: Patches | None, surroundings: Surroundings
 ) -> Beams:
-    """Beams of the pulses on which rows stand.
+    """Collect the Beams of the pulses behind rows.
 
     Parameters
     ----------
     survey : Survey
     rows : Rows
-        As build_rows gives them.
+        From build_rows.
     finding : Finding
-        Of the same survey: its targets as fitted.
+        Finding of the same survey, with its fitted targets.
     patches : Patches or None
-        Of which the rows are.
+        Patches of the rows.
     surroundings : Surroundings
-        Of the surveyed targets, when all clouds were read.
+        Surroundings of the surveyed targets, after all clouds were read.
 
     Rows whose pulses are not found have none in Beams.
 
     Raises
     ------
     ValueError
-        For rows of another survey.
+        If rows belong to another survey.
     """
     origin = np.round(rows.position.mean(axis=0))
     platform = scan.recorded_platform(survey, origin)
@@ -106,7 +106,7 @@ def collect_beams(
 
 
 def _patches_behind(rows, patches):
-    """The patches behind rows, told by their sample pulses; in order of their cells."""
+    """Patches behind rows, identified by their sample pulses, in order of their cells."""
     pulses = rows.pulses[~np.isin(rows.pulses.item, rows.item[rows.channel == "target"])]
     if len(pulses) == 0 or patches is None:
         return []
@@ -183,7 +183,7 @@ def _middle(xyz, view, count):
 
 
 def _reference(survey, rows, origin):
-    """The reference surface about the origin, where there are rows on it."""
+    """Reference surface relative to the origin, if there are rows on it."""
     if survey.reference is None or not (rows.channel == "surface").any():
         return None
     return scan.MeshWorld(read_mesh(SceneScenario(kind="mesh", file=survey.reference), origin))

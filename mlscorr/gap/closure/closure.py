@@ -1,9 +1,8 @@
-"""How far the gap shrinks, on data not used to find the cause, once the simulator has it.
+"""Reduction of the gap with the cause in the simulator, on data not used to find it.
 
-Which effect it is, all blocks of time say; its size is found without each fifth of them. The
-simulator runs again with it, and the gap is measured where its size was not looked for, also as
-errors over the sigma that the simulator gives them: one when it is right. Check points are never
-looked at but here.
+The effect is chosen from all blocks of time; its size is estimated without each fifth of them. The
+simulator runs again with it, and the gap is measured in the held-out blocks, also as errors over
+their simulated sigma, which is one for a correct simulator. Check points are used only here.
 """
 
 from __future__ import annotations
@@ -41,7 +40,7 @@ from mlscorr.gap.residuals import Rows, background
 
 @dataclass(frozen=True)
 class Gap:
-    """Signed, before and after a cause is added, and 95 % of what it is when nothing is wrong."""
+    """Signed gap before and after a cause is added, and 95 % interval of the gap by chance."""
 
     before: float
     after: float
@@ -50,35 +49,35 @@ class Gap:
 
 @dataclass(frozen=True)
 class Closure:
-    """The gap before and after a cause is added, where its size was not looked for.
+    """Gap before and after a cause is added, in data not used to estimate its size.
 
     Parameters
     ----------
     effect : str
-        The label that was added; the best known one where the verdict is unknown.
+        Added label; the best known one if the verdict is unknown.
     probability : float
         Of that label.
     kind, unit : str
-        How the gap is measured, see measure.
+        Measure of the gap; see measure.
     before, after : float
         Signed.
     shrink : float
-        1 - after^2 / before^2, at most 1; 0 where nothing was added. Where the gap grew,
-        before^2 / after^2 - 1, which is -1 at least.
+        1 - after^2 / before^2, at most 1; 0 if nothing was added. If the gap grew, before^2 /
+        after^2 - 1, at least -1.
     interval : (float, float)
         95 % of it, within [-1, 1].
     null_band : (float, float)
-        95 % of what the gap is when nothing is wrong.
+        95 % interval of the gap if nothing is wrong.
     held_out : str
         A sentence.
     is_held_out : bool
-        Whether the size was found without the rows that judge it.
+        True if the size was estimated without the rows that test it.
     folds : (f, 2) array
         The gap in each fold alone, before and after. In the unit.
     gap : Gap
-        That of the rows in which the cause was found.
+        Gap of the rows in which the cause was found.
     over_sigma : OverSigma
-        Errors over the sigma that the simulator gives them.
+        Errors over their simulated sigma.
     """
 
     effect: str
@@ -98,7 +97,7 @@ class Closure:
 
     @property
     def is_within_noise(self) -> bool:
-        """Whether chance alone makes a gap as large as that before: there is nothing to close."""
+        """True if chance alone explains the gap before, so that there is nothing to close."""
         low, high = self.null_band
         is_lost = self.kind == "returns" and self.before < low  # below it fewer pulses return
         return self.effect != "none" and self.before <= high and not is_lost
@@ -111,14 +110,14 @@ def close_gap(
     rng: np.random.Generator,
     progress: Callable[[int], None] | None = None,
 ) -> Closure:
-    """Closure of a cause.
+    """Measure the closure of a cause.
 
     Parameters
     ----------
     case : FoundCause
     simulated : function of a tuple of Effect, or (m,) array
-        What the simulator, run again with these too, adds to the rows' residuals: (m,); or what its
-        next run added, whatever was changed in it.
+        Change of the rows' residuals (m,) in a second run with these effects, too; or the change in
+        the next run, whatever was changed in it.
     rng : numpy.random.Generator
     progress : function of a number of steps, one in all, optional
     """
@@ -127,7 +126,7 @@ def close_gap(
     cause = case.cause
     kind = gap_kind(cause.effect, case.evidence.noisy, rows)
     unit = UNITS[kind]
-    whole = predict_whole(case, simulated)  # takes most memory: before there is a table of all rows
+    whole = predict_whole(case, simulated)  # takes most memory, so before the table of all rows
     probability = 0.0
     if callable(simulated):
         probability = cause.probability
@@ -159,7 +158,7 @@ def close_gap(
 
 
 def _gap(squares, unit):
-    """Gap in a unit, by Squares."""
+    """Gap in a unit, from Squares."""
     before, after = (float(v) for v in signed_root(squares.square, unit))
     band = np.percentile(signed_root(squares.chance, unit), INFERENCE.band)
     return Gap(before, after, tuple(float(v) for v in band))
@@ -167,7 +166,7 @@ def _gap(squares, unit):
 
 @dataclass(frozen=True)
 class _Ruler:
-    """What a gap is measured with."""
+    """Measuring method of a gap."""
 
     kind: str
     rows: Rows
@@ -197,7 +196,9 @@ class _Ruler:
         return cls(kind, rows, case.used, observations, white, model, probability)
 
     def compare(self, folds, rng, among=None):
-        """What the size of each fold's others does to the gap of some rows (m,): Squares."""
+        """Compare the gap of some rows (m,) before and after with the sizes from other folds:
+        Squares.
+        """
         if among is None:
             among = np.ones(len(self.rows), bool)
         if self.kind == "systematic":
@@ -225,8 +226,8 @@ class _Ruler:
         return Squares(*(sign * v for v in squares), gone, _jackknife(left, gone, usual))
 
     def _terms(self, folds, rng):
-        """Terms before, after (q,) and by chance (q, k) where the simulator is right without the
-        cause and with it, whose means are gaps; their rows (q,).
+        """Terms before, after (q,) and by chance (q, k), for a simulator that is correct
+        without and with the cause; their means are gaps; and their rows (q,).
         """
         rows = self.rows
         nothing = Predicted.nothing(self.rows)
@@ -259,7 +260,7 @@ class _Ruler:
         return before[:, 0], after[:, 0], before[:, 1:], after[:, 1:], place
 
     def _replicas(self, predicted, rng):
-        """Terms (n, k) of the position where the simulator is right with what is predicted."""
+        """Position terms (n, k) of a simulator that is correct with the prediction."""
         o = self.observations
         whitener = o.whitener(predicted.model, predicted.extra[o.row] * o.half)
         drawn = whitener.draw(rng, INFERENCE.replicas) + o.columns(predicted.shift[:, None])
@@ -267,8 +268,8 @@ class _Ruler:
 
 
 def _outliers(residual, expected, noise, among):
-    """Which rows (m,) of some are odd with the cause and without it: kerbs and crowns are rougher
-    than planes, and a few of them would rule a mean of squares.
+    """Flag (m,) of rows that are odd with and without the cause: curbs and crowns are rougher
+    than planes, and a few of them would dominate a mean of squares.
     """
     score = np.minimum(np.abs(residual), np.abs(residual - expected)) / np.sqrt(noise)
     if among.any():
@@ -279,7 +280,7 @@ def _outliers(residual, expected, noise, among):
 
 
 def _left_out(both, block):
-    """Means (g, 2) of terms (q, 2) with groups of blocks (q,) left out in turn."""
+    """Means (g, 2) of terms (q, 2) with groups of blocks (q,) omitted in turn."""
     groups = 2 * SETTINGS.folds
     group = np.unique((block * groups) // (block.max() + 1), return_inverse=True)[1]
     count = np.bincount(group)
@@ -288,7 +289,7 @@ def _left_out(both, block):
 
 
 def _jackknife(left, share, usual):
-    """95 % of the share that is gone, by what is there without each of g groups (g, 2)."""
+    """95 % interval of the removed share, from its values without each of g groups (g, 2)."""
     g = len(left)
     each = np.array([share_gone(*pair, usual) for pair in left])
     spread = INFERENCE.quantile * np.sqrt((g - 1) / g * ((each - each.mean()) ** 2).sum())
@@ -302,10 +303,11 @@ class OverSigma:
     Parameters
     ----------
     axes : tuple of str
-        E, N, H; those that rows have. Where the cause is a POS that is worse in windows, in these.
+        E, N, H; those of the rows. If the cause is a POS that is worse in intervals, only within
+        these.
     before, after : tuple of float
     largest : tuple of float
-        What 97.5 % of surveys stay below in which nothing else is wrong.
+        97.5 % quantile for surveys without other errors.
     """
 
     axes: tuple[str, ...]
@@ -315,7 +317,7 @@ class OverSigma:
 
     @property
     def beyond(self) -> tuple[str, ...]:
-        """Axes whose errors after it are larger than chance makes them, and than 1.96 sigma."""
+        """Axes whose errors after it exceed chance, and 1.96 sigma."""
         pairs = zip(self.axes, self.after, self.largest, strict=True)
         usual = INFERENCE.quantile
         return tuple(axis for axis, after, chance in pairs if after > max(chance, usual))
@@ -324,9 +326,10 @@ class OverSigma:
 def errors_over_sigma(
     rows: Rows, observations: Observations, folds: Folds, rng: np.random.Generator
 ) -> OverSigma:
-    """OverSigma of the rows along an axis of the map, by sizes found without them.
+    """Errors over sigma of the rows along a map axis, with sizes estimated without them.
 
-    Not of planes of two passes: where they are is free, which outweighs all that passes differ by.
+    Planes of two passes are excluded, because their unknown position outweighs all differences
+    between passes.
 
     Parameters
     ----------

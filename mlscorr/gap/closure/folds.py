@@ -1,8 +1,8 @@
-"""Sizes of a cause found without some blocks of time, for these to judge.
+"""Cross-validation of a cause: sizes estimated without some blocks of time, tested on these.
 
-Which effect it is, all blocks say together, and with what probability: a choice made anew in each
-part of the data is often another one. When an event acts they say too. Sizes are found anew
-without each fifth of the blocks, by innovations: these are independent under V, drift and all.
+The effect, its probability and the time of an event are determined from all blocks, because a
+choice in each part of the data often differs. Sizes are estimated without each fifth of the blocks,
+from innovations, which are independent under V, including drift.
 """
 
 from collections.abc import Callable, Sequence
@@ -31,16 +31,16 @@ from mlscorr.survey import Survey
 
 @dataclass(frozen=True)
 class FoundCause:
-    """A cause, and what it was found in.
+    """Cause, and the data in which it was found.
 
     Parameters
     ----------
     rows : Rows
-        All of them, check points too.
+        All rows, including check points.
     used : (m,) bool array
         False for those of check points.
     survey : Survey
-        With what the simulator believes.
+        With the simulator's assumptions.
     signatures : sequence of Signature
         Of all rows.
     evidence : LabelEvidence
@@ -58,13 +58,13 @@ class FoundCause:
 
     @property
     def shifting(self) -> list[tuple[Signature, np.ndarray]]:
-        """The parts of the cause that are no noise, with their estimates."""
+        """Parts of the cause that are not noise, with their estimates."""
         return [pair for pair in self.cause.parts if pair[0].name not in self.evidence.noisy]
 
     @property
     def undecided(self) -> np.ndarray:
-        """Rows (m,) bool of check points seen at the moment of a jump, between the used rows
-        next to it: nothing says on which side of it they are.
+        """Rows (m,) bool of check points at the time of a jump, between the adjacent used rows,
+        so that their side of the jump is unknown.
         """
         rows = self.rows
         undecided = np.zeros(len(self.rows), bool)
@@ -78,7 +78,7 @@ class FoundCause:
         return undecided
 
     def columns(self) -> np.ndarray:
-        """What these parts make of all rows (m, p), by their parameters."""
+        """Effect of these parts on all rows (m, p), by their parameters."""
         # nothing is drawn
         bench = Bench(self.rows, self.survey)
         rng = np.random.default_rng(0)
@@ -91,21 +91,21 @@ Simulated = Callable[[tuple[Effect, ...]], np.ndarray] | np.ndarray
 
 @dataclass(frozen=True)
 class Folds:
-    """Which rows judge which size of a cause.
+    """Assignment of rows to the sizes of a cause that they test.
 
     Parameters
     ----------
     block : (m,) int array
-        Of time, from 0.
+        Block of time, from 0.
     fold : (m,) int array
-        Which of `predicted` each row judges; -1 for check points, which judge all.
+        Index of `predicted` that each row tests; -1 for check points, which test all.
     predicted : tuple of Predicted
     held_out : str
-        What was, in a sentence.
+        Held-out data, in a sentence.
     whole : Predicted
-        Of the cause that was found in all used rows.
+        Prediction from the cause found in all used rows.
     columns : (m, p) array
-        What the parts of the cause that shift rows make of them, by their parameters.
+        Effect of the cause's shifting parts on the rows, by their parameters.
     """
 
     block: np.ndarray
@@ -117,28 +117,28 @@ class Folds:
 
     @property
     def is_held_out(self) -> bool:
-        """Whether rows judge a size that was found without them."""
+        """True if rows test a size that was estimated without them."""
         return len(self.predicted) > 1
 
     @property
     def of_rows(self) -> np.ndarray:
-        """Which of `predicted` (m,) is compared with each row where one must be."""
+        """Index of `predicted` (m,) that is compared with each row, if one is required."""
         return np.clip(self.fold, 0, len(self.predicted) - 1)
 
     def held(self, name: str) -> np.ndarray:
-        """A column (m,) of Predicted by its name, of each row as of its own fold."""
+        """Return a column (m,) of Predicted by name, for each row from its own fold."""
         each = np.array([getattr(predicted, name) for predicted in self.predicted])
         return each[self.of_rows, np.arange(len(self.fold))]
 
 
 def predict_whole(case: FoundCause, simulated: Simulated) -> Predicted:
-    """What the cause that all used rows tell makes of the rows, or the simulator's next run did.
+    """Predict the rows from the cause found in all used rows, or from the simulator's next run.
 
     Parameters
     ----------
     case : FoundCause
     simulated
-        As in ``close_gap``.
+        See ``close_gap``.
     """
     rows = case.rows
     if callable(simulated):
@@ -158,19 +158,19 @@ def make_folds(
     rng: np.random.Generator,
     progress: Callable[[int], None] | None = None,
 ) -> Folds:
-    """Folds for a cause.
+    """Make the Folds of a cause.
 
     Parameters
     ----------
     case : FoundCause
     whole : Predicted
-        Of the cause as all used rows tell it.
+        Prediction from the cause found in all used rows.
     observations : Observations
         Of all rows.
     model : ErrorModel
         Of their covariance, with the cause.
     simulated, rng, progress
-        As in ``close_gap``.
+        See ``close_gap``.
     """
     rows = case.rows
     used = case.used
@@ -217,11 +217,11 @@ def make_folds(
 
 
 def _with_sizes(case, observations, model, fold, whole, columns):
-    """What the simulator expects by the size that all folds but each tell: Predicted of each.
+    """Predictions of the simulator with the size from all folds except each.
 
-    The run with the size of all blocks, and to the first order what another size changes.
+    The run has the size from all blocks; another size is applied to first order.
     """
-    if not whole.shift.any():  # no simulator takes it
+    if not whole.shift.any():  # no simulator accepts it
         return (whole,) * SETTINGS.folds
     learned = observations[case.used[observations.row]]
     residual = learned.columns(case.rows.residual[:, None])[:, 0]
@@ -233,7 +233,7 @@ def _with_sizes(case, observations, model, fold, whole, columns):
 
 
 def _blocks(rows, cause):
-    """Which block of time each row (m,) is in, from 0."""
+    """Block of time of each row (m,), from 0."""
     widths = [part.fixed["width"] for part, _ in cause.parts if "width" in part.fixed]
     length = min(SETTINGS.block_length, SETTINGS.event_share * min(widths, default=np.inf))
     number = np.floor((rows.gps_time - rows.reference.start) / length)
@@ -241,9 +241,9 @@ def _blocks(rows, cause):
 
 
 def _dealt(squares):
-    """Which fold each block is in: each holds about as much of what the cause moves.
+    """Fold of each block, so that folds have similar squared shifts.
 
-    In turn to and fro from the largest on; blocks in which nothing moves follow in turn.
+    Blocks are dealt back and forth from the largest; blocks without motion follow in turn.
     """
     turn = np.append(np.arange(SETTINGS.folds), np.arange(SETTINGS.folds)[::-1])
     dealt = np.empty(len(squares), dtype=int)
@@ -252,9 +252,9 @@ def _dealt(squares):
 
 
 def _trained(case, observations, model, used, rng):
-    """The cause of a noise class with the size that some rows (m,) bool tell of.
+    """Cause of a noise class with the size estimated from some rows (m,) bool.
 
-    The windows of a worse POS are those that all rows tell, as an event's time is.
+    Intervals of a worse POS, like times of events, come from all rows.
     """
     survey = case.survey
     evidence = case.evidence
@@ -276,7 +276,7 @@ def _trained(case, observations, model, used, rng):
 
 
 def _with_factor(observations, model, residual):
-    """Windows of a model with all their factors changed alike, to what residuals (n, 1) tell."""
+    """Intervals of a model with all factors scaled equally, as residuals (n, 1) indicate."""
 
     def windows(log_ratio):
         return tuple(w._replace(factor=w.factor * float(np.exp(log_ratio))) for w in model.windows)
@@ -290,17 +290,17 @@ def _with_factor(observations, model, residual):
 
 
 def _likeliest(evidence, name):
-    """The NoiseEvidence of a label that explains most."""
+    """NoiseEvidence of a label that explains most."""
     return max((e for e in evidence.noise if e.label == name), key=lambda each: each.gain[0])
 
 
 def _is_alike(noise, other):
-    """Whether two NoiseEvidence are of one kind: of all times, of fixes, or in windows."""
+    """True if two NoiseEvidence are of one kind: at all times, of fixes, or in intervals."""
     return type(noise) is type(other) and (noise.member < 0) == (other.member < 0)
 
 
 def cause_for_simulator(rows: Rows, signatures: Sequence[Signature], inference: Inference) -> Cause:
-    """The cause that is put into the simulator: the verdict's; the best known one for unknown.
+    """Cause to add to the simulator: that of the verdict, or the best known one for unknown.
 
     Parameters
     ----------
@@ -319,20 +319,20 @@ def cause_for_simulator(rows: Rows, signatures: Sequence[Signature], inference: 
 
 
 def _best_known(probability):
-    """The most probable label that a simulator can take; none where there is no other."""
+    """Most probable label that a simulator can apply; none if there is no other."""
     known = (name for name in probability if name not in ("none", "unknown"))
     return max(known, key=probability.get, default="none")
 
 
 def _predict(rows, survey, cause, simulated):
-    """What a simulator with a cause in it expects of all rows: Predicted."""
+    """Prediction of all rows by a simulator with a cause."""
     try:
         effects = cause.effects
-    except ValueError:  # larger than any survey can have: no simulator takes it
+    except ValueError:  # larger than possible: no simulator accepts it
         return Predicted.nothing(rows)
     own = [effect for effect in effects if not effect.is_of_pose()]
     change = expected(rows, survey, [effect for effect in own if effect.random])
-    rough = (rows.channel == "roughness").any()  # then the stated noise, from the points, holds it
+    rough = (rows.channel == "roughness").any()  # the stated noise, from points, includes it then
     extra = np.zeros(len(rows)) if rough else change.variance
     shift = simulated(tuple(own)) if own else np.zeros(len(rows))
     return Predicted(shift, change.growth, extra, cause.model)
@@ -340,15 +340,15 @@ def _predict(rows, survey, cause, simulated):
 
 @dataclass(frozen=True)
 class CrossFit:
-    """Columns of a cause, whitened, and the folds of their observations.
+    """Whitened columns of a cause, and the folds of their observations.
 
     Parameters
     ----------
     columns : (n, p) array
-        Innovations of the columns in the observations that may be learned from.
+        Innovations of the columns in the observations allowed for training.
     fold : (n,) int array
     number : int
-        Of folds.
+        Number of folds.
     """
 
     columns: np.ndarray
@@ -356,7 +356,7 @@ class CrossFit:
     number: int
 
     def sizes(self, innovations: np.ndarray) -> np.ndarray:
-        """Sizes (f + 1, p, k) by all folds but each, and last by all, of k columns.
+        """Estimate sizes (f + 1, p, k) of k columns from all folds except each, and last from all.
 
         Parameters
         ----------
@@ -380,12 +380,12 @@ def cross_fitted(
     columns: np.ndarray,
     residual: np.ndarray,
 ) -> np.ndarray:
-    """Sizes (f + 1, p) of columns by all folds but each, and last by all.
+    """Estimate sizes (f + 1, p) of columns from all folds except each, and last from all.
 
     Parameters
     ----------
     observations : Observations
-        That may be learned from.
+        Observations allowed for training.
     model : ErrorModel
         Of their covariance.
     fold : (n,) int array

@@ -1,8 +1,8 @@
-"""The full simulator run again on a survey's own pulses: what the residuals would be in it.
+"""Replay of a survey's own pulses in the full simulator, and the resulting residuals.
 
-Targets are fitted anew by the extraction, and planes anew to their points, as build_rows does
-with the survey itself. The world is the reference surface, the targets where they were surveyed,
-and planes as the survey shows them; a plane that was seen twice is one.
+Targets are fitted again by the extraction, and planes to their points, as in build_rows. The world
+consists of the reference surface, the targets at their surveyed positions, and planes as observed;
+a plane in an overlap is a single one.
 """
 
 from collections.abc import Iterable
@@ -29,33 +29,32 @@ ON_PATCHES = ("shared", "roughness", "return_rate")
 def rerun(
     rows: Rows, survey: Survey, beams: Beams, effects: Iterable[Effect], rng: np.random.Generator
 ) -> np.ndarray:
-    """Residuals (m,) of the rows in a survey that the simulator makes with some effects.
+    """Residuals (m,) of the rows in a simulated survey with some effects.
 
     Parameters
     ----------
     rows : Rows
-        Those that the Beams were collected for, or some of them.
+        Rows for which the Beams were collected, or some of them.
     survey : Survey
-        As recorded; its Scanner says what noise the simulator makes.
+        Recorded survey; its Scanner gives the noise of the simulator.
     beams : Beams
     effects : iterable of Effect
-        Turn truth into record. Random ones on the pose are not realised: their variance is the
-        background's.
+        Effects from truth to record. Random effects on the pose are not simulated: their variance
+        belongs to the background.
     rng : numpy.random.Generator
-        One seed draws the same noise whatever the effects are: the difference of two runs is what
-        the effects do.
+        One seed draws the same noise for any effects, so the difference of two runs is due to the
+        effects.
 
     Returns
     -------
     (m,) array
-        As in Rows, in the same units; NaN where nothing can be compared: beams that meet another
-        surface, a target that isn't found or known much worse than as observed.
+        As in Rows, in the same units; NaN without a comparison: beams on another surface, or a
+        target that is not found or much less accurate than observed.
 
     Raises
     ------
     ValueError
-        For effects on the beams of a survey without a mounting, and for rows that are not the
-        Beams'.
+        If effects act on the beams of a survey without a mounting, or rows do not match the Beams.
     """
     effects = tuple(effects)
     views = _views_of(rows, beams)
@@ -73,8 +72,8 @@ def rerun(
 
 
 def _as_seen(residual, rows, beams, views, run, dither, speckle, fit_rng):
-    """Fill the residuals of targets, where they were surveyed, and of planes, as they were seen;
-    the _Patches of these.
+    """Fill the residuals of targets at their surveyed positions, and of observed planes; return
+    their _Patches.
     """
     boards = _boards(rows, beams, run.effects)
     met = _meet(rows, beams, views, run.beams, boards, speckle)
@@ -91,7 +90,7 @@ def _as_seen(residual, rows, beams, views, run, dither, speckle, fit_rng):
 
 @dataclass(frozen=True)
 class BeamSimulator:
-    """The simulator on a survey's own beams, with the same noise each time.
+    """Simulator on a survey's own beams, with the same noise in each run.
 
     Parameters
     ----------
@@ -100,7 +99,7 @@ class BeamSimulator:
     beams : Beams
         Of these.
     effects : tuple of Effect
-        That it believes in already.
+        Effects already in the simulator.
     seed : int
     """
 
@@ -111,7 +110,7 @@ class BeamSimulator:
     seed: int
 
     def added(self, effects: Iterable[Effect]) -> np.ndarray:
-        """What further effects add to each row (m,); to the first order where no run tells it."""
+        """Effect of further effects on each row (m,), to first order if no run covers it."""
         union = reduce(joined, effects, [*self.effects])
         added = self._run(tuple(union)) - self._plain
         linear = expected(self.rows, self.survey, effects).shift
@@ -126,8 +125,8 @@ class BeamSimulator:
 
 
 def _drawn(rows, survey, beams, effects, rng):
-    """All that is random, whatever the effects are: the Replay, rounding of the points (n, 3) in
-    m, speckle of the pulses about targets, and a generator for the fits.
+    """All random data, independent of the effects: the Replay, rounding of the points (n, 3) in
+    m, speckle of the pulses near targets, and a generator for the fits.
     """
     draws, dither, speckle, fit_rng = rng.spawn(4)
     n = len(beams.view)
@@ -139,7 +138,7 @@ def _drawn(rows, survey, beams, effects, rng):
 
 
 def _views_of(rows, beams):
-    """Numbers (m, 2) of the first and second view of each row's item; -1 for none."""
+    """Indices (m, 2) of the first and second view of each row's item; -1 for none."""
     views = np.full((len(rows), 2), -1)
     for column in (0, 1):
         numbers = np.flatnonzero(beams.second == bool(column))
@@ -155,7 +154,7 @@ def _views_of(rows, beams):
 
 
 def _boards(rows, beams, effects):
-    """Boards of the views at targets, where these truly are."""
+    """Boards of the views at targets, at their true positions."""
     targets = true_targets(rows.targets, effects, rows.reference)
     of_item = dict(zip(rows.item.tolist(), rows.survey_item, strict=True))
     items = beams.item[beams.target >= 0].tolist()
@@ -168,7 +167,7 @@ def _boards(rows, beams, effects):
 
 
 def _meet(rows, beams, views, shot, boards, speckle):
-    """Met of all pulses: with the planes of patches, and with targets."""
+    """Met of all pulses, with the planes of patches and with targets."""
     point = beams.point.copy()
     normal = beams.normal.copy()
     shared, second = np.nonzero((views >= 0) & (rows.channel == "shared")[:, None])
@@ -182,13 +181,13 @@ def _meet(rows, beams, views, shot, boards, speckle):
     planes = Planes(normal[view], offset[view], beams.pulses.intensity[flat])
     number = beams.target[beams.view[on_target]]
     world = TargetWorld(boards, number, beams.beyond[on_target], beams.behind[on_target], speckle)
-    met = ((planes, flat), (world, on_target))  # patches stand before targets
+    met = ((planes, flat), (world, on_target))  # patches have priority over targets
     return Met.concatenate([what.meet(start[on], direction[on]) for what, on in met])
 
 
 @dataclass(frozen=True)
 class _Patches:
-    """Planes through the simulated points of each view at a patch; NaN or 0 for other views.
+    """Planes through the simulated points of each view of a patch; NaN or 0 for other views.
 
     centre, normal (l, 3); variance (l,) in m^2; number (l,) of points and of pulses that met it.
     """
@@ -243,10 +242,9 @@ def _return_rate(patches, views, _believed):
 def _surface(rows, survey, beams, on, view, run, dither, spread):
     """Mean distance (k,) of simulated points from the facets that the recorded beams meet.
 
-    Points farther from the middle one than the spread (l,), and than any surface is rough, are of
-    another surface.
+    Points farther from the median than the spread (l,) and any roughness belong to another surface.
     """
-    fired = np.flatnonzero(np.isin(beams.view, view))  # the other pulses are not compared
+    fired = np.flatnonzero(np.isin(beams.view, view))  # other pulses are not compared
     of = beams.view[fired]
     facet = beams.facet[fired]
     start, beam = (values[fired] for values in run.beams)
@@ -299,22 +297,22 @@ def refit_targets(
     simulated: tuple,
     rng: np.random.Generator,
 ) -> None:
-    """Fill the residuals of target rows: where the extraction finds the simulated targets.
+    """Fill the residuals of target rows from the simulated targets found by the extraction.
 
     Parameters
     ----------
     residual : (m,) array
-        Left as it is where a target can't be compared. Units: m.
+        Unchanged if a target cannot be compared. Units: m.
     rows : Rows
     survey : Survey
     beams : Beams
     views : (m, 2) int array
         Numbers of the views of each row.
     simulated : tuple
-        Points (n, 3) on the map and whether they are kept (n,), Met, the true beams, and Boards
-        where the targets truly are.
+        Points (n, 3) on the map and flags (n,) of kept ones, Met, the true beams, and Boards at the
+        true positions.
     rng : numpy.random.Generator
-        Of the extraction.
+        Generator for the extraction.
     """
     xyz, kept, met, (start, direction), boards = simulated
     seed = rng.integers(2**63)
@@ -334,11 +332,12 @@ def refit_targets(
             number = rows.survey_item[row]
             shape = rows.targets.kind[number], float(rows.targets.size[number])
             bright = boards.bright[beams.target[view]]
-            same_rng = np.random.default_rng(seed)  # of each target alike
+            same_rng = np.random.default_rng(seed)  # the same for each target
             fitted[view] = _fitted(cloud, shape, survey, place, bright, same_rng)
         target = fitted[view]
         along = rows.direction[row]
-        # a plate whose edges lie along the scan lines is known well at one place, not beside it
+        # a plate with edges along the scan lines is well determined at one position, but not next
+        # to it
         worst = max(SETTINGS.worst**2 * rows.noise[row], SETTINGS.least_worst**2)
         if target is None or along @ target.covariance @ along > worst:
             continue
@@ -346,10 +345,9 @@ def refit_targets(
 
 
 def _fitted(cloud, shape, survey, place, bright, rng):
-    """The FittedTarget near its expected place, or None.
+    """FittedTarget near its expected position, or None.
 
-    What is brighter than half way from what lies beside it to its paint is looked at first, which
-    spares looking at all else.
+    Points brighter than half way from background to paint are tried first, which usually suffices.
     """
     kind, size = shape
     apart = np.linalg.norm(cloud.xyz - place, axis=1)

@@ -1,6 +1,6 @@
-"""Observed targets and the pulses about them, also those that met nothing, and what lies behind.
+"""Observed targets, with the pulses around them (also without a return) and the background.
 
-No file has a pulse that met nothing; the regular steps of those beside it tell of it.
+Files do not contain pulses without a return, but the regular steps of adjacent pulses reveal them.
 """
 
 from collections.abc import Iterable
@@ -32,7 +32,7 @@ from mlscorr.targets import NO_POINTS, FittedTarget, search_radius
 
 @dataclass(frozen=True)
 class Sighting:
-    """An observed target that rows are of: their item, and where it was surveyed (3,) in m."""
+    """Observed target behind rows: their item, and its surveyed position (3,) in m."""
 
     item: int
     fitted: FittedTarget
@@ -41,7 +41,7 @@ class Sighting:
 
 @dataclass(frozen=True)
 class SightedTarget:
-    """Pulses about a target as observed, its Boards of one; see Beams."""
+    """Pulses around a target as observed, and its Boards; see Beams."""
 
     pulses: RecordedPulses
     board: Boards
@@ -50,7 +50,7 @@ class SightedTarget:
 
     @classmethod
     def join(cls, sighting: Sighting, parts: list) -> "SightedTarget":
-        """The view of a Sighting from the pulses about it, as Surroundings gives them.
+        """Make the view of a Sighting from the pulses around it, from Surroundings.
 
         Parameters
         ----------
@@ -89,7 +89,7 @@ class SightedTarget:
 
 
 def sightings_of(rows: Rows, finding: Any) -> list[Sighting]:
-    """Sightings of the target rows.
+    """Make the Sightings of the target rows.
 
     Parameters
     ----------
@@ -120,20 +120,20 @@ def board_of(
     dark: float = 0.0,
     speckle: float = 0.0,
 ) -> Boards:
-    """Boards of one FittedTarget.
+    """Make the Boards of one FittedTarget.
 
     Parameters
     ----------
     target : FittedTarget
     origin : (3,) array
-        About which it is built. Units: m.
+        Reference of its coordinates. Units: m.
     bright, dark, speckle : float
-        Intensity of its paints, and their relative noise.
+        Intensities of its paints, and their relative noise.
     """
     outline, (u, v) = target.view.outline, target.view.axes
     cos = np.cos(outline.turn)
     sin = np.sin(outline.turn)
-    if target.kind == "circle":  # nobody knows how its board is turned: upright
+    if target.kind == "circle":  # orientation of its board is unknown: upright
         normal = np.cross(u, v)
         if abs(normal[2]) < 0.99:
             side = np.array([0.0, 0.0, 1.0])
@@ -158,9 +158,10 @@ def board_of(
 
 
 class Surroundings:
-    """Points whose beams pass near surveyed targets, of the chunks that it is given.
+    """Points of chunks whose beams pass near surveyed targets.
 
-    A target lies somewhere within its search radius; once it is fitted the points about it stay.
+    A target is somewhere within its search radius; after it is fitted, the points around it are
+    kept.
 
     Parameters
     ----------
@@ -181,7 +182,7 @@ class Surroundings:
         return sum(len(cloud) for cloud, _ in [*self._settled, *self._open])
 
     def add(self, chunk: PointCloud) -> None:
-        """Take what it needs of a chunk."""
+        """Add the relevant points of a chunk."""
         inside = chunk[self._trajectory.segment(chunk.gps_time) >= 0]
         if len(inside) == 0 or len(self._targets) == 0:
             return
@@ -192,14 +193,14 @@ class Surroundings:
         self._open.append((inside[near], inside.gps_time[[0, -1]]))
 
     def settle(self, fitted: Iterable[FittedTarget], since: float) -> None:
-        """Let go of points before a time (s) but those about targets that are fitted.
+        """Release points before a time (s), except those around fitted targets.
 
         Parameters
         ----------
         fitted : iterable of FittedTarget
-            Since the last call.
+            Fitted since the last call.
         since : float
-            Targets to come have no point before it. Units: s.
+            Further targets have no points before it. Units: s.
         """
         self._fitted += [(t, _scanned(t), self._largest_extent(t)) for t in fitted]
         if not self._open:
@@ -222,22 +223,26 @@ class Surroundings:
         return cloud[keep]
 
     def _largest_extent(self, target):
-        """How far from a fitted target beams may be wanted, whichever point it is. Units: m."""
+        """Largest distance of relevant beams from a fitted target, for any matched point.
+        Units: m.
+        """
         away = np.linalg.norm(self._targets.position - target.position, axis=1)
         return _extent(target, away[away <= self._radius].max(initial=away.min()))
 
     def _passing(self, cloud, place, extent):
-        """Which beams (n,) of a cloud pass places (k, 3) within extents (k,), or would. m."""
+        """Flag (n,) of beams of a cloud that pass positions (k, 3) within extents (k,), or
+        would.
+        """
         start = self._platform.scanner(cloud.gps_time)
         return _passing_any(start, cloud.xyz - self._origin, place - self._origin, extent**2)
 
     def about(self, platform: Platform, sighting: Sighting, origin: np.ndarray) -> list:
-        """Pulses about a Sighting, whether they returned or not, wherever chunks end.
+        """Pulses around a Sighting, with and without return, regardless of chunks.
 
         Parameters
         ----------
         platform : Platform
-            The recorded one about the origin.
+            Recorded platform, relative to the origin.
         sighting : Sighting
         origin : (3,) array
             Units: m.
@@ -245,8 +250,8 @@ class Surroundings:
         Returns
         -------
         list of (RecordedPulses, (n,) array, (n,) array, (n, 2) array)
-            One or none: pulses, and their distance (m), cosine of incidence and place where they
-            cross the target's plane (m).
+            At most one: pulses, with distance (m), cosine of incidence and position of their
+            crossing with the target's plane (m).
         """
         target = sighting.fitted
         times = np.array(_scanned(sighting.fitted))
@@ -280,19 +285,21 @@ class Surroundings:
 
 
 def _scanned(target):
-    """Times between which a fitted target and its surroundings were scanned. Units: s."""
+    """Time interval in which a fitted target and its surroundings were scanned. Units: s."""
     time = target.cloud.gps_time
     return time.min() - OBSERVE.moment, time.max() + OBSERVE.moment
 
 
 def _extent(target, apart):
-    """How far from a target, observed apart from where it was surveyed, beams matter. m."""
+    """Distance from a target within which beams matter, given its offset from the survey. m."""
     return SETTINGS.around * target.size + SETTINGS.search_margin + apart
 
 
 @loop
 def _passing_any(start, end, place, squared_extent):
-    """Which beams (n,) from start to end (n, 3) pass one of the places (k, 3), or would."""
+    """Flag (n,) of beams from start to end (n, 3) that pass one of the positions (k, 3), or
+    would.
+    """
     near = np.zeros(len(start), np.bool_)
     for i in range(len(start)):
         x = end[i, 0] - start[i, 0]
@@ -311,7 +318,7 @@ def _passing_any(start, end, place, squared_extent):
 
 
 def _first_returns(pulses):
-    """Pulses in order of time without later echoes: the same time and direction, farther away."""
+    """Pulses in order of time without later echoes, which have the same time and direction."""
     apart = np.abs(np.diff(pulses.angle)) + np.abs(np.diff(pulses.elevation))
     same = (np.diff(pulses.gps_time) == 0) & (
         apart * np.minimum(pulses.range[1:], pulses.range[:-1]) < 5e-3
@@ -322,20 +329,20 @@ def _first_returns(pulses):
 
 
 def unreturned(pulses: RecordedPulses, span: tuple[float, float], opening: float) -> RecordedPulses:
-    """Pulses that were fired between recorded ones, and beside them, and met nothing.
+    """Pulses without a return, reconstructed between and next to recorded ones.
 
     Parameters
     ----------
     pulses : RecordedPulses
-        About one place, in order of time.
+        Pulses around one position, in order of time.
     span : (float, float)
-        Times between which they are wanted. Units: s.
+        Time interval of interest. Units: s.
     opening : float
         Angle about the recorded ones. Units: rad.
 
-    Times and angles go on in the steps of those recorded. None where these are not regular (rings
-    of beams, jitter, a thinned cloud): then a target before the sky has only the beams that met
-    it.
+    Times and angles continue in the recorded steps. The result is empty if these are not regular
+    (rings of beams, jitter, a thinned cloud); a target before the sky then has only the beams that
+    hit it.
     """
     none = pulses[:0]
     start = pulses.gps_time[0]
@@ -377,8 +384,8 @@ def unreturned(pulses: RecordedPulses, span: tuple[float, float], opening: float
 
 
 def _each_turn(zero, rate, width, ends):
-    """Numbers between ends whose angle, zero and so much more by each, is within a width of a whole
-    turn, or next to it: a scanner is turned away most of the time.
+    """Numbers between ends whose angle, increasing from zero at a rate, is within a width of a
+    whole turn, or next to it, because a scanner mostly points away.
     """
     first, last = np.sort(zero + rate * ends) / (2 * np.pi)
     turns = 2 * np.pi * np.arange(np.floor(first), np.ceil(last) + 1)

@@ -1,4 +1,4 @@
-"""Channels beside geometry: intensity, density, lost returns and edges, real against simulated."""
+"""Non-geometric channels: intensity, density, lost returns and edges, real versus simulated."""
 
 from mlscorr.gap.contrast.channels import contrast_clouds, contrast_returns
 from mlscorr.gap.contrast.distances import (

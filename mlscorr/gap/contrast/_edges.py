@@ -1,8 +1,8 @@
-"""Depth edges along scan lines: over which angle a line passes from a surface to one behind it.
+"""Depth edges along scan lines: the angle over which a line passes to a surface behind.
 
-A thin beam steps from the near surface to the far one. A wide one measures pulses between, or
-both surfaces with one pulse, as long as its footprint lies on both: their number times the angle
-between pulses is the width of the edge.
+A thin beam steps from the near surface to the far one. A wide beam gives pulses in between, or both
+surfaces in one pulse, while its footprint covers both: their number times the angle between pulses
+is the width of the edge.
 """
 
 from dataclasses import dataclass
@@ -39,12 +39,12 @@ class Edges(Columns):
 
     @property
     def chance(self) -> np.ndarray:
-        """A number from 0 to 1 (e,) of the moment, the same in all clouds."""
+        """Random number from 0 to 1 (e,) of the moment, the same in all clouds."""
         return chance(np.floor(self.gps_time / OBSERVE.moment).astype(np.int64))
 
 
 class EdgeCollector:
-    """Keeps about `limit` depth edges of the chunks that it is given, wherever these end.
+    """Collector of about `limit` depth edges from chunks, regardless of their ends.
 
     Parameters
     ----------
@@ -60,25 +60,25 @@ class EdgeCollector:
         self._stream = MomentStream(survey.trajectory)
 
     def add(self, chunk: PointCloud) -> None:
-        """Take the edges of a chunk, but those of the moments about its last point."""
+        """Add the edges of a chunk, except those of the moments around its last point."""
         rows = np.flatnonzero(self._survey.trajectory.segment(chunk.gps_time) >= 0)
         self._stream.add(chunk[rows], rows)
         self._take_until(chunk.gps_time[-1] if len(chunk) else np.inf)
 
     def _take_until(self, time):
-        """Take the edges of the moments that are whole at a time (s)."""
+        """Add the edges of the moments that are complete at a time (s)."""
         for _, cloud, _ in self._stream.moments(time):
             self._take(cloud[np.argsort(cloud.gps_time, kind="stable")])
 
     def _take(self, inside):
-        """Take the edges of the points of a moment, in order of time."""
+        """Add the edges of the points of a moment, sorted by time."""
         sight = inside.xyz - self._origin - self._platform.scanner(inside.gps_time)
         rough = max(OBSERVE.roughest, 6 * np.sqrt(6) * self._survey.scanner.range_noise)
         edges = edges_of(inside, sight, rough)
         self._edges.add(edges, edges.chance)
 
     def edges(self) -> Edges:
-        """Edges of all chunks, of which none follows."""
+        """Return the edges of all chunks, after the last one."""
         self._take_until(np.inf)
         nothing = Edges(np.empty(0), np.empty((0, 3)), np.empty(0), np.empty(0))
         return Edges.concatenate([nothing, *self._edges.parts()])
@@ -90,15 +90,15 @@ class EdgeCollector:
 
 
 def edges_of(cloud: PointCloud, sight: np.ndarray, rough: float) -> Edges:
-    """Depth edges of points in order of time.
+    """Find depth edges of points in order of time.
 
     Parameters
     ----------
     cloud : PointCloud
     sight : (n, 3) array
-        From the scanner to each. Units: m.
+        Vector from the scanner to each point. Units: m.
     rough : float
-        Second difference of ranges below which points lie on one surface. Units: m.
+        Second difference of ranges below which points are on one surface. Units: m.
     """
     away = np.linalg.norm(sight, axis=1)
     beam = sight / np.maximum(away, 1e-9)[:, None]
@@ -121,12 +121,12 @@ def edges_of(cloud: PointCloud, sight: np.ndarray, rough: float) -> Edges:
     low = np.minimum(ahead, back)
     high = np.maximum(ahead, back)
     is_edge = (high - low >= SETTINGS.jump) & (end - begin - 1 >= 2)
-    mixed = np.maximum(end - begin - 3, 0)  # but the last on the one and the first on the other
+    mixed = np.maximum(end - begin - 3, 0)  # without the ends on both surfaces
     last = len(first)
     is_double = far - near >= SETTINGS.jump
     is_near = near[begin] <= near[end]  # pulses that measure both surfaces end the near one
     both = np.where(is_near, _run(is_double)[begin + 1], _run(is_double[::-1])[::-1][end - 1])
-    for offset in range(2, SETTINGS.widest + 2):  # a pulse between is on neither surface
+    for offset in range(2, SETTINGS.widest + 2):  # a pulse in between is on neither surface
         k = np.minimum(begin + offset, last - 1)
         is_inside = offset < end - begin - 1
         is_edge &= ~is_inside | ((near[k] > low + rough) & (near[k] < high - rough))
@@ -136,13 +136,13 @@ def edges_of(cloud: PointCloud, sight: np.ndarray, rough: float) -> Edges:
 
 
 def _run(is_double):
-    """How many pulses (n,) up to each, it among them, follow each other without a break."""
+    """Number of pulses (n,) in unbroken sequence up to each one, inclusive."""
     number = np.arange(len(is_double))
     return number - np.maximum.accumulate(np.where(is_double, -1, number))
 
 
 def _between_plateaus(is_smooth, follows):
-    """Last pulse of a plateau (e,) and first of the next (e,), with few pulses between them."""
+    """Last pulse of a plateau (e,) and first pulse of the next, with few pulses between them."""
     change = np.flatnonzero(np.diff(is_smooth.astype(np.int8)))
     starts = np.append(0, change + 1)
     ends = np.append(change, len(is_smooth) - 1)
@@ -150,7 +150,7 @@ def _between_plateaus(is_smooth, follows):
     smooth = is_smooth[starts]
     middle = np.arange(1, len(starts) - 1)
     gaps = np.append(0, np.cumsum(~follows))
-    least = SETTINGS.plateau - 2  # a smooth pulse has its neighbours on the surface
+    least = SETTINGS.plateau - 2  # neighbors of a smooth pulse are on the surface
     good = ~smooth[middle] & (length[middle] <= SETTINGS.widest + 2)
     good &= (length[middle - 1] >= least) & (length[middle + 1] >= least)
     begin = ends[middle - 1]

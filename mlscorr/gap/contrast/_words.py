@@ -1,11 +1,11 @@
-"""What a channel's table says where real and simulated cloud differ, in plain sentences."""
+"""Sentences on differences between the real and the simulated cloud in a channel."""
 
 import numpy as np
 
 from mlscorr.gap.contrast.tables import ContrastTable, Measure, with_sigma
 from mlscorr.wording import percent, value_and_sigma
 
-SILENT = {  # why a channel is not compared
+SILENT = {  # reasons why a channel is not compared
     "intensity": "The simulator says nothing of intensity: without its clouds there is nothing to "
     "compare the survey's with. Give them by --simulated.",
     "density": "The simulator says nothing of how many points come from where: it has no cloud "
@@ -24,17 +24,17 @@ PLACES = {"range": ("range", " m"), "incidence": ("angle of incidence", "°")}
 def sentence(
     measure: Measure, table: ContrastTable, sums: np.ndarray, is_further: bool = False
 ) -> str:
-    """Where a table shows the largest difference beyond chance, with its figure; else nothing.
+    """Sentence on the largest significant difference in a table, with its value; otherwise empty.
 
     Parameters
     ----------
     measure : Measure
-        Of which the table is.
+        Measure of the table.
     table : ContrastTable
     sums : (b, bins, k) array
-        Over blocks, which made the table.
+        Sums over blocks behind the table.
     is_further : bool
-        Whether a sentence on another table of the channel stands before it.
+        True if a sentence on another table of the channel precedes it.
     """
     run = _largest_run(table)
     if run is None:
@@ -65,7 +65,7 @@ def sentence(
 
 
 def _opening(subject, is_further):
-    """The subject of a sentence, which may follow another one on the same channel."""
+    """Subject of a sentence, which may follow another one on the same channel."""
     if is_further:
         return f"Beyond that, {subject}"
     return subject.capitalize()
@@ -100,7 +100,9 @@ def _intensity(table, value, sigma, where, is_further):
 
 
 def _lacks(by, falls):
-    """What simulated intensities lack, where the real ones fall along the bins, or rise."""
+    """Phrase on missing features of simulated intensities, if the real ones fall or rise with
+    the bins.
+    """
     if by == "reflectance":
         return f"'s materials differ too {'much' if falls else 'little'} in brightness"
     if by == "range":
@@ -113,7 +115,9 @@ def _lacks(by, falls):
 
 
 def _largest_run(table):
-    """Slice of the neighbouring bins of one sign that differ, with the largest value; or None."""
+    """Slice of adjacent bins with significant differences of one sign and the largest value; or
+    None.
+    """
     signs = np.where(table.differs, np.sign(np.nan_to_num(table.value)), 0)
     if not signs.any():
         return None
@@ -127,7 +131,7 @@ def _largest_run(table):
 
 
 def _where(table, run):
-    """The stretch of a run of bins, in words."""
+    """Range of a run of bins, in words."""
     if run == slice(0, len(table.bins)):
         return "everywhere"
     if table.edges is None:

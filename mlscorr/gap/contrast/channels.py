@@ -1,7 +1,7 @@
-"""Channels of a real cloud beside those of a simulated one, by range, incidence and reflectance.
+"""Channels of a real and a simulated cloud, compared by range, incidence and reflectance.
 
-Cells of both are paired, and range, slant and brightness of a cell are those of both together:
-whatever is chosen by them is chosen from both alike, so that twins differ by chance alone.
+Cells of both are paired, and range, incidence and brightness of a cell are those of both together.
+Selections by these apply equally to both, so that twins differ only by chance.
 """
 
 from collections.abc import Sequence
@@ -23,18 +23,18 @@ CLASSES = ("dark", "medium", "bright")
 
 @dataclass(frozen=True, repr=False)
 class PairedCells(Columns):
-    """Cells in which either cloud has points.
+    """Cells in which at least one cloud has points.
 
     Parameters
     ----------
     points : (c, 2) array
         Of the real and of the simulated cloud.
     brightness : (c, 2) array
-        Mean log10 of the intensity; NaN where either has too few points.
+        Mean log10 of the intensity; NaN if either has too few points.
     range : (c,) array
         Units: m.
     incidence : (c,) array
-        NaN where the cell is not flat. Units: deg.
+        NaN if the cell is not flat. Units: deg.
     block : (c,) int array
     """
 
@@ -48,7 +48,7 @@ class PairedCells(Columns):
 def contrast_clouds(
     survey: Survey, real: ChannelSample, simulated: ChannelSample, rng: np.random.Generator
 ) -> tuple[Contrast, ...]:
-    """A Contrast of each channel of two clouds.
+    """Compare each channel of two clouds.
 
     Parameters
     ----------
@@ -72,14 +72,14 @@ def contrast_clouds(
 def contrast_returns(
     survey: Survey, patches: Patches | None, loss: float | None, rng: np.random.Generator
 ) -> tuple[Contrast, ...]:
-    """The same of a cloud and of what is believed: lost returns alone can be compared.
+    """Compare a cloud with the assumptions: only lost returns can be compared.
 
     Parameters
     ----------
     survey : Survey
     patches : Patches or None
     loss : float or None
-        Share of returns that the simulator loses; None where it says nothing of it.
+        Share of returns that the simulator loses; None if unknown.
     rng : numpy.random.Generator
         For replicas of the bootstrap.
     """
@@ -88,7 +88,7 @@ def contrast_returns(
 
 
 def _judged(channels: Sequence[Contrast | Measure]) -> tuple[Contrast, ...]:
-    """Contrasts with what differs by more than chance, however much is looked at."""
+    """Contrasts with significant differences, corrected for the number of tests."""
     tables = [
         [measure.table(split) for split in measure.splits] if isinstance(measure, Measure) else []
         for measure in channels
@@ -101,16 +101,17 @@ def _judged(channels: Sequence[Contrast | Measure]) -> tuple[Contrast, ...]:
 
 
 def _contrast(measure, tables, tests):
-    """The Contrast of a Measure: its clearest table speaks first, the others of what that leaves.
+    """Contrast of a Measure: its clearest table first, then the others after its removal.
 
-    Things that are far are often seen at a slant, too: a difference by range shows by incidence.
+    Distant objects are often observed obliquely, so a difference by range also appears by
+    incidence.
     """
     judged = [table.judged(tests) for table, _ in tables]
     clear = [_explained(table, sums) for table, (_, sums) in zip(judged, tables, strict=True)]
     whole, sums_of_all = measure.whole()
     whole = whole.judged(tests)
     sentences = []
-    if max(clear) == 0.0:  # too few blocks in each bin, and enough in all
+    if max(clear) == 0.0:  # too few blocks in each bin, but enough in total
         sentences.append(sentence(measure, whole, sums_of_all))
     else:
         best = int(np.argmax(clear))
@@ -128,7 +129,7 @@ def _contrast(measure, tables, tests):
 
 
 def _explained(table, sums):
-    """Mean square of the values that differ, by the weight of their bins."""
+    """Mean square of the significant values, weighted by bins."""
     weight = sums[..., -1].sum(axis=0)
     squares = np.where(table.differs, np.nan_to_num(table.value) ** 2, 0.0)
     return float((weight * squares).sum() / max(weight.sum(), 1e-300))
@@ -145,7 +146,7 @@ def _by_sight(away, incidence):
 def _intensity(
     pairs: PairedCells, real: ChannelSample, simulated: ChannelSample, rng: np.random.Generator
 ) -> Contrast | Measure:
-    """The ratio of intensities beside the median one, which units make."""
+    """Ratio of intensities relative to the median, which depends on units."""
     for name, cloud in (("survey's", real), ("simulated", simulated)):
         if not cloud.has_intensity:
             return Contrast("intensity", f"The {name} cloud has no intensity: all are the same.")
@@ -159,12 +160,12 @@ def _intensity(
 
 
 def _of_ratio(pairs, ratio, weights, splits):
-    """Measure of the intensity by log ratios (n,)."""
+    """Measure of the intensity from log ratios (n,)."""
     medians = _medians(ratio, pairs.block, weights)
 
     def figure(sums):
         mean = sums[..., 0] / sums[..., 3]
-        if sums.ndim > 2:  # of replicas, not of bins and columns alone
+        if sums.ndim > 2:  # replicas, not only bins and columns
             return mean - medians[1:, None]
         return mean - medians[0]
 
@@ -191,7 +192,7 @@ def _medians(ratio, block, weights):
 
 
 def _classes(pairs):
-    """Third (n,) of brightness beside things of the same range and incidence; -1 unknown."""
+    """Third (n,) of brightness among cells with the same range and incidence; -1 if unknown."""
     brightness = pairs.brightness.mean(axis=1)
     splits = _by_sight(pairs.range, pairs.incidence)
     bins = np.column_stack([split.number(split.edges) for split in splits])
@@ -207,7 +208,7 @@ def _classes(pairs):
 
 
 def _density(pairs: PairedCells, rng: np.random.Generator) -> Contrast | Measure:
-    """Points of the real cloud over those of the simulated one."""
+    """Ratio of points in the real and the simulated cloud."""
     if len(pairs) == 0 or not pairs.points.any(axis=0).all():
         return Contrast("density", SILENT["apart"])
     splits = _by_sight(pairs.range, pairs.incidence)
@@ -215,7 +216,7 @@ def _density(pairs: PairedCells, rng: np.random.Generator) -> Contrast | Measure
 
 
 def _of_points(block, real, simulated, weights, splits):
-    """Measure of the density by numbers of points (n,)."""
+    """Measure of the density from numbers of points (n,)."""
     return Measure(
         "density",
         block,
@@ -229,7 +230,7 @@ def _of_points(block, real, simulated, weights, splits):
 
 
 def _of_means(channel, block, real, simulated, splits, weights):
-    """Measure of the difference of two means, of pairs of sums and numbers (n,) of things."""
+    """Measure of the difference of two means, from pairs of sums and numbers (n,) of items."""
     (a, m), (b, n) = real, simulated
 
     def without(change):
@@ -254,7 +255,7 @@ def _dropout(
     loss: float | None,
     rng: np.random.Generator,
 ) -> Contrast | Measure:
-    """Beams without a return, between those of a scan line that have one."""
+    """Beams without a return between those of a scan line with one."""
     known = [part for part in (patches, simulated) if part is not None]
     if patches is None or not all(part.fired.any() for part in known):
         return Contrast("dropout", SILENT["pulses"])
@@ -279,7 +280,7 @@ def _dropout(
 def _edge_width(
     real: ChannelSample, simulated: ChannelSample, rng: np.random.Generator
 ) -> Contrast | Measure:
-    """Over which angle depth edges are smeared. Units: mrad."""
+    """Angle over which depth edges are blurred. Units: mrad."""
     share = min(real.edge_share, simulated.edge_share)
     sides = [each.edges[each.edges.chance < share] for each in (real, simulated)]
     if min(map(len, sides)) < SETTINGS.least_blocks:
@@ -294,7 +295,7 @@ def _edge_width(
 
 
 def paired_cells(survey: Survey, real: ChannelSample, simulated: ChannelSample) -> PairedCells:
-    """PairedCells of the ground of which both samples have all cells.
+    """Pair the cells of the ground blocks for which both samples have all cells.
 
     Parameters
     ----------
@@ -332,7 +333,9 @@ def paired_cells(survey: Survey, real: ChannelSample, simulated: ChannelSample) 
 
 
 def _sight(survey, cells):
-    """From the scanner to the centres of cells (c, 3), at the mean time of the points. m."""
+    """Vectors from the scanner to the centers of cells (c, 3), at the mean time of the points.
+    m.
+    """
     segment = survey.trajectory.segment(cells.gps_time)
     first, last = survey.trajectory.passes[np.maximum(segment, 0)].T
     return cells.centre - scanner_origin(survey, np.clip(cells.gps_time, first, last))

@@ -1,7 +1,7 @@
-"""Distances between distributions, as other fields state a gap: energy, MMD and Chamfer distance.
+"""Distances between distributions as used in other fields: energy, MMD and Chamfer distance.
 
-Each stands beside what it is between two halves of one simulation: zero looks like that. The
-estimators of energy distance and MMD have no bias, so that they may be negative.
+Each is compared with its value between two halves of one simulation, which corresponds to zero. The
+estimators of energy distance and MMD are unbiased, so they may be negative.
 """
 
 from collections.abc import Callable
@@ -18,27 +18,27 @@ from mlscorr.gap.evidence import Inference, Observations
 from mlscorr.gap.residuals import Background, Rows
 from mlscorr.surfaces import chance
 
-UNITS = {"points": "m", "intensity": "decades", "density": "decades"}  # of clouds; else sigmas
+UNITS = {"points": "m", "intensity": "decades", "density": "decades"}  # of clouds; otherwise sigmas
 
 
 @dataclass(frozen=True)
 class DistributionDistance:
-    """A distance between a real and a simulated sample.
+    """Distance between a real and a simulated sample.
 
     Parameters
     ----------
     channel : str
-        What the samples are of.
+        Channel of the samples.
     figure : str
         energy_distance, mmd or chamfer.
     unit : str
     before, after : float
-        With the simulator as it was, and with the cause in it; NaN where it didn't run again. Mean
-        over draws of halves.
+        With the original simulator, and with the cause in it; NaN without a second run. Mean over
+        draws of halves.
     floor, floor_high : float
-        Between halves of the simulation: mean over draws, and what 95 % of these are below.
+        Between halves of the simulation: mean over draws, and their 95 % quantile.
     drawn : int
-        Size of each sample, at most.
+        Largest size of each sample.
     """
 
     channel: str
@@ -51,17 +51,17 @@ class DistributionDistance:
     drawn: int
 
     def document(self) -> dict:
-        """A row of ``distances`` in gap.json."""
+        """Return a row of ``distances`` in gap.json."""
         return vars(self) | {"halves": SETTINGS.halves}
 
 
 def energy_distance(x: np.ndarray, y: np.ndarray) -> float:
-    """2 E|X - Y| - E|X - X'| - E|Y - Y'| (Szekely and Rizzo 2013), without bias.
+    """2 E|X - Y| - E|X - X'| - E|Y - Y'| (Szekely and Rizzo 2013), unbiased.
 
     Parameters
     ----------
     x, y : (n, d) and (m, d) array
-        At least two rows each.
+        Each with at least two rows.
 
     >>> energy_distance(np.array([[0.0], [2.0]]), np.array([[5.0], [7.0]]))
     6.0
@@ -70,12 +70,12 @@ def energy_distance(x: np.ndarray, y: np.ndarray) -> float:
 
 
 def maximum_mean_discrepancy(x: np.ndarray, y: np.ndarray, bandwidth: float) -> float:
-    """Square of the maximum mean discrepancy (Gretton et al. 2012, Eq. 3), without bias.
+    """Squared maximum mean discrepancy (Gretton et al. 2012, Eq. 3), unbiased.
 
     Parameters
     ----------
     x, y : (n, d) and (m, d) array
-        At least two rows each.
+        Each with at least two rows.
     bandwidth : float
         One sigma of the Gaussian kernel.
 
@@ -88,7 +88,7 @@ def maximum_mean_discrepancy(x: np.ndarray, y: np.ndarray, bandwidth: float) -> 
 
 
 def chamfer_distance(x: np.ndarray, y: np.ndarray) -> float:
-    """Mean distance to the nearest point of the other cloud, both ways.
+    """Mean distance to the nearest point of the other cloud, in both directions.
 
     Parameters
     ----------
@@ -110,8 +110,8 @@ def cloud_distances(
 ) -> tuple[DistributionDistance, ...]:
     """Distances of a cloud from the simulator's, and from those of its next run.
 
-    Real pulses of one half are compared with simulated ones of the other, as the simulated halves
-    are with each other: two clouds of the same beams lie on each other point by point.
+    Real pulses of one half are compared with simulated ones of the other half, like the simulated
+    halves with each other, because two clouds of the same beams coincide point by point.
 
     Parameters
     ----------
@@ -147,10 +147,10 @@ def cloud_distances(
 def innovation_distances(
     channel: np.ndarray, innovation: np.ndarray, replicas: np.ndarray, rng: np.random.Generator
 ) -> tuple[DistributionDistance, ...]:
-    """Distances of innovations from those of replicas of the survey in which nothing acts.
+    """Distances of innovations from those of replicas of the survey without effects.
 
-    Both are over their own scatter, that after the cause: a noise that is stated too large is no
-    gap, and of what is left the shape alone counts.
+    Both are divided by their own scatter, that after the cause: stated noise that is too large is
+    not a gap, and only the shape counts.
 
     Parameters
     ----------
@@ -178,32 +178,32 @@ def innovation_distances(
 
 
 def _columns_of(values, replicas, number, rng):
-    """A column of values (n, k), and another one of replicas, in random order."""
+    """Column of values (n, k), and another one of replicas, in random order."""
     columns = values[:, number % values.shape[1]], replicas[:, number % replicas.shape[1]]
     return tuple(rng.permutation(column)[:, None] for column in columns)
 
 
 @dataclass(frozen=True)
 class _Sample:
-    """Values (n, d), and which pulse or cell (n,) each is of: the same in all clouds."""
+    """Values (n, d), and the pulse or cell (n,) of each, the same in all clouds."""
 
     values: np.ndarray
     identity: np.ndarray
 
     def half(self, salt, is_first, rng):
-        """Values of one half in random order."""
+        """Return the values of one half in random order."""
         in_first = chance(self.identity, np.full(len(self.values), salt)) < 0.5
         return self.values[rng.permutation(np.flatnonzero(in_first == is_first))]
 
 
 def _of_samples(channel, samples, rng, figures=None):
-    """DistributionDistances of real things from those of one simulation or two."""
+    """DistributionDistances of real items from those of one or two simulations."""
     real, simulated, *following = samples
     if figures is None:
         figures = _pairwise(simulated.values)
     smallest = min(len(sample.values) for sample in samples)
-    half = smallest // 2 - smallest // 8  # halves are not quite alike
-    number = dict.fromkeys(figures, min(half, SETTINGS.drawn))  # all pairs are looked at
+    half = smallest // 2 - smallest // 8  # halves are not exactly equal
+    number = dict.fromkeys(figures, min(half, SETTINGS.drawn))  # all pairs are used
     if "chamfer" in number:
         number["chamfer"] = min(half, SETTINGS.distance_points)
     sides = {"before": (real, simulated), "floor": (simulated, simulated)}
@@ -214,12 +214,12 @@ def _of_samples(channel, samples, rng, figures=None):
 
 
 def _halves(x, y, salt, rng):
-    """Values of the one half of a sample, and of the other half of another."""
+    """Values of one half of a sample, and of the other half of another."""
     return x.half(salt, True, rng), y.half(salt, False, rng)
 
 
 def _of_draws(channel, figures, pairs, number, rng):
-    """A DistributionDistance of each figure, where there are things enough."""
+    """DistributionDistance of each figure, if there are enough items."""
     for name, figure in figures.items():
         size = number[name]
         if size < SETTINGS.least_blocks:
@@ -245,7 +245,7 @@ def _of_draws(channel, figures, pairs, number, rng):
 
 
 def _pairwise(simulated) -> dict[str, Callable]:
-    """Energy distance and MMD, whose bandwidth is the median distance in the simulation."""
+    """Energy distance and MMD, with the median distance in the simulation as bandwidth."""
     some = simulated[:: max(1, len(simulated) // SETTINGS.drawn)]
     apart = pdist(some)
     apart = apart[apart > 0]
@@ -259,9 +259,9 @@ def _pairwise(simulated) -> dict[str, Callable]:
 def replica_innovations(
     rows: Rows, background: Background, inference: Inference, rng: np.random.Generator
 ) -> np.ndarray:
-    """Innovations (n, replicas) of surveys in which nothing acts.
+    """Innovations (n, replicas) of surveys without effects.
 
-    Their POS errs, and their noise has tails, as this one's do once its cause is taken off.
+    Their POS errors and noise tails are those of this survey after removal of its cause.
 
     Parameters
     ----------
@@ -269,7 +269,7 @@ def replica_innovations(
     background : Background
         Of these.
     inference : Inference
-        Of these; n is the number of its innovations.
+        Inference of these rows; n is the number of its innovations.
     rng : numpy.random.Generator
     """
     observed = Observations.of(rows, background)

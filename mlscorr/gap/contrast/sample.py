@@ -1,8 +1,7 @@
-"""What is kept of a cloud while it is read, so that its channels can be compared.
+"""Sample of a cloud for the comparison of channels, collected while it is read.
 
-Cells of space and time hold how many points there are, how bright, how far, how steep. Their sums
-add up over chunks. Which blocks of the ground are kept a hash of their place tells: the same in all
-clouds.
+Cells of space and time contain number, brightness, range and incidence of points, as sums over
+chunks. Ground blocks are selected by a hash of their position, which is the same in all clouds.
 """
 
 from __future__ import annotations
@@ -32,21 +31,21 @@ from mlscorr.targets import NO_POINTS
 
 @dataclass(frozen=True)
 class ChannelSample:
-    """A bounded part of a cloud.
+    """Limited sample of a cloud.
 
     Parameters
     ----------
     cells : Cells
         In the order of their keys; the value of a point is log10 of its intensity in counts.
     share : float
-        Of the ground, of which all cells are there.
+        Share of the ground with all its cells.
     edges : Edges
     edge_share : float
-        Of the moments, of which all edges are there.
+        Share of the moments with all their edges.
     points : PointCloud
-        Of whole cells.
+        Points of complete cells.
     point_share : float
-        Of all cells, whose points are there.
+        Share of all cells whose points are included.
     patches : Patches or None
     """
 
@@ -60,12 +59,12 @@ class ChannelSample:
 
     @property
     def has_intensity(self) -> bool:
-        """Whether its intensities tell anything: some differ."""
+        """True if intensities carry information, that is, some differ."""
         return len(self.points) > 0 and bool(np.ptp(self.points.intensity) > 0)
 
 
 def of_shared_moments(samples: Sequence[ChannelSample]) -> list[ChannelSample]:
-    """The samples at moments in which all of them have points: a cloud may be of a part of a drive.
+    """Restrict samples to moments with points in all of them, as a cloud may cover part of a drive.
 
     Parameters
     ----------
@@ -88,7 +87,7 @@ def of_shared_moments(samples: Sequence[ChannelSample]) -> list[ChannelSample]:
 
 
 class SampleCollector:
-    """Keeps a ChannelSample of the chunks that it is given.
+    """Collector of a ChannelSample from chunks.
 
     Parameters
     ----------
@@ -99,12 +98,12 @@ class SampleCollector:
         self._cells, self._edges = CellCollector(survey), EdgeCollector(survey)
 
     def add(self, chunk: PointCloud) -> None:
-        """Take what it needs of a chunk."""
+        """Add a chunk."""
         self._cells.add(chunk)
         self._edges.add(chunk)
 
     def sample(self, patches: Patches | None) -> ChannelSample:
-        """The ChannelSample of all chunks so far.
+        """Return the ChannelSample of all chunks so far.
 
         Parameters
         ----------
@@ -125,13 +124,13 @@ class SampleCollector:
 
 
 class CellCollector:
-    """Keeps about `limit` cells of the chunks that it is given, and all points of some of them.
+    """Collector of about `limit` cells of chunks, and of all points of some of them.
 
     Parameters
     ----------
     survey : Survey
     limit, points : int
-        Cells, and points, at most.
+        Largest numbers of cells and points.
     """
 
     def __init__(
@@ -144,7 +143,7 @@ class CellCollector:
         self.share = 1.0
 
     def add(self, chunk: PointCloud) -> None:
-        """Take the cells of a chunk."""
+        """Add the cells of a chunk."""
         inside = chunk[self._survey.trajectory.segment(chunk.gps_time) >= 0]
         if self.share < 1:
             some = inside[block_chance(inside.xyz) < self.share]
@@ -158,12 +157,12 @@ class CellCollector:
         self._points.add(inside, cell_chance(inside))
 
     def cells(self) -> Cells:
-        """Cells of all chunks so far, in the order of their keys."""
+        """Return the cells of all chunks so far, in the order of their keys."""
         cells = self._table.of()
         return cells[np.argsort(cells.key)]
 
     def points(self) -> PointCloud:
-        """All points of the cells whose points are kept."""
+        """Return all points of the cells whose points are kept."""
         return PointCloud.concatenate([NO_POINTS, *self._points.parts()])
 
     @property
@@ -173,7 +172,7 @@ class CellCollector:
 
 
 def sampled(cloud: PointCloud, share: float) -> PointCloud:
-    """The points of a share of all cells: whole cells, the same in all clouds.
+    """Points of a share of all cells: complete cells, the same in all clouds.
 
     Parameters
     ----------
@@ -186,7 +185,7 @@ def sampled(cloud: PointCloud, share: float) -> PointCloud:
 
 
 def cell_chance(cloud: PointCloud) -> np.ndarray:
-    """A number from 0 to 1 (n,) for the cell and moment of points, the same in all clouds.
+    """Random number from 0 to 1 (n,) for the cell and moment of points, the same in all clouds.
 
     Parameters
     ----------

@@ -1,5 +1,6 @@
-"""Tables of a channel by what it may depend on, with honest sigmas: what lies in one block of the
-ground goes together, and the bootstrap draws blocks.
+"""Tables of a channel by covariates, with sigmas from a bootstrap over ground blocks.
+
+Data in one block are correlated, so the bootstrap draws blocks.
 """
 
 from __future__ import annotations
@@ -13,13 +14,13 @@ from scipy.stats import t
 
 from mlscorr.gap.contrast._settings import SETTINGS
 
-RATIOS = ("intensity", "density")  # channels whose figure is a ratio; else it is a difference
+RATIOS = ("intensity", "density")  # channels whose figure is a ratio; otherwise a difference
 UNITS = {"intensity": "counts", "density": "points", "edge_width": "mrad", "dropout": "share"}
 
 
 @dataclass(frozen=True)
 class ContrastTable:
-    """A channel by one thing that it may depend on.
+    """Channel by one covariate.
 
     Parameters
     ----------
@@ -30,12 +31,12 @@ class ContrastTable:
     real, simulated : (b,) array
         In the channel's own unit.
     value, sigma : (b,) array
-        Difference of the two, or log of their ratio, and its sigma by blocks; NaN where there are
-        too few of them.
+        Difference of the two, or log of their ratio, and its sigma from blocks; NaN with too few of
+        them.
     blocks : (b,) array
-        On which that rests.
+        Number of blocks used.
     differs : (b,) bool array
-        Where it is more than chance.
+        True for significant differences.
     """
 
     by: str
@@ -49,7 +50,7 @@ class ContrastTable:
     differs: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
 
     def judged(self, tests: int) -> ContrastTable:
-        """The table with what differs by more than chance, where so many bins are looked at.
+        """Return the table with significant differences flagged, for a number of tested bins.
 
         Parameters
         ----------
@@ -60,12 +61,12 @@ class ContrastTable:
         return replace(self, differs=differs)
 
     def document(self, is_ratio: bool) -> dict:
-        """A table of ``contrasts`` in gap.json.
+        """Return a table of ``contrasts`` in gap.json.
 
         Parameters
         ----------
         is_ratio : bool
-            Whether the value is the log of a ratio.
+            True if the value is the log of a ratio.
         """
         value = self.value
         sigma = self.sigma
@@ -89,13 +90,13 @@ class ContrastTable:
 
 @dataclass(frozen=True)
 class Binning:
-    """What things (n,) are sorted by.
+    """Covariate by which items (n,) are sorted.
 
     Parameters
     ----------
     by : str
     values : (n,) array
-        Or numbers of bins, where there are no edges; -1 for none.
+        Values, or indices of bins without edges; -1 for none.
     edges : tuple of float, optional
         Of the finest bins.
     bins : tuple of str
@@ -107,7 +108,7 @@ class Binning:
     bins: tuple[str, ...] = ()
 
     def number(self, edges: tuple[float, ...] | None) -> np.ndarray:
-        """The bin (n,) of each thing; -1 for none.
+        """Return the bin (n,) of each item; -1 for none.
 
         Parameters
         ----------
@@ -121,14 +122,14 @@ class Binning:
 
 @dataclass(frozen=True)
 class Measure:
-    """Columns (n,) of n things in blocks, and what figures their sums give.
+    """Columns (n,) of n items in blocks, and figures from their sums.
 
     Parameters
     ----------
     channel : str
     block : (n,) int array
     columns : list of k (n,) arrays
-        The last is what each thing weighs.
+        The last one is the weight of each item.
     figure : function
         Of sums (..., bins, k): values (..., bins).
     sides : function
@@ -136,7 +137,7 @@ class Measure:
     weights : (replicas, b) array
         Of the bootstrap.
     without : function
-        Of a change (n,) of the figure of each thing: the Measure of what is left without it.
+        Of a change (n,) of the figure of each item: the Measure without it.
     splits : tuple of Binning
     """
 
@@ -150,7 +151,7 @@ class Measure:
     splits: tuple[Binning, ...]
 
     def table(self, split: Binning) -> tuple[ContrastTable, np.ndarray]:
-        """ContrastTable by a Binning, and the sums (b, bins, k) over blocks that made it.
+        """Return the ContrastTable by a Binning, and its sums (b, bins, k) over blocks.
 
         Parameters
         ----------
@@ -172,25 +173,25 @@ class Measure:
         return ContrastTable(split.by, edges, bins, *sides, *figures), sums
 
     def whole(self) -> tuple[ContrastTable, np.ndarray]:
-        """ContrastTable of all things as one bin, and its sums."""
+        """Return the ContrastTable of all items in one bin, and its sums."""
         return self.table(Binning("all", np.zeros(len(self.block), int), bins=("all",)))
 
 
 @dataclass(frozen=True)
 class Contrast:
-    """A channel of the real cloud beside the simulated one's.
+    """Channel of the real and the simulated cloud, compared.
 
     Parameters
     ----------
     channel : str
         intensity, density, dropout or edge_width.
     silent : str
-        Why nothing is compared, in a sentence; else nothing.
+        Reason why nothing is compared, in a sentence; otherwise empty.
     whole : ContrastTable, optional
-        Of all bins as one.
+        Table of all bins as one.
     tables : tuple of ContrastTable
     sentences : tuple of str
-        Where the two differ by more than chance.
+        Sentences on significant differences.
     """
 
     channel: str
@@ -200,7 +201,7 @@ class Contrast:
     sentences: tuple[str, ...] = ()
 
     def document(self) -> dict:
-        """A row of ``contrasts`` in gap.json."""
+        """Return a row of ``contrasts`` in gap.json."""
         is_ratio = self.channel in RATIOS
         return {
             "channel": self.channel,
@@ -216,7 +217,7 @@ class Contrast:
 
 
 def block_of(place: np.ndarray) -> np.ndarray:
-    """Number (n,) of the block of the ground that each place is in, from 0.
+    """Index (n,) of the ground block of each position, from 0.
 
     Parameters
     ----------
@@ -234,7 +235,7 @@ def sums_by_block(block: np.ndarray, number: np.ndarray, bins: int, columns: lis
     ----------
     block : (n,) int array
     number : (n,) int array
-        The bin of each; -1 for none.
+        Bin of each; -1 for none.
     bins : int
     columns : list of k (n,) arrays
     """
@@ -246,7 +247,7 @@ def sums_by_block(block: np.ndarray, number: np.ndarray, bins: int, columns: lis
 
 
 def effective(weight: np.ndarray) -> np.ndarray:
-    """Number of blocks (...) as if all weighed alike, of weights (b, ...).
+    """Effective number of equally weighted blocks (...), from weights (b, ...).
 
     Parameters
     ----------
@@ -256,12 +257,12 @@ def effective(weight: np.ndarray) -> np.ndarray:
 
 
 def joined_bins(weight: np.ndarray) -> list[slice]:
-    """Bins of finer ones, so joined that each has blocks enough; none before and after all data.
+    """Merge fine bins so that each has enough blocks; none before and after all data.
 
     Parameters
     ----------
     weight : (b, bins) array
-        Of each block in each of the finer bins.
+        Weight of each block in each fine bin.
     """
     filled = np.flatnonzero(weight.sum(axis=0) > 0)
     if len(filled) == 0:
@@ -273,7 +274,7 @@ def joined_bins(weight: np.ndarray) -> list[slice]:
         if effective(weight[:, start:end].sum(axis=1)) >= SETTINGS.least_blocks:
             bins.append(slice(start, end))
             start = end
-    if start < stop:  # what is left is no bin of its own
+    if start < stop:  # the rest is not a separate bin
         if bins:
             start = bins.pop().start
         bins.append(slice(start, stop))
@@ -281,7 +282,7 @@ def joined_bins(weight: np.ndarray) -> list[slice]:
 
 
 def weights_of(blocks: int, rng: np.random.Generator) -> np.ndarray:
-    """How often each block is drawn (replicas, blocks) by the bootstrap.
+    """Draw counts (replicas, blocks) of each block for the bootstrap.
 
     Parameters
     ----------
@@ -296,12 +297,12 @@ def weights_of(blocks: int, rng: np.random.Generator) -> np.ndarray:
 def with_sigma(
     sums: np.ndarray, figure: Callable[[np.ndarray], np.ndarray], weights: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A figure of each bin, its sigma by the bootstrap over blocks, and its number of blocks.
+    """Figure of each bin, its sigma from a bootstrap over blocks, and its number of blocks.
 
     Parameters
     ----------
     sums : (b, bins, k) array
-        The last column is what a block weighs.
+        The last column is the weight of a block.
     figure : function
         Of sums (..., bins, k): values (..., bins).
     weights : (replicas, b) array
@@ -309,7 +310,7 @@ def with_sigma(
     Returns
     -------
     value, sigma, blocks : (bins,) arrays
-        Blocks as if all weighed alike; NaN for values of fewer than can tell a sigma.
+        Effective number of blocks; NaN for values with too few of them for a sigma.
     """
     with np.errstate(invalid="ignore", divide="ignore"):
         blocks = effective(sums[..., -1])
@@ -323,12 +324,12 @@ def with_sigma(
 
 
 def limit(blocks: np.ndarray, tests: int) -> np.ndarray:
-    """Sigmas (n,) that a difference must reach, where so many are looked at (Bonferroni).
+    """Threshold (n,) of a difference in sigmas, for a number of tests (Bonferroni).
 
     Parameters
     ----------
     blocks : (n,) array
-        On which each sigma rests.
+        Number of blocks behind each sigma.
     tests : int
     """
     return t.isf(

@@ -1,4 +1,4 @@
-"""Which effect explains the rows, with what probability and parameters, and where it shows."""
+"""Inference of the effect that explains the rows: probability, parameters, and location."""
 
 from mlscorr.gap.evidence._noise import detectable_size
 from mlscorr.gap.evidence.causes import Cause, CauseParameter, Inference, cause_of, infer_causes

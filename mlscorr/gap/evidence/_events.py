@@ -1,4 +1,4 @@
-"""Events between the times and widths of the bank: the best one, refined."""
+"""Refinement of the best event between the times and widths of the bank."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,17 +23,17 @@ from mlscorr.survey import Survey
 
 @dataclass(frozen=True)
 class RefinedEvent:
-    """The most probable time and width of an event.
+    """Most probable time and width of an event.
 
     Parameters
     ----------
     signature : Signature
     table : ColumnTable
-        Of it alone.
+        Table of this event only.
     gain : float
-        Log evidence over that of none, counted as the bank's are.
+        Log evidence over that of none, with the same prior as in the bank.
     sigma : dict
-        Of time and width, by the curvature of the evidence. Units: s.
+        Sigmas of time and width, from the curvature of the evidence. Units: s.
     """
 
     signature: Signature
@@ -50,12 +50,12 @@ def refine_events(
     evidence: BlockEvidence,
     signatures: Sequence[Signature],
 ) -> dict[str, RefinedEvent]:
-    """Refined events by their labels, where the bank has one that stands out.
+    """Refine significant events of the bank, by label.
 
     Parameters
     ----------
     rows, survey, observations, signatures
-        Of one survey.
+        All of one survey.
     bank : ColumnTable
     evidence : BlockEvidence
         Of the residual, first column, by the bank.
@@ -83,7 +83,7 @@ def refine_events(
 
 
 def _spacing_of(times: Sequence[float]) -> float:
-    """Time between those at which events of one kind were tried. Units: s.
+    """Time step between trial events of one kind. Units: s.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ class _Search:
     survey: Survey
     observations: Observations
     models: tuple[ErrorModel, ...]
-    none: float  # log evidence of none by all models: by these, which suit the event, it is less
+    none: float  # log evidence of none by all models: less by these, which suit the event
 
     def score(self, event):
         """Log evidence over none of a signature, and its table."""
@@ -116,7 +116,7 @@ class _Search:
         return float(np.logaddexp.reduce(table.weighed(gain)[:, 0])), table
 
     def moved(self, event, **fixed):
-        """The signature at another time or width, or None where there is none."""
+        """Signature at another time or width, or None if there is none."""
         bench = Bench(self.rows, self.survey)
         try:
             moved = signature(bench, event.kind, event.fixed | fixed, np.random.default_rng(0))
@@ -129,7 +129,7 @@ class _Search:
         return None
 
     def best(self, event, share, spacing):
-        """The RefinedEvent near an event of the bank with a prior share."""
+        """RefinedEvent near an event of the bank with a prior share."""
         if "width" in event.fixed:
             event, gain, table, sigma = self._by_steps(event)
         else:
@@ -137,9 +137,9 @@ class _Search:
         return RefinedEvent(event, table, gain + np.log(share / SETTINGS.event_cell), sigma)
 
     def _between_rows(self, event, spacing):
-        """An event without a width: between two rows its evidence is the same at all times, and
-        there are peaks beside the highest. The most probable interval, among those a part of the
-        spacing apart, then by halves.
+        """Event without a width: between two rows its evidence is constant, and there are
+        secondary peaks. The most probable interval, first among those a fraction of the spacing
+        apart, then by bisection.
         """
         time = event.fixed["time"]
         parts = int(4 / SETTINGS.event_steps[-1])
@@ -163,7 +163,9 @@ class _Search:
         return event, gain, table, {"time": float(np.sqrt(shares(score) @ off))}
 
     def _edges(self, time, span):
-        """Times near one at which an event changes other rows: of rows and passes. Units: s."""
+        """Times close to one at which an event changes other rows: those of rows and passes.
+        Units: s.
+        """
         rows = self.rows
         passes = self.survey.trajectory.passes.ravel()
         times = rows.gps_time[rows.metric], rows.gps_time_2[rows.two_times]
@@ -172,15 +174,15 @@ class _Search:
         return np.concatenate([[time - span], known, [time + span]])
 
     def _at(self, event, time):
-        """Score, table and signature at another time; minus infinity where there is none."""
+        """Score, table and signature at another time; minus infinity if there is none."""
         moved = self.moved(event, time=round(float(time), 3))
         if moved is None:
             return (-np.inf, None, None)
         return (*self.score(moved), moved)
 
     def _by_steps(self, event):
-        """An event with a width: by halves, until the evidence falls by less than a factor e to
-        all sides; a drift of metres tells its time to milliseconds.
+        """Event with a width: by halved steps, until the evidence decreases by less than a
+        factor e on all sides. A drift of meters determines its time to milliseconds.
         """
         gain, table = self.score(event)
         keys = event.kind.moment()
@@ -205,7 +207,7 @@ class _Search:
         return event, gain, table, {key: self._sigma(event, key, gain, step) for key in keys}
 
     def _changed(self, event, key, step):
-        """The signature with another time or width, or None where there is none."""
+        """Signature with another time or width, or None if there is none."""
         time = event.fixed["time"]
         width = event.fixed["width"]
         if key == "time":
@@ -213,8 +215,8 @@ class _Search:
         return self.moved(event, width=float(width * np.exp(2 * step)))
 
     def _sigma(self, event, key, gain, step):
-        """By the fall of the evidence one step to both sides; the step itself where there is
-        none.
+        """Sigma from the decrease of the evidence one step to both sides; otherwise the step
+        itself.
         """
         width = event.fixed["width"]
         if key == "width":

@@ -1,9 +1,9 @@
-"""Noise classes: what is noisier, or otherwise correlated, than the simulator says.
+"""Noise classes: errors that are noisier, or otherwise correlated, than in the simulator.
 
-They show in the covariance of the metric rows, in the roughness of patches and in the share of
-pulses that return, and are tried before any systematic effect. Noise is detectable from the size on
-at which its expected log evidence is d^2 / 2, as that of a bias of d sigmas is, with all that the
-evidence allows for: another drift, noisier rows, roughness and return rates that are off together.
+They affect the covariance of the metric rows, the roughness of patches and the share of returning
+pulses, and are tried before any systematic effect. Noise is detectable if its expected log evidence
+is at least d^2 / 2, like that of a bias of d sigmas, allowing for other drift, noisier rows, and
+common offsets of roughness and return rates.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from mlscorr.gap.residuals import Rows, with_loss_variance
 from mlscorr.gap.signatures import Signature
 
 CHANNELS = ("roughness", "return_rate")
-DRAWS = 8  # of noisy residuals: the evidence of 4 sigmas scatters by 4, the mean of 8 by a sixth
+DRAWS = 8  # of noisy residuals: evidence of 4 sigmas scatters by 4, the mean of 8 by 1/6
 DOUBLINGS = 12  # of the usual size, up and down: 1 um of range noise to 20 m
 
 
@@ -41,13 +41,13 @@ class NoiseEvidence:
     ----------
     label : str
     member : int
-        Which of the signatures; -1 for a POS whose drift is larger than its sigmas say.
+        Index of the signature; -1 for a POS with more drift than its sigmas.
     size : (x,) array
-        Of the effect; of such a drift the factor on the sigmas.
+        Size of the effect; for such a drift the factor on the sigmas.
     metric : (x, k) array
-        Of k residual columns: log evidence with that much noise, over that of none.
+        Log evidence of k residual columns with that noise, over that of none.
     channels : (x, k) array
-        Of the k columns of roughness and return rate, likewise.
+        The same for k columns of roughness and return rate.
     """
 
     label: str
@@ -58,8 +58,8 @@ class NoiseEvidence:
 
     @property
     def by_size(self) -> np.ndarray:
-        """Log evidence (x, k). Noise of a row's own may be in its stated variance already, which
-        is taken from the scatter of its points: then only the channels show it.
+        """Log evidence (x, k). Independent noise of rows may already be in their stated
+        variance, which comes from the scatter of their points; then only the channels show it.
         """
         metric = self.metric
         if self.member >= 0 and self.channels.any():
@@ -80,18 +80,18 @@ def weigh_noise(
     residual: np.ndarray,
     channels: np.ndarray,
 ) -> tuple[NoiseEvidence, ...]:
-    """Evidence of each noise class.
+    """Weigh the evidence of each noise class.
 
     Parameters
     ----------
     observations, rows, signatures
-        Of one survey.
+        All of one survey.
     evidence : BlockEvidence
         Of the same residuals.
     residual : (n, k) array
-        Of the observations.
+        Residuals of the observations.
     channels : (q, k) array
-        Residuals of the rows without a metre.
+        Residuals of the rows without a length unit.
     """
     results = []
     rate = rows.channel == "return_rate"
@@ -120,7 +120,7 @@ def weigh_noise(
 
 
 def noisy_pos_models() -> list[ErrorModel]:
-    """Of a POS that is noisier, or has larger drift, than its sigmas say."""
+    """Models of a POS that is noisier, or drifts more, than its sigmas."""
     usual = PositionNoise.quantities()["magnitude"].typical
     drift = [model for scale in SETTINGS.drift_sizes for model in shaped_models(scale)]
     fixes = [model for size in SETTINGS.fix_sizes for model in shaped_models(1.0, usual * size)]
@@ -128,9 +128,9 @@ def noisy_pos_models() -> list[ErrorModel]:
 
 
 def draw_channels(rows: Rows, rng: np.random.Generator | None, number: int) -> np.ndarray:
-    """Residuals of the rows without a metre, and replicas without any effect.
+    """Residuals of the rows without a length unit, and replicas without any effect.
 
-    These are as scattered as the residuals are, and as many of them odd.
+    The replicas have the same scatter and share of outliers as the residuals.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def draw_channels(rows: Rows, rng: np.random.Generator | None, number: int) -> n
 
 
 def _between(steps, size):
-    """Sizes with so many steps from each to the next, evenly by their logs."""
+    """Geometric sequence of sizes with a number of steps between given ones."""
     n = len(size) - 1
     return np.exp(np.interp(np.arange(n * steps + 1) / steps, np.arange(n + 1), np.log(size)))
 
@@ -173,7 +173,7 @@ def _by_models(observations, residual, models):
 
 
 def _own(observations, signature, evidence, residual, size):
-    """Log evidence (x, k) over none, under the model that explains the first column best."""
+    """Log evidence (x, k) over none, with the model that explains the first column best."""
     best = int(np.argmax(evidence.none[:, 0]))
     calm = replace(evidence.models[best], noise=1.0)
     variance = signature.variance[observations.row] * observations.half
@@ -184,7 +184,7 @@ def _own(observations, signature, evidence, residual, size):
 
 
 def _channel_means(rows: Rows, signature: Signature, size: np.ndarray) -> np.ndarray:
-    """What noise of x sizes makes of the q rows without a metre on average: (x, q).
+    """Mean change of the q rows without a length unit by noise of x sizes: (x, q).
 
     Parameters
     ----------
@@ -203,12 +203,12 @@ def _channel_means(rows: Rows, signature: Signature, size: np.ndarray) -> np.nda
 def channel_evidence(
     rows: Rows, signature: Signature, size: np.ndarray, values: np.ndarray
 ) -> np.ndarray:
-    """Log evidence (x, k) over none of the rows without a metre.
+    """Log evidence (x, k) over none of the rows without a length unit.
 
     Parameters
     ----------
     rows, signature, size
-        As in ``channel_means``.
+        See ``channel_means``.
     values : (q, k) array
         Residuals of these rows.
     """
@@ -239,7 +239,7 @@ def _channel_likelihood(values, mean, rough, noise):
 
 
 def _roughness(values, mean, noise) -> list[tuple[float, np.ndarray, MixtureFit]]:
-    """Weight, variance (q,) and fit under each scatter between patches."""
+    """Yield weight, variance (q,) and fit for each scatter between patches."""
     density = 1 / SETTINGS.odd_span
     fits = []
     for sigma, weight in SETTINGS.roughness:
@@ -253,23 +253,23 @@ def _roughness(values, mean, noise) -> list[tuple[float, np.ndarray, MixtureFit]
 def detectable_size(
     rows: Rows, observations: Observations, kind: Signature, mdb: float = 1.0
 ) -> float:
-    """Size of a random effect that shows as a bias of so many minimal detectable ones would.
+    """Size of a random effect that is as detectable as a number of minimal detectable biases.
 
     Parameters
     ----------
     rows : Rows
-        Their residuals say what else scatters.
+        Their residuals give the other scatter.
     observations : Observations
         Of these.
     kind : Signature
         Of the random effect.
     mdb : float
-        In minimal detectable biases.
+        Number of minimal detectable biases.
 
     Returns
     -------
     size : float
-        In the effect's unit, within a fifth; nan where none within 4 000 times the usual one is.
+        In the effect's unit, to 20 %; NaN if there is none up to 4 000 times the usual size.
     """
     if _channel_means(rows, kind, kind.typical).any():
         shown = _channels
@@ -292,10 +292,9 @@ def detectable_size(
 
 
 def _channels(rows, _observations, kind, size):
-    """Expected log evidence by roughness and return rate.
+    """Expected log evidence from roughness and return rate.
 
-    What the residuals scatter by is taken with both signs: their product with the mean, which is
-    chance, falls out of the sum of the two.
+    Residuals are used with both signs, so that their random product with the mean cancels.
     """
     mean = np.zeros(len(rows))
     residual = draw_channels(rows, None, 0)
@@ -307,7 +306,7 @@ def _channels(rows, _observations, kind, size):
 
 
 def _metric(rows, observations, kind, size):
-    """Expected log evidence by the scatter of residuals in m, over draws of such."""
+    """Expected log evidence from the scatter of residuals in m, over random draws."""
     rng = np.random.default_rng(0)  # the same draws at each size, so that the evidence is smooth
     residual = observations.columns(rows.residual[:, None])
     calm = _best(observations, residual)
@@ -328,6 +327,6 @@ def _metric(rows, observations, kind, size):
 
 
 def _best(observations, residual):
-    """The ErrorModel that explains all columns of residuals best."""
+    """ErrorModel that explains all columns of residuals best."""
     models = error_models()
     return max(models, key=lambda m: model_likelihood(observations, m, residual).sum())

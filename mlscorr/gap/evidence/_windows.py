@@ -1,8 +1,8 @@
-"""Windows of time in which the POS is worse than it says, as it is without GNSS.
+"""Intervals in which the POS is worse than stated, as in a GNSS outage.
 
-Inside a window its position has a further error. Windows and sizes come from a bank, over which
-the evidence is averaged: the price of having looked often. Where one stands out it is refined, and
-others are looked for beside it.
+Within an interval (window), the position has an additional error. Windows and sizes come from a
+bank, over which the evidence is averaged to account for multiple tests. A significant window is
+refined, and further ones are then searched.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from mlscorr.gap.evidence.settings import SETTINGS
 from mlscorr.gap.signatures import Signature
 from mlscorr.pos import EXCURSIONS, HUMP, RISE
 
-# A single HUMP is position_bump, an effect: as a cause of noise it counts beside other windows only
+# A single HUMP is position_bump, an effect: as noise it counts only together with other windows
 
 
 class Window(NamedTuple):
-    """When the POS is worse than it says: start and length (s), factor on sigma, shape."""
+    """Interval of a worse POS: start and length (s), factor on sigma, shape."""
 
     start: float
     length: float
@@ -41,11 +41,11 @@ class Window(NamedTuple):
 
     @property
     def end(self) -> float:
-        """Units: s."""
+        """End of the window. Units: s."""
         return self.start + self.length
 
     def overlaps(self, others: Iterable[Window]) -> bool:
-        """Whether any of the others has a moment in common with it."""
+        """Return True if the window overlaps any of the others."""
         return any(self.start < other.end and other.start < self.end for other in others)
 
 
@@ -56,14 +56,14 @@ class WindowEvidence(NoiseEvidence):
     Parameters
     ----------
     windows : tuple of Window
-        The most probable ones.
+        Most probable windows.
     """
 
     windows: tuple[Window, ...] = ()
 
 
 def models_with_windows(noise: Iterable[NoiseEvidence]) -> list[ErrorModel]:
-    """All ErrorModels with the windows that stood out among noise classes."""
+    """Make all ErrorModels with the significant windows of noise classes."""
     windows = [each.windows for each in noise if isinstance(each, WindowEvidence)]
     return [replace(model, windows=group) for group in windows for model in error_models()]
 
@@ -75,7 +75,7 @@ def weigh_windows(
     residual: np.ndarray,
     accepted: np.ndarray,
 ) -> tuple[WindowEvidence, ...]:
-    """Evidence of windows of a worse POS; empty where nothing can hold or make them.
+    """Weigh the evidence of windows of a worse POS; empty if none can be tested.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def weigh_windows(
     residual : (n, k) array
         Units: m.
     accepted : (n, q) array
-        Columns of ``observations.shared`` that are a cause: what it explains asks for no window.
+        Columns of ``observations.shared`` that are a cause, whose signal needs no window.
     """
     bank = _bank(observations.errors.gps_time)
     if not bank or not any(signature.is_common for signature in signatures):
@@ -120,7 +120,7 @@ def weigh_windows(
 
 
 def _bank(gps_time):
-    """Windows that hold some of the moments (n,) and not all, with a factor to be chosen."""
+    """Windows that contain some but not all of the moments (n,), with a factor to be chosen."""
     moment = np.unique(gps_time)
     windows = [
         Window(float(start), length, SETTINGS.window_factors[1], RISE)
@@ -128,14 +128,14 @@ def _bank(gps_time):
         for start in np.arange(moment[0] - length / 2, moment[-1], length / 2)
     ]
     count = [np.diff(np.searchsorted(moment, [w.start, w.end]))[0] for w in windows]
-    # three moments inside and three outside tell a window from a single odd one
+    # three moments inside and three outside separate a window from a single outlier
     return [w for w, held in zip(windows, count, strict=True) if 3 <= held <= len(moment) - 3]
 
 
 def _excess(observations, residual, windows, bank):
-    """How far squared residuals (n, k) are above their variance in each window: (w, k).
+    """Excess of squared residuals (n, k) over their variance in each window: (w, k).
 
-    Not of innovations: where GNSS is back, these are largest after the window.
+    Innovations are not used, because after re-acquisition these are largest after the window.
     """
     errors = observations.errors
     row = observations.row
@@ -156,7 +156,9 @@ def _score(observations, residual, base, windows):
 
 @dataclass(frozen=True)
 class _Search:
-    """For the windows that explain one residual column (n, 1), where its rest (n, 1) is large."""
+    """Search for windows that explain one residual column (n, 1), where its rest (n, 1) is
+    large.
+    """
 
     observations: Observations
     residual: np.ndarray
@@ -167,7 +169,7 @@ class _Search:
         return _score(self.observations, self.residual, base, windows)[0]
 
     def best(self):
-        """Windows refined one after the other, and the log evidence of all."""
+        """Refine windows one by one; return them and the log evidence of all."""
         factors = SETTINGS.window_factors
         prior = -np.log(SETTINGS.event_cell * len(self.bank) * len(factors) * len(EXCURSIONS))
         base, windows = self._first(EXCURSIONS)
@@ -197,13 +199,13 @@ class _Search:
 
     def _base(self, windows):
         """Model that explains the column best with windows. Only its own share of the evidence
-        counts: what others would add is left out, to the disadvantage of windows.
+        counts, to the disadvantage of windows.
         """
         return max(error_models(), key=lambda model: self.score(model, windows))
 
     def _first(self, shapes):
-        """Model and window that explain the column best, from the best of each length and shape,
-        as each may stay where it is.
+        """Model and window that explain the column best, from the best of each length and
+        shape, because refinement may not change these.
         """
         excess = _excess(self.observations, self.left, (), self.bank)[:, 0]
         results = []
@@ -219,7 +221,7 @@ class _Search:
         return base, self._refined(base, windows)
 
     def _refined(self, base, windows):
-        """The last window with its start, end and factor where the likelihood is largest."""
+        """Last window with the start, end and factor of largest likelihood."""
         *others, window = windows
         time = self.observations.errors.gps_time
         least = SETTINGS.window_lengths[0]
@@ -233,11 +235,11 @@ class _Search:
             if moved.length < least / 2 or factor < 1 or moved.overlaps(others):
                 return -np.inf
             if edges != best and (start < first or end > last):
-                return -np.inf  # nothing says how an error goes on that nobody sees
+                return -np.inf  # unobserved errors cannot be extrapolated
             return self.score(base, (*others, moved))
 
         top = score(best)
-        # each three times: what suits the start may not suit the factor any more
+        # three times each, because a new start may need another factor
         for step in np.repeat(SETTINGS.window_steps, 3):
             for key, change in product(range(3), (-step, step)):
                 edges = _moved(best, key, change)
@@ -249,7 +251,7 @@ class _Search:
 
 
 def _moved(edges, key, change):
-    """Start, end and factor, one of them moved by a share of the length, or twice of its log."""
+    """Start, end and factor, one of them changed by a share of the length, or twice that in log."""
     moved = list(edges)
     if key == 2:
         moved[key] *= np.exp(2 * change)

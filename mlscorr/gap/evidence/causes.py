@@ -1,5 +1,6 @@
-"""The whole inference in one call, and causes with their parameters: estimate, sigma, and what this
-survey could detect at all.
+"""Complete inference in one call, and causes with their parameters.
+
+Parameters have an estimate, a sigma, and the size that this survey could detect.
 """
 
 from collections.abc import Sequence
@@ -39,7 +40,7 @@ UNITS = ("s", "s", "ratio")  # of a window's start, length and factor
 
 @dataclass(frozen=True)
 class CauseParameter:
-    """One number of a cause; detectable is its minimal detectable bias (80 %, 0.1 %)."""
+    """One parameter of a cause; detectable is its minimal detectable bias (80 %, 0.1 %)."""
 
     name: str
     unit: str
@@ -50,20 +51,20 @@ class CauseParameter:
 
 @dataclass(frozen=True)
 class Cause:
-    """One label with what it says in numbers.
+    """One label with its numbers.
 
     Parameters
     ----------
     effect : str
-        The label.
+        Label of the cause.
     probability : float
     parameters : tuple of CauseParameter
     parts : tuple of (Signature, (p,) array)
-        What to put into the simulator: signature.effect(estimate) is the Effect.
+        Parts for the simulator: signature.effect(estimate) is the Effect.
     shift : (m,) array
-        What it makes of the residuals.
+        Its effect on the residuals.
     extra : (m,) array or None
-        Variance that it adds to the rows' own noise.
+        Variance added to the rows' own noise.
     model : ErrorModel
         Of the POS's covariance with it.
     """
@@ -78,17 +79,18 @@ class Cause:
 
     @property
     def effects(self) -> tuple[Effect, ...]:
-        """Effects for the simulator. Raises ValueError for a size that no survey can have."""
+        """Return the Effects for the simulator. Raises ValueError if a size is impossible."""
         return tuple(signature.effect(estimate) for signature, estimate in self.parts)
 
     def stretches(self, trajectory: Trajectory) -> tuple[tuple[str, float, float], ...]:
-        """Name, start and end of each event and window, as far as the drive reaches; an event's
-        where it is half as large as at its largest, or larger.
+        """Name, start and end of each event and window, limited to the drive.
+
+        An event lasts while it is at least half of its maximum.
 
         Parameters
         ----------
         trajectory : Trajectory
-            The recorded one.
+            Recorded trajectory.
         """
         stretches = []
         for part, _ in self.parts:
@@ -108,23 +110,23 @@ class Cause:
 
 @dataclass(frozen=True)
 class Inference:
-    """All that the rows say.
+    """Complete result for the rows.
 
     Parameters
     ----------
     verdict : GapVerdict
     causes : tuple of Cause
-        That of the verdict, then the others, best first.
+        Cause of the verdict, then the others, best first.
     same : tuple of str
-        Effects that this survey can't tell apart from the label at the size that it has.
+        Effects that this survey cannot separate from the label at its size.
     where : Where
     separability : Separability
     probability : dict
-        Of every label that was weighed, most probable first.
+        Probability of every weighed label, most probable first.
     evidence : LabelEvidence
-        What was compared.
+        Compared evidence.
     joint : JointScore
-        Of the labels.
+        Scores of the labels.
     """
 
     verdict: GapVerdict
@@ -138,7 +140,7 @@ class Inference:
 
     @property
     def cause(self) -> Cause:
-        """The Cause of the verdict."""
+        """Cause of the verdict."""
         return next(cause for cause in self.causes if cause.effect == self.verdict.label)
 
 
@@ -153,7 +155,7 @@ def infer_causes(
     absence: Absence | None = None,
     costs: Costs | None = None,
 ) -> Inference:
-    """Which effect explains the rows, with what parameters, and where it shows.
+    """Infer the effect that explains the rows, with parameters and location.
 
     Parameters
     ----------
@@ -162,18 +164,18 @@ def infer_causes(
     survey : Survey
     signatures : sequence of Signature
     rng : numpy.random.Generator
-        Draws the replicas.
+        For the replicas.
     replicas : int
-        More of them make the p-value and the null bands finer.
+        More of them refine the p-value and the null bands.
     absence : Absence, optional
-        Of targets that have no row.
+        Absence of targets without a row.
     costs : Costs, optional
-        Of wrong answers.
+        Costs of wrong answers.
 
     Raises
     ------
     ValueError
-        When no row has a residual in m, or a sigma is zero.
+        If no row has a residual in m, or a sigma is zero.
     """
     evidence = weigh_labels(rows, background, survey, signatures, rng, replicas)
     joint, evidence = joint_score(rows, survey, signatures, evidence)
@@ -189,7 +191,7 @@ def infer_causes(
     ]
     names = list(dict.fromkeys((verdict.label, *names)))
     causes = [cause_of(rows, signatures, evidence, name, probability[name]) for name in names]
-    if verdict.is_hidden:  # the rows show nothing of it
+    if verdict.is_hidden:  # the rows do not show it
         causes[0] = Cause("unknown", probability["unknown"], (), (), np.zeros(len(rows)))
     first, *others = causes
     causes = (first, *sorted(others, key=lambda cause: -cause.probability))
@@ -200,7 +202,7 @@ def infer_causes(
         acts = best.stretches(survey.trajectory)
     else:
         acts = ()
-    acts = acts[0][1:] if len(acts) == 1 else None  # several are no stretch
+    acts = acts[0][1:] if len(acts) == 1 else None  # several do not form one interval
     where = locate(rows, background, best.shift, rng, models, best.model, best.extra, acts)
     compared = compare_signatures(evidence.observations, signatures, evidence.blocks.models[0])
     same = _same(best, compared)
@@ -208,9 +210,9 @@ def infer_causes(
 
 
 def _likely_models(evidence, residual, rng, number, windows):
-    """Models drawn by their probability given residuals (m,) that nothing but windows acts on."""
+    """Models drawn by their probability, given residuals (m,) affected only by windows."""
     columns = evidence.observations.columns(residual[:, None])
-    # with windows all are open: those that were relevant were chosen without them
+    # with windows all are open: the relevant ones were chosen without windows
     models = error_models() if windows else evidence.blocks.models
     score = np.concatenate(
         [
@@ -223,7 +225,7 @@ def _likely_models(evidence, residual, rng, number, windows):
 
 
 def _same(cause, compared):
-    """Effects with the squared correlation of one class with a cause of one part."""
+    """Effects in one class of squared correlation with a cause of one part."""
     if len(cause.parts) != 1 or cause.effect not in compared.effects:
         return (cause.effect,)
     return compared.same(cause.effect, cause.parts[0][1])
@@ -236,7 +238,7 @@ def cause_of(
     label: str,
     probability: float,
 ) -> Cause:
-    """Cause of a label.
+    """Make the Cause of a label.
 
     Parameters
     ----------
@@ -268,7 +270,7 @@ def cause_of(
 
 
 def _with_noise(cause, rows, signatures, evidence, name):
-    """The cause with one noise class beside."""
+    """Cause with an additional noise class."""
     classes = [each for each in evidence.noise if each.label == name]
     best = max(classes, key=lambda each: each.gain[0])
     if isinstance(best, WindowEvidence):
@@ -291,13 +293,13 @@ def _with_noise(cause, rows, signatures, evidence, name):
         return replace(cause, model=replace(cause.model, fixes=size))
     if (
         best.channels.any() or cause.extra is not None
-    ):  # the stated noise, from the points, holds it
+    ):  # the stated noise, from the points, includes it
         return cause
     return replace(cause, extra=size**2 * kind.variance)
 
 
 def _unknown_shift(rows, evidence):
-    """What the leading unknown block makes of the residuals (m,)."""
+    """Effect of the leading unknown block on the residuals (m,)."""
     observations = evidence.observations
     columns = evidence.table.columns[:, evidence.lead()[1]]
     residual = observations.columns(rows.residual[:, None])[:, 0]
@@ -323,14 +325,14 @@ def fit_amplitudes(
     residual: np.ndarray,
     columns: np.ndarray,
 ) -> _AmplitudeFit:
-    """Amplitudes of columns in a residual, averaged over error models.
+    """Fit amplitudes of columns in a residual, averaged over error models.
 
     Parameters
     ----------
     observations : Observations
     models : sequence of s ErrorModel
     log_weight : (s,) array
-        Of each.
+        Log weight of each.
     residual : (n,) array
         Units: m.
     columns : (n, p) array
@@ -375,7 +377,7 @@ def _effect_parameters(
     estimates : list of (p,) arrays
         Of each signature.
     shift : (m,) array
-        What they make of the residuals.
+        Their effect on the residuals.
     """
     jacobian = np.hstack([m.jacobian for m in members])
     observations = evidence.observations
@@ -424,7 +426,7 @@ def window_parameters(windows: Sequence[Window]) -> tuple[CauseParameter, ...]:
 
 
 def most_probable_size(size: np.ndarray, score: np.ndarray) -> tuple[float, float]:
-    """Size at the top of a log evidence by log size, and its sigma, by a parabola.
+    """Size with the largest log evidence by log size, and its sigma, from a parabola.
 
     Parameters
     ----------

@@ -1,9 +1,8 @@
-"""From evidence to probabilities that are right as often as they say, and to one label.
+"""Conversion of evidence to calibrated probabilities, and to one label.
 
-What was learned on synthetic surveys (benchmarks/train_decision.py) stands in decision.json:
-weights of features of the evidence, from which the probability of each kind of label follows, and
-how far evidence tells labels of one kind apart. Nothing there was set on a mechanism that grades a
-diagnosis.
+decision.json contains the results of training on synthetic surveys (benchmarks/train_decision.py):
+weights of features of the evidence, which give the probability of each kind of label, and the power
+of evidence to separate labels of one kind. No mechanism used for grading was used in training.
 """
 
 from __future__ import annotations
@@ -22,23 +21,23 @@ from mlscorr.gap.evidence.settings import SETTINGS
 from mlscorr.gap.residuals import Absence
 
 BINS = 5  # of the stated probability: 300 cases of a blind check fill no more
-ABSENT = -20.0  # log evidence of what there is none of: less than any that matters
-BEND = 2.0  # log evidence beyond which more of it says less: odds of seven to one
-FARTHEST = 3.0  # standard deviations of a feature: beyond them nothing was learned
+ABSENT = -20.0  # log evidence for an absent item: less than any that matters
+BEND = 2.0  # log evidence beyond which it has less weight: odds of seven to one
+FARTHEST = 3.0  # standard deviations of a feature: no training data beyond
 
 
 @dataclass(frozen=True)
 class Costs:
-    """What a wrong answer costs, in units of an effect named for another one.
+    """Costs of wrong answers, in units of an effect mistaken for another one.
 
     Parameters
     ----------
     false_alarm : float
-        Of a cause, or unknown, where nothing is wrong.
+        Cost of a cause, or unknown, if nothing is wrong.
     miss : float
-        Of none, or noise, where a cause is there.
+        Cost of none, or noise, if there is a cause.
     unknown : float
-        Of unknown where a known cause is there.
+        Cost of unknown if there is a known cause.
     """
 
     false_alarm: float = 4.0
@@ -54,7 +53,7 @@ OPERATING_POINTS = {
 
 
 def features(joint: JointScore) -> dict[str, float]:
-    """What probabilities are made of, by name.
+    """Features for the probabilities, by name.
 
     Parameters
     ----------
@@ -89,7 +88,7 @@ def features(joint: JointScore) -> dict[str, float]:
         "cause to unknown": cause - unknown,
     }
     bent = {n: float(np.arcsinh(v / BEND)) for n, v in (evidence | joint.facts).items()}
-    # evidence of an event is worth less: it may be drift
+    # evidence of an event has less weight, as it may be drift
     bent["effect: event"] = bent["effect"] * joint.facts["event"]
     return bent
 
@@ -111,22 +110,22 @@ def _total(values: Iterable[float]) -> float:
 
 @dataclass(frozen=True)
 class LearnedDecision:
-    """What was learned.
+    """Learned decision parameters.
 
     Parameters
     ----------
     names : tuple of f str
         Of features.
     mean, scale : (f,) array
-        By which these are standardised.
+        For their standardization.
     weights : (5, f) array
-        Of each of KINDS, and with ``bias`` the log of its probability up to a constant.
+        Weights of each of KINDS; with ``bias`` they give the log probability up to a constant.
     bias : (5,) array
     sharpness : dict
-        By kind: factor on the scores of its labels, against each other, and the share that all of
-        them have alike, whatever their scores.
+        By kind: factor on the scores of its labels, and the share that all labels have regardless
+        of their scores.
     p_value : tuple of (a, b)
-        Of the beta distribution that p-values from replicas have where nothing acts.
+        Parameters of the beta distribution of p-values from replicas without effects.
     """
 
     names: tuple[str, ...]
@@ -139,7 +138,7 @@ class LearnedDecision:
 
     @classmethod
     def of(cls, document: dict) -> LearnedDecision:
-        """The LearnedDecision of a document, as decision.json has it."""
+        """Make the LearnedDecision from a document such as decision.json."""
         mean, scale, weights, bias = (
             np.array(document[key]) for key in ("mean", "scale", "weights", "bias")
         )
@@ -149,7 +148,7 @@ class LearnedDecision:
         return cls(names, mean, scale, weights, bias, sharpness, (a, b))
 
     def standardised(self, values: Sequence[float]) -> np.ndarray:
-        """Features (f,) less their mean, over their scale, no farther than was learned.
+        """Standardize features (f,), limited to the range of the training data.
 
         Parameters
         ----------
@@ -158,14 +157,14 @@ class LearnedDecision:
         return np.clip((np.asarray(values) - self.mean) / self.scale, -FARTHEST, FARTHEST)
 
     def by_kind(self, joint: JointScore) -> np.ndarray:
-        """Probability (5,) of each of KINDS; zero where there is no such label."""
+        """Return the probability (5,) of each of KINDS; zero without such a label."""
         values = features(joint)
         score = self.weights @ self.standardised([values[name] for name in self.names]) + self.bias
         score[[not joint.of_kind(kind) for kind in KINDS]] = -np.inf
         return np.exp(score - np.logaddexp.reduce(score))
 
     def probabilities(self, joint: JointScore) -> dict[str, float]:
-        """Probability of every label, most probable first.
+        """Return the probability of every label, most probable first.
 
         Parameters
         ----------
@@ -185,7 +184,7 @@ class LearnedDecision:
         return {name: float(share[name]) for name in sorted(share, key=lambda n: -share[n])}
 
     def calibrated(self, p_value: float) -> float:
-        """Probability of a p-value from replicas as small as this where nothing acts.
+        """Return the probability of such a small p-value from replicas without effects.
 
         Parameters
         ----------
@@ -196,18 +195,18 @@ class LearnedDecision:
 
 @lru_cache(maxsize=1)
 def learned() -> LearnedDecision:
-    """The LearnedDecision that comes with the package."""
+    """Return the LearnedDecision of the package."""
     text = (files("mlscorr.gap.evidence") / "decision.json").read_text(encoding="utf-8")
     return LearnedDecision.of(json.loads(text))
 
 
 def cheapest(probability: dict[str, float], noisy: Collection[str], costs: Costs) -> str:
-    """The label whose expected cost is least.
+    """Label with the smallest expected cost.
 
     Parameters
     ----------
     probability : dict
-        Of all labels, most probable first.
+        Probability of all labels, most probable first.
     noisy : collection of str
         Labels of noise classes.
     costs : Costs
@@ -221,7 +220,7 @@ def cheapest(probability: dict[str, float], noisy: Collection[str], costs: Costs
         if calm[label]:
             return costs.miss * (1 - no_cause) + no_cause - right
         wrong = costs.unknown if label == "unknown" else 1.0
-        # where noise is the truth something is wrong: a cause there is a wrong name, no false alarm
+        # if noise is the truth, something is wrong: a cause is a wrong name, not a false alarm
         return costs.false_alarm * none + no_cause - none + wrong * (1 - no_cause - right)
 
     return min(probability, key=cost)
@@ -229,7 +228,7 @@ def cheapest(probability: dict[str, float], noisy: Collection[str], costs: Costs
 
 @dataclass(frozen=True)
 class GapVerdict:
-    """The answer.
+    """Verdict of a diagnosis.
 
     Parameters
     ----------
@@ -237,13 +236,13 @@ class GapVerdict:
         none, unknown, an effect, or two joined by +.
     probability : float
     set : tuple of str
-        The smallest set of labels that holds 95 %.
+        Smallest set of labels with 95 % probability.
     p_value : float
-        Of none, from replicas of this very survey, and by how these lie where nothing acts.
+        p-value of none, from replicas of this survey, calibrated without effects.
     lead : str
-        Where unknown points: "height error that grows with speed squared"; else empty.
+        Hint of unknown, such as "height error that grows with speed squared"; otherwise empty.
     is_hidden : bool
-        Whether unknown is what targets without a residual tell of, and no row does.
+        True if only targets without a residual indicate unknown, and no row does.
     """
 
     label: str
@@ -255,16 +254,16 @@ class GapVerdict:
 
 
 def with_absence(probability: dict[str, float], absence: Absence) -> dict[str, float]:
-    """Probabilities that know of targets without a residual, most probable first.
+    """Add targets without a residual to the probabilities, most probable first.
 
-    Whatever acts in the rows, a run of them is chance, or something unknown that no row shows has
-    made it. An effect stays what it is with that beside it; none doesn't. However likely the
-    chance, none stays behind unknown: of what was not seen nobody knows that it is right.
+    A run of them is either chance or due to something unknown that no row shows. An effect remains
+    a cause in addition to that, but none does not. Regardless of the chance, none is ranked after
+    unknown, because what was not observed cannot be confirmed.
 
     Parameters
     ----------
     probability : dict
-        Of all labels, by the rows.
+        Probability of all labels, from the rows.
     absence : Absence
     """
     if not absence.runs:
@@ -284,17 +283,17 @@ def decide(
     absence: Absence | None = None,
     costs: Costs | None = None,
 ) -> GapVerdict:
-    """Verdict from probabilities.
+    """Decide on a verdict from probabilities.
 
     Parameters
     ----------
     evidence : LabelEvidence
     probability : dict
-        Of all labels by the rows, most probable first.
+        Probability of all labels from the rows, most probable first.
     absence : Absence, optional
-        Of targets that have none.
+        Absence of targets without a row.
     costs : Costs, optional
-        Of wrong answers.
+        Costs of wrong answers.
     """
     by_rows = probability
     is_hidden = False
@@ -316,13 +315,13 @@ def decide(
 
 
 def calibration_error(stated: np.ndarray, hit: np.ndarray) -> float:
-    """Mean distance of stated probabilities from how often they were right, over bins of them.
+    """Mean difference between stated probabilities and hit rates, over bins.
 
     Parameters
     ----------
     stated : (n,) array
     hit : (n,) array
-        One where it was right, else zero.
+        One for hits, otherwise zero.
     """
     bins = np.clip((stated * BINS).astype(int), 0, BINS - 1)
     return float(

@@ -1,4 +1,4 @@
-"""Evidence: how probable the residuals are when nothing, some effect or something unknown acts.
+"""Evidence: probability of the residuals with no effect, some effect or something unknown.
 
 Residuals r = A x + e with e of covariance V and amplitudes x ~ N(0, s^2 I); integrated over x
 (Rasmussen and Williams 2006, Eq. 2.43, with a finite basis),
@@ -6,10 +6,10 @@ Residuals r = A x + e with e of covariance V and amplitudes x ~ N(0, s^2 I); int
     log p(r | A) - log p(r) = - 1/2 log det(I + s^2 G) + 1/2 b^T (G + I / s^2)^-1 b,
     G = A^T V^-1 A,  b = A^T V^-1 r.
 
-Columns of A are scaled to an rms of one metre in the rows that they change, so that one grid of s
-serves all effects. It is averaged over s and over the ErrorModels of V. What comes with many
-members, as events do with their times and widths, is the mean over them: the price of having
-looked often.
+Columns of A are scaled to an RMS of one meter in the rows that they change, so that one grid of s
+serves all effects. Evidence is averaged over s and over the ErrorModels of V. For labels with many
+members, such as events with their times and widths, it is the mean over them, which accounts for
+multiple tests.
 """
 
 from collections import Counter
@@ -36,13 +36,13 @@ class ColumnBlock:
     label : str
         The effect's name, or unknown.
     member : int
-        Which of the signatures, or of the unknown blocks.
+        Index of the signature, or of the unknown block.
     columns : (p,) int array
         In the ColumnTable.
     weight : float
         Prior weight within the label.
     least : float
-        Least amplitude (m). An error of the position in time that is no larger than the POS's own
+        Smallest amplitude (m). A position error over time that is no larger than the POS's own
         sigma is drift, not an event.
     """
 
@@ -54,14 +54,14 @@ class ColumnBlock:
 
     @property
     def amplitudes(self) -> tuple[float, ...]:
-        """Those of its prior."""
+        """Amplitudes of its prior."""
         allowed = tuple(s for s in SETTINGS.amplitudes if s >= self.least)
         return allowed or SETTINGS.amplitudes[-1:]
 
 
 @dataclass(frozen=True)
 class ColumnTable:
-    """All columns (m, c) of signatures and unknown blocks, scaled to one metre of rms."""
+    """All columns (m, c) of signatures and unknown blocks, scaled to an RMS of one meter."""
 
     columns: np.ndarray
     blocks: tuple[ColumnBlock, ...]
@@ -73,26 +73,26 @@ class ColumnTable:
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Labels but unknown."""
+        """Labels except unknown."""
         return tuple(label for label in self.labels if label != "unknown")
 
     @cached_property
     def steady(self) -> set[str]:
-        """Effects that are no events: those with a single member."""
+        """Effects that are not events, with a single member."""
         members = {(block.label, block.member) for block in self.blocks}
         count = Counter(label for label, _ in members)
         return {label for label in self.effects if count[label] == 1}
 
     def of(self, label: str) -> np.ndarray:
-        """Which blocks (h,) have a label."""
+        """Return the blocks (h,) bool of a label."""
         return np.array([block.label == label for block in self.blocks], dtype=bool)
 
     def weighed(self, gain: np.ndarray) -> np.ndarray:
-        """Log of weight times evidence (h, k)."""
+        """Return the log of weight times evidence (h, k)."""
         return np.log([block.weight for block in self.blocks])[:, None] + gain
 
     def best(self, label: str, gain: np.ndarray) -> int:
-        """Number of the block of a label that explains a column best, by gains (h,)."""
+        """Return the index of a label's block that explains a column best, by gains (h,)."""
         numbers = np.flatnonzero(self.of(label))
         return int(numbers[np.argmax(self.weighed(gain[:, None])[numbers, 0])])
 
@@ -100,7 +100,7 @@ class ColumnTable:
 def column_table(
     rows: Rows, signatures: Sequence[Signature], unknown: Sequence[UnknownBlock], sigma: np.ndarray
 ) -> ColumnTable:
-    """Columns of the signatures that shift the metric rows, and of unknown blocks.
+    """Make columns of the signatures that shift the metric rows, and of unknown blocks.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def column_table(
     signatures : sequence of Signature
     unknown : sequence of UnknownBlock
     sigma : (m,) array
-        Stated one of each row by the POS's position. Units: m.
+        Stated sigma of each row due to the POS position. Units: m.
     """
     metric = rows.metric
     parts = [np.zeros((len(rows), 0))]
@@ -116,7 +116,7 @@ def column_table(
     members = Counter(signature.name for signature in signatures)
 
     def add(columns, block):
-        """Columns with one block of all, whose numbers are block.columns."""
+        """Add columns with one block of all, whose indices are block.columns."""
         blocks.append(replace(block, columns=block.columns + sum(p.shape[1] for p in parts)))
         parts.append(columns)
 
@@ -153,14 +153,14 @@ def column_table(
 
 
 def _with_shares(unknown, events):
-    """Pairs of unknown blocks and their shares; of drift less where events explain it too."""
+    """Pairs of unknown blocks and their shares; less for drift if events also explain it."""
     shares = [SETTINGS.unknown_drift if block.is_drift and events else 1.0 for block in unknown]
     total = max(sum(shares), 1.0)
     return [(block, share / total) for block, share in zip(unknown, shares, strict=True)]
 
 
 def is_of_one_target(rows: Rows, jacobian: np.ndarray) -> bool:
-    """Whether all that changes is all that was seen of one surveyed target: its outlier's to tell.
+    """True if all changed rows are all rows of one surveyed target, which its outlier explains.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ def _rms_of(sigma, columns):
 
 
 def _rms(column):
-    """Root mean square over the rows that a column changes; zero where it changes none."""
+    """Root mean square over the rows that a column changes; zero if it changes none."""
     size = np.abs(column)
     changed = size > SETTINGS.changed * size.max(initial=0.0)
     if changed.any():
@@ -192,7 +192,9 @@ def _rms(column):
 
 
 def block_groups(table: ColumnTable) -> Iterator[tuple[np.ndarray, np.ndarray, tuple[float, ...]]]:
-    """Blocks alike in size and amplitudes: column numbers (h, p), block numbers, amplitudes."""
+    """Yield blocks of equal size and amplitudes: column indices (h, p), block indices,
+    amplitudes.
+    """
     kinds: dict = {}
     for number, block in enumerate(table.blocks):
         kinds.setdefault((len(block.columns), block.amplitudes), []).append(number)
@@ -211,7 +213,7 @@ class BlockEvidence:
     none : (s, k) array
         Log of weight times likelihood.
     gain : (h, k) array
-        Log evidence of each block, averaged over models, less that of none.
+        Log evidence of each block, averaged over models, minus that of none.
     by_model : (s, h) array
         Log of weight times evidence of each block for the first column.
     """
@@ -233,7 +235,7 @@ def weigh_blocks(
     residual: np.ndarray,
     table: ColumnTable,
 ) -> BlockEvidence:
-    """Evidence of residuals under none and each block of a table.
+    """Weigh the evidence of residuals under none and each block of a table.
 
     Parameters
     ----------
@@ -264,13 +266,13 @@ def weigh_blocks(
 
 
 def without_known(observations: Observations, table: ColumnTable) -> ColumnTable:
-    """The table without those unknown errors that some effect makes just so: they are known.
+    """Return the table without unknown errors that some effect explains exactly.
 
     Parameters
     ----------
     observations : Observations
     table : ColumnTable
-        Its effects with many members, events and outliers, are not tried.
+        Its effects with many members (events and outliers) are not tried.
     """
     white = observations.whitener().whiten(observations.columns(table.columns))
     normal = white.product(white)
@@ -326,7 +328,7 @@ def block_gain(
 
 
 def steady_columns(observations: Observations, table: ColumnTable) -> np.ndarray:
-    """Columns (n, q) of all effects that are no events.
+    """Columns (n, q) of all effects that are not events.
 
     Parameters
     ----------
@@ -344,8 +346,7 @@ def suited_models(
     models: Iterable[ErrorModel],
     residual: np.ndarray,
 ) -> tuple[ErrorModel, ...]:
-    """Those models that explain residuals when nothing acts, or all effects that are no events and
-    what changes slowly with time.
+    """Models that explain residuals with no effect, or with all steady effects and slow changes.
 
     Parameters
     ----------

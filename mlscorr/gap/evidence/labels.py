@@ -1,5 +1,6 @@
-"""All labels weighed: none, each effect, noise and unknown, in a survey and in replicas of it; then
-two causes together, given the best ones.
+"""Weighing of all labels: none, each effect, noise and unknown, and pairs of causes.
+
+Labels are weighed in a survey and in replicas of it; pairs follow, given the best single causes.
 """
 
 from __future__ import annotations
@@ -42,25 +43,25 @@ KINDS = ("none", "noise", "effect", "pair", "unknown")
 
 @dataclass(frozen=True)
 class LabelEvidence:
-    """What was compared, and how likely each label made it.
+    """Compared evidence, and the likelihood of each label.
 
     Parameters
     ----------
     observations : Observations
     table : ColumnTable
     leads : tuple of str
-        What each of the unknown blocks says in words.
+        Hint of each unknown block, in words.
     blocks : BlockEvidence
-        Of the residuals (first column) and of replicas without any effect.
+        Evidence of the residuals (first column) and of replicas without any effect.
     noise : tuple of NoiseEvidence
     refined : dict of RefinedEvent
-        Events that stand out, by label: their own, or that of the pair in which they do.
+        Significant events by label: their own, or that of the pair in which they are significant.
     score : dict
         Log of prior times evidence over that of none, (k,) for each label; none is there too.
     p_value : float
-        Of none.
+        p-value of none.
     tail : (o,) int array
-        Rows taken for a tail of the noise.
+        Rows treated as a tail of the noise.
     """
 
     observations: Observations
@@ -79,21 +80,21 @@ class LabelEvidence:
         return {each.label for each in self.noise}
 
     def best(self, label: str) -> int:
-        """Number of the block of a label that explains the residuals best."""
+        """Return the index of a label's block that explains the residuals best."""
         return self.table.best(label, self.blocks.gain[:, 0])
 
     def event(self, name: str, label: str) -> RefinedEvent | None:
-        """The event of a name that is, or is part of, a label; None if it doesn't stand out."""
+        """Return the event that is, or is part of, a label; None if it is not significant."""
         known = (self.refined.get(key) for key in (label, name))
         return next((each for each in known if each and each.signature.name == name), None)
 
     def lead(self) -> tuple[str, np.ndarray]:
-        """What the best of the unknown blocks says in words, and its column numbers."""
+        """Return the hint of the best unknown block, in words, and its column indices."""
         block = self.table.blocks[self.best("unknown")]
         return self.leads[block.member], block.columns
 
     def likely_model(self, label: str) -> ErrorModel:
-        """The ErrorModel that is most probable when a label, or the first of two, acts."""
+        """Return the most probable ErrorModel when a label, or the first of two, acts."""
         name = label.split("+", maxsplit=1)[0]
         score = self.blocks.none[:, 0]
         if name in self.table.labels:
@@ -101,7 +102,8 @@ class LabelEvidence:
         return self.blocks.models[int(np.argmax(score))]
 
 
-# Hundreds of products of small matrices: threads of BLAS wait for each other longer than they work.
+# Hundreds of products of small matrices: threads of BLAS would wait for each other longer than they
+# work.
 @threadpool_limits.wrap(limits=1, user_api="blas")
 def weigh_labels(
     rows: Rows,
@@ -111,7 +113,7 @@ def weigh_labels(
     rng: np.random.Generator,
     replicas: int = SETTINGS.replicas,
 ) -> LabelEvidence:
-    """Evidence of all labels for the residuals of a survey and for replicas of it.
+    """Weigh the evidence of all labels for the residuals of a survey and for replicas of it.
 
     Parameters
     ----------
@@ -121,12 +123,12 @@ def weigh_labels(
     signatures : sequence of Signature
     rng : numpy.random.Generator
     replicas : int
-        Surveys of the same geometry in which nothing acts.
+        Number of surveys of the same geometry without effects.
 
     Raises
     ------
     ValueError
-        When no row has a residual in m, or a sigma is zero.
+        If no row has a residual in m, or a sigma is zero.
     """
     observations = Observations.of(rows, background)
     unknown = unknown_blocks(rows, survey)
@@ -143,7 +145,7 @@ def weigh_labels(
     noise = weigh_noise(observations, rows, signatures, blocks, residual, channels)
     noise += weigh_windows(observations, signatures, blocks, residual, residual[:, :0])
     score = _scores(table, blocks, noise)
-    p = p_value(score)  # before events are refined, as those of replicas are not
+    p = p_value(score)  # before events are refined, as in the replicas
     refined = refine_events(rows, survey, observations, table, blocks, signatures)
     for label, event in refined.items():
         prior = np.log(dict(SETTINGS.prior)["effect"] / len(table.effects))
@@ -152,8 +154,8 @@ def weigh_labels(
 
 
 def _replicas(observations, models, residual, rng, number):
-    """Residuals (n, number) in which nothing acts, under models as probable as they are, with
-    tails as these have.
+    """Residuals (n, number) without effects, under models drawn by probability, with the tails
+    of these residuals.
     """
     score = np.array([model_likelihood(observations, model, residual)[0] for model in models])
     count = rng.multinomial(number, shares(score))
@@ -186,7 +188,7 @@ def block_scores(
     effect : float
         Prior probability of each effect.
     prior : dict
-        Holds that of unknown.
+        Contains the prior of unknown.
     """
     weighed = table.weighed(blocks.gain)
     return {
@@ -197,13 +199,13 @@ def block_scores(
 
 
 def _noise_scores(noise: Sequence[NoiseEvidence], prior: dict[str, float]) -> dict[str, np.ndarray]:
-    """Scores of noise classes, which share their prior evenly; several of one are averaged.
+    """Scores of noise classes, which share their prior evenly; several of one class are averaged.
 
     Parameters
     ----------
     noise : sequence of NoiseEvidence
     prior : dict
-        Holds that of noise.
+        Contains the prior of noise.
     """
     labels = list(dict.fromkeys(each.label for each in noise))
     scores = {}
@@ -215,9 +217,9 @@ def _noise_scores(noise: Sequence[NoiseEvidence], prior: dict[str, float]) -> di
 
 
 def p_value(score: dict[str, np.ndarray]) -> float:
-    """Probability of scores against none as high as the first column's when nothing acts.
+    """Probability of scores against none as high as the first column's, without effects.
 
-    By replicas; beyond the highest ones by the exponential tail that the upper fifth of them has.
+    From replicas; beyond the highest ones from an exponential tail through their upper fifth.
 
     Parameters
     ----------
@@ -238,7 +240,7 @@ def p_value(score: dict[str, np.ndarray]) -> float:
 
 
 def kind_of(label: str, noisy: Collection[str]) -> str:
-    """The one of KINDS that a label is of: how many effects it names, whatever noise is beside.
+    """Kind of a label, one of KINDS: the number of its effects, ignoring noise.
 
     Parameters
     ----------
@@ -254,18 +256,18 @@ def kind_of(label: str, noisy: Collection[str]) -> str:
 
 @dataclass(frozen=True)
 class JointScore:
-    """Logs of prior times evidence over none, of all labels and given the best effect.
+    """Log of prior times evidence over none, for all labels and given the best effect.
 
     Parameters
     ----------
     score : dict
-        By label, none and pairs among them.
+        By label, including none and pairs.
     single : dict
-        By label, before two of them were tried together.
+        By label, before pairs were tried.
     beside : dict
-        By label: what each adds to the effect that is best alone; empty where there is no effect.
+        By label: gain of each in addition to the best single effect; empty without an effect.
     facts : dict
-        Of the survey: what tells how evidence is to be taken, by name.
+        Properties of the survey that matter for the weight of evidence, by name.
     noisy : set of str
         Labels of noise classes.
     """
@@ -277,7 +279,7 @@ class JointScore:
     noisy: Collection[str]
 
     def of_kind(self, kind: str) -> dict[str, float]:
-        """Scores of the labels of one of KINDS."""
+        """Return scores of the labels of one of KINDS."""
         return {n: v for n, v in self.score.items() if kind_of(n, self.noisy) == kind}
 
 
@@ -285,12 +287,11 @@ class JointScore:
 def joint_score(
     rows: Rows, survey: Survey, signatures: Sequence[Signature], evidence: LabelEvidence
 ) -> tuple[JointScore, LabelEvidence]:
-    """Scores of all labels, two of them together included; and the evidence with the events that
-    were refined beside another cause.
+    """Compute scores of all labels, including pairs, and the evidence with further refined events.
 
-    Each of the best causes is taken as accepted, its size as free; then noise classes, effects and
-    unknown are compared again on what it leaves. What only unknown explains there is unknown: a
-    cause that leaves it impersonates another.
+    Each of the best causes is accepted with a free size; then noise classes, effects and unknown
+    are compared again on the remaining residuals. If only unknown explains these, the label is
+    unknown, because the cause then mimics another one.
 
     Parameters
     ----------
@@ -323,15 +324,13 @@ def joint_score(
 
 
 def _best_effect(evidence):
-    """The effect with the largest score, or None without any."""
+    """Effect with the largest score, or None without any."""
     return max(evidence.table.effects, key=lambda name: evidence.score[name][0], default=None)
 
 
 def _accepted(evidence, score, best):
-    """The best effect, and the one or two best causes, if probable enough to be tried with
-    another.
-    """
-    # unknown is left out of the sum: its blocks can hold two effects that are a pair
+    """Best effect, and the one or two best causes that are probable enough to be tried in pairs."""
+    # unknown is excluded from the sum: its blocks can contain a pair of effects
     total = np.logaddexp.reduce([value for name, value in score.items() if name != "unknown"])
     order = [n for n in sorted(score, key=score.get, reverse=True) if n not in ("none", "unknown")]
     causes = [name for name in order if score[name] - total > np.log(1 - SETTINGS.confidence)][:2]
@@ -343,7 +342,7 @@ def _accepted(evidence, score, best):
 
 
 def _facts(rows, evidence, best):
-    """What tells how evidence is to be taken."""
+    """Properties of the survey that matter for the weight of evidence."""
     observations = evidence.observations
     raised = observations.errors.raised >= 0
     is_event = best is not None and bool(effect_class(best).moment())
@@ -369,16 +368,16 @@ def _joined(evidence, *names):
 def best_member(
     signatures: Sequence[Signature], evidence: LabelEvidence, name: str, label: str
 ) -> Signature:
-    """The signature of an effect that explains the residuals best; an event's is refined.
+    """Signature of an effect that explains the residuals best; that of an event is refined.
 
     Parameters
     ----------
     signatures : sequence of Signature
     evidence : LabelEvidence
     name : str
-        Of the effect.
+        Name of the effect.
     label : str
-        That it is part of.
+        Label with the effect.
     """
     event = evidence.event(name, label)
     best = evidence.table.blocks[evidence.best(name)]
@@ -388,7 +387,7 @@ def best_member(
 
 
 def _best_columns(evidence, name):
-    """Columns (m, p), scaled, of one label's best member; an event's is refined."""
+    """Scaled columns (m, p) of a label's best member; those of an event are refined."""
     if name in evidence.refined:
         return evidence.refined[name].table.columns
     table = evidence.table
@@ -398,10 +397,9 @@ def _best_columns(evidence, name):
 
 
 def _given(rows, survey, signatures, evidence, first):
-    """What one label gains by models that suit it, the scores of others given it, and the events
-    that stand out beside it.
+    """Gain of one label, scores of the others given it, and further significant events.
 
-    Scores are logs of prior times evidence over that of the one alone.
+    Scores are logs of prior times evidence over that of the single label.
     """
     observations = evidence.observations
     table = evidence.table
@@ -433,7 +431,7 @@ def _given(rows, survey, signatures, evidence, first):
 
 
 def _regained(evidence, name, models, residual):
-    """By how much the log evidence of a label over none grows with models that suit it."""
+    """Increase of the log evidence of a label over none with suitable models."""
     columns = _best_columns(evidence, name)
     block = evidence.table.blocks[evidence.best(name)]
     table = ColumnTable(columns, (replace(block, columns=np.arange(columns.shape[1])),))

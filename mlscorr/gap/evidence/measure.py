@@ -1,10 +1,9 @@
-"""How large the gap is, beyond chance, in the unit in which its kind of cause shows.
+"""Size of the gap beyond chance, in the unit of its kind of cause.
 
-systematic   mm: of the squared residuals, in the metric of V^-1, the most that any one cause, known
-             or unknown, could explain, less what it explains by chance
-position     mm: mean of sigma_i^2 (u_i^2 - 1) of the innovations u: more than all sigmas predict
-scatter      mm: mean excess variance of the points about their planes
-returns      percent: mean excess share of pulses that return
+systematic mm: of the squared residuals, in the metric of V^-1, the most that any one cause, known
+or unknown, could explain, minus the part by chance position mm: mean of sigma_i^2 (u_i^2 - 1) of
+the innovations u: more than all sigmas predict scatter mm: mean excess variance of the points about
+their planes returns percent: mean excess share of pulses that return
 
 All are signed squares that are zero on average when nothing is wrong.
 """
@@ -27,16 +26,16 @@ UNITS = {"systematic": "mm", "position": "mm", "scatter": "mm", "returns": "%"}
 
 @dataclass(frozen=True)
 class Predicted:
-    """What a simulator with a cause in it expects of the rows.
+    """Prediction of the rows by a simulator with a cause.
 
     Parameters
     ----------
     shift : (m,) array
-        Of the residuals, in their unit.
+        Shift of the residuals, in their unit.
     growth : (m,) array
-        Of roughness rows: variance about the plane that is added, over the believed one.
+        For roughness rows: added variance about the plane over the assumed one.
     extra : (m,) array
-        Variance that is added to the rows' own noise. Units: m^2.
+        Variance added to the rows' own noise. Units: m^2.
     model : ErrorModel
         Of the POS's covariance.
     """
@@ -48,13 +47,13 @@ class Predicted:
 
     @classmethod
     def nothing(cls, rows: Rows) -> Predicted:
-        """Of the simulator as it is."""
+        """Return the prediction of the unchanged simulator."""
         zero = np.zeros(len(rows))
         return cls(zero, zero, zero)
 
 
 def gap_kind(label: str, noisy: Iterable[str], rows: Rows) -> str:
-    """How the gap of a label is measured: one of UNITS.
+    """Measure of a label's gap, one of UNITS.
 
     Parameters
     ----------
@@ -83,7 +82,7 @@ def signed_root(square: np.ndarray, unit: str = "mm") -> np.ndarray:
 
 @dataclass(frozen=True)
 class Explanations:
-    """What each block of a table explains of innovations.
+    """Explained part of innovations for each block of a table.
 
     Parameters
     ----------
@@ -91,8 +90,8 @@ class Explanations:
     columns : (n, c) array
         Innovations of its columns.
     modes : tuple
-        Of blocks alike, their numbers (h,), columns (h, p) and, of each block's normal matrix,
-        values (h, p) and vectors (h, p, p).
+        For blocks of equal size: indices (h,), columns (h, p) and, for each normal matrix,
+        eigenvalues (h, p) and eigenvectors (h, p, p).
     """
 
     table: ColumnTable
@@ -101,7 +100,7 @@ class Explanations:
 
     @classmethod
     def of(cls, table: ColumnTable, columns: np.ndarray) -> Explanations:
-        """See the class."""
+        """Make the explanations; see the class."""
         normal = columns.T @ columns
         modes = []
         for index, numbers, _ in block_groups(table):
@@ -110,9 +109,9 @@ class Explanations:
         return cls(table, columns, tuple(modes))
 
     def largest(self, innovations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The most that any block explains of the squares, and which one does so.
+        """Largest part of the squares that any block explains, and this block.
 
-        Each block counts less its number of columns, which is what it explains by chance.
+        The number of columns is subtracted for each block, as the part explained by chance.
 
         Parameters
         ----------
@@ -139,7 +138,7 @@ class Explanations:
         return score[best, np.arange(k)], number[best]
 
     def fit(self, number: int, innovations: np.ndarray) -> np.ndarray:
-        """What one block makes of innovations (n,): (n,)."""
+        """Return the fit of one block to innovations (n,)."""
         columns = self.columns[:, self.table.blocks[number].columns]
         normal = columns.T @ columns + np.eye(columns.shape[1]) / SETTINGS.free_sigma**2
         return columns @ np.linalg.solve(normal, columns.T @ innovations)
@@ -148,7 +147,7 @@ class Explanations:
 def position_terms(
     observations: Observations, predicted: Predicted, residual: np.ndarray
 ) -> np.ndarray:
-    """sigma^2 (u^2 - 1) of residuals less what is predicted.
+    """Terms sigma^2 (u^2 - 1) of residuals minus predictions.
 
     Parameters
     ----------
@@ -196,7 +195,7 @@ def simulated_variance(
     observations : Observations
     model : ErrorModel
     extra : (m,) array, optional
-        That is added to the rows' own noise. Units: m^2.
+        Variance added to the rows' own noise. Units: m^2.
     """
     e = observations.errors
     position = (e.raised_position(model.raised) ** 2).sum(axis=1)

@@ -1,11 +1,11 @@
-"""The rows as scalar observations in the order of time, and V: how they err when nothing is wrong.
+"""Rows as scalar observations in order of time, and V, their covariance if nothing is wrong.
 
-V = position and attitude of the POS + survey errors + noise of each row. Residuals of one drive
-are not white: without V every clean survey is "explained" by some effect, and with one fixed V
-nearly half of those whose drift merely has another shape. The position errs by one process of the
-stated sigma(t), the attitude by one of its own; scale, shape, and how far the POS errs beyond its
-sigma in each stretch in which that is raised, are open. So V is a family of ErrorModels with prior
-weights, to be averaged over.
+V = position and attitude of the POS + survey errors + noise of each row. Residuals of one drive are
+not white: without V every error-free survey would be "explained" by some effect, and with one fixed
+V nearly half of those whose drift has another shape. Position errors are one process with the
+stated sigma(t), attitude errors another one. Scale, shape, and the excess over sigma in each
+interval of increased sigma are unknown. V is thus a family of ErrorModels with prior weights, over
+which results are averaged.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from mlscorr.pos import SETTINGS as POS
 from mlscorr.pos import excursion_profile, stated_processes
 from mlscorr.survey import Columns
 
-FACTORS = 128  # kept of V0: those that the evidence comes back to, less than 100 MB
+FACTORS = 128  # kept of V0: those used repeatedly, less than 100 MB
 
 
 @dataclass(frozen=True)
 class ErrorModel:
-    """One covariance V: factors on what is believed, and what is added to it.
+    """One covariance V: factors on the stated sigmas, and additions.
 
     Parameters
     ----------
@@ -42,17 +42,17 @@ class ErrorModel:
     attitude : tuple of (scale, family, time)
         The same of the attitude.
     raised : tuple of float
-        Further factor on the position's sigma in each stretch in which that is raised; one in
-        stretches that it doesn't name.
+        Further factor on the position's sigma in each interval in which it is increased; one in
+        intervals not listed.
     noise : float
-        On the sigma of each row's own noise.
+        Factor on the sigma of each row's own noise.
     fixes : float
-        Sigma of noise of GNSS fixes, in E, N and H. Units: m.
+        Noise sigma of GNSS fixes, in E, N and H. Units: m.
     weight : float
         Prior probability.
     windows : tuple of (start, length, factor, shape)
-        Times (s) in which the POS has a further error, whose sigma is at most the stated one of
-        the position times a factor. It rises with time or has its largest value in the middle.
+        Intervals (s) in which the POS has an additional error with a sigma of at most factor times
+        the stated one of the position. It increases with time, or is largest in the middle.
     """
 
     scale: float = 1.0
@@ -70,7 +70,7 @@ STATED = ErrorModel()
 
 
 def shares(score: np.ndarray) -> np.ndarray:
-    """Probabilities (n,) that add up to one, of their logs up to a constant of any size.
+    """Normalized probabilities (n,) from their logs up to any constant.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def shares(score: np.ndarray) -> np.ndarray:
 def window_growth(
     windows: Sequence[tuple[float, float, float, str]], gps_time: np.ndarray
 ) -> np.ndarray:
-    """Sigma that windows of a worse POS add, over the stated one of the position.
+    """Sigma added by windows of a worse POS, over the stated one of the position.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def window_growth(
 
 
 def error_models() -> tuple[ErrorModel, ...]:
-    """Those within the belief whose attitude errs as the position does; weights sum to one."""
+    """Models within the prior with equal scale of attitude and position; weights sum to one."""
     return tuple(
         ErrorModel(scale, family, time, (scale, family, time), weight=weight)
         for scale, family, time, weight in stated_processes()
@@ -111,12 +111,12 @@ def error_models() -> tuple[ErrorModel, ...]:
 
 
 def shaped_models(scale: float = 1.0, fixes: float = 0.0) -> list[ErrorModel]:
-    """One of each shape.
+    """Make one model of each shape.
 
     Parameters
     ----------
     scale : float
-        On the POS's sigmas.
+        Scale on the POS's sigmas.
     fixes : float
         Sigma of noise of GNSS fixes. Units: m.
     """
@@ -127,15 +127,14 @@ def shaped_models(scale: float = 1.0, fixes: float = 0.0) -> list[ErrorModel]:
 
 
 def _varied_models(stretches: int) -> Iterator[Callable]:
-    """Functions that vary a model: its attitude, its noise, each stretch of raised sigma, and last
-    what lies between the steps of scales and shapes, wider than data may leave.
+    """Yield functions that vary a model: attitude, noise, increased sigmas, and finer steps.
 
-    Each takes the best model so far and returns models to be tried.
+    Each takes the current best model and returns models to try.
 
     Parameters
     ----------
     stretches : int
-        Number of those in which sigma is raised.
+        Number of intervals with increased sigma.
     """
     yield lambda best: [
         replace(best, attitude=process[:3], weight=best.weight * process.weight)
@@ -162,7 +161,9 @@ def _varied_models(stretches: int) -> Iterator[Callable]:
 
 
 def _nearby_models(model: ErrorModel) -> tuple[ErrorModel, ...]:
-    """Models about one: the steps between scales and shapes are wider than data may leave."""
+    """Models close to one, because the steps between scales and shapes are coarser than the
+    data allow.
+    """
     steps = (0.8, 1.0, 1.25), (0.7, 1.0, 1.4), (0.9, 1.0, 1.15)
     return tuple(
         replace(
@@ -179,24 +180,24 @@ def _nearby_models(model: ErrorModel) -> tuple[ErrorModel, ...]:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Errors(Columns):
-    """What each of n observations errs by, as sigmas in m.
+    """Errors of n observations, as sigmas in m.
 
     Parameters
     ----------
     gps_time : (n,) array
         Units: s.
     clock : (n,) array
-        Of the position, which leaps where its error starts anew. Units: s.
+        Clock of the position, which jumps where its error restarts. Units: s.
     own : (n,) array
         Variance of its noise. Units: m^2.
     position, attitude, place : (n, 3) array
         Mixings; place is the derivative by the position.
     correlation_time : float
-        As believed. Units: s.
+        Prior correlation time. Units: s.
     growth : (n, 1) array
-        Factor of what believed windows add, see ``window_growth``.
+        Factor added by prior windows; see ``window_growth``.
     raised : (n,) int array
-        Stretch in which the stated sigma is raised; -1 where it isn't.
+        Interval with increased stated sigma; -1 outside.
     """
 
     gps_time: np.ndarray
@@ -211,25 +212,25 @@ class Errors(Columns):
 
     @property
     def position_variance(self) -> np.ndarray:
-        """Stated variance by the POS's position: (n,), m^2."""
+        """Stated variance from the POS position: (n,), m^2."""
         return (self.position**2).sum(axis=1)
 
     def raised_position(self, factors: tuple[float, ...]) -> np.ndarray:
-        """Mixing (n, 3) of the position with a factor on each stretch in which sigma is raised.
+        """Mixing (n, 3) of the position with a factor on each interval of increased sigma.
 
         Parameters
         ----------
         factors : tuple of float
-            Of the first stretches; one for others.
+            For the first intervals; one for others.
         """
         known = np.ones(max(self.raised.max(initial=-1) + 1, len(factors)) + 1)
         known[: len(factors)] = factors
-        return self.position * known[self.raised][:, None]  # the last, -1, is where it isn't raised
+        return self.position * known[self.raised][:, None]  # -1, the last, is outside of them
 
 
 @dataclass(frozen=True, repr=False)
 class Observations(Columns):
-    """Metric rows as n scalar observations in the order of time, one for each look.
+    """Metric rows as n scalar observations in order of time, one for each view.
 
     A row of two times is two observations, half of it each, that share the unknown height of
     their plane.
@@ -239,14 +240,14 @@ class Observations(Columns):
     rows : int
         Number of Rows, m.
     row : (n,) int array
-        The row that each observation is of.
+        Row of each observation.
     half : (n,) array
         Share of the row's value.
     errors : Errors
     shared : (n, c) array
-        Errors that several observations have in common. Units: m.
+        Errors shared by several observations. Units: m.
     second : (n,) bool array
-        False for the first of two looks, which only defines the plane.
+        False for the first of two views, which only defines the plane.
     """
 
     rows: int
@@ -261,7 +262,7 @@ class Observations(Columns):
 
     @classmethod
     def of(cls, rows: Rows, background: Background) -> Observations:
-        """Observations of the metric rows; of too many two-time rows some, evenly in time.
+        """Make observations of the metric rows; two-time rows are thinned evenly in time.
 
         Parameters
         ----------
@@ -272,7 +273,7 @@ class Observations(Columns):
         Raises
         ------
         ValueError
-            When no row has a unit of length.
+            If no row has a unit of length.
         """
         if not rows.metric.any():
             raise ValueError(
@@ -307,35 +308,35 @@ class Observations(Columns):
         return cls(len(rows), row, half, errors, shared, ~first)
 
     def columns(self, values: np.ndarray) -> np.ndarray:
-        """Columns (n, c) of values (m, c) of the rows."""
+        """Return columns (n, c) of values (m, c) of the rows."""
         return np.asarray(values, dtype=float)[self.row] * self.half[:, None]
 
     @property
     def sigma(self) -> np.ndarray:
-        """Stated sigma (m,) of the rows by the POS's position. Units: m."""
+        """Stated sigma (m,) of the rows due to the POS position. Units: m."""
         return np.sqrt(np.bincount(self.row, self.errors.position_variance, self.rows))
 
     def with_shared(self, columns: np.ndarray) -> Observations:
-        """The same with causes that are accepted, as nuisance: columns (n, k) of free size."""
+        """Add accepted causes as nuisance: columns (n, k) of free size."""
         return replace(self, shared=np.hstack([self.shared, SETTINGS.free_sigma * columns]))
 
     def with_own(self, own: np.ndarray) -> Observations:
-        """The same with other variances (n,) of the observations' own noise."""
+        """Replace the variances (n,) of the observations' own noise."""
         return replace(self, errors=replace(self.errors, own=own))
 
     def whitener(self, model: ErrorModel = STATED, extra: np.ndarray | float = 0.0) -> Whitener:
-        """V under a model, factored.
+        """Return the factored V under a model.
 
         Parameters
         ----------
         model : ErrorModel
         extra : (n,) array, optional
-            Added to the variance of the observations' own noise; kept in no cache. Units: m^2.
+            Added to the variance of the observations' own noise; not cached. Units: m^2.
 
         Raises
         ------
         ValueError
-            When V is not positive definite.
+            If V is not positive definite.
         """
         plain = np.ndim(extra) == 0 and extra == 0.0
         if plain:
@@ -346,7 +347,7 @@ class Observations(Columns):
 
 
 def _affordable(rows):
-    """Which rows (m,) are observed: each of two times costs a column of shared error."""
+    """Rows (m,) that are observed, because each two-time row costs a column of shared error."""
     double = np.flatnonzero(rows.two_times)
     keep = np.ones(len(rows), dtype=bool)
     if len(double) > SETTINGS.double_rows:
@@ -357,8 +358,8 @@ def _affordable(rows):
 
 
 def _plane_heights(row, double, first):
-    """Heights of planes that were seen twice, as free as the largest amplitude: (n, k), positive
-    at the first look, negative at the second.
+    """Heights of planes in overlaps, as free as the largest amplitude: (n, k), positive for the
+    first view, negative for the second.
     """
     planes, number = np.unique(row[double], return_inverse=True)
     heights = np.zeros((len(row), len(planes)))
@@ -373,7 +374,7 @@ def _factored(errors, model):
 
 
 def _factor(errors, model, extra=0.0):
-    """Whitener of V0: of signals and own noise."""
+    """Whitener of V0, of signals and own noise."""
     growth = np.hypot(window_growth(model.windows, errors.gps_time), errors.growth)
     position = errors.raised_position(model.raised)
     turn_scale, turn_family, turn_time = model.attitude
@@ -411,7 +412,7 @@ def model_likelihood(
     residual : (n, k) array
         Units: m.
     extra : (n,) array, optional
-        As in ``Observations.whitener``.
+        See ``Observations.whitener``.
     """
     return np.log(model.weight) + observations.whitener(model, extra).log_likelihood(residual)
 
@@ -422,7 +423,7 @@ def relevant_models(
     residual: np.ndarray,
     nuisances: Sequence[np.ndarray],
 ) -> tuple[ErrorModel, ...]:
-    """Those models, and some near the best, that explain the residuals whatever acts on them.
+    """Select models, and some near the best, that explain the residuals with any nuisance.
 
     Parameters
     ----------
@@ -430,7 +431,7 @@ def relevant_models(
     models : iterable of ErrorModel
     residual : (n, 1) array
     nuisances : sequence of (n, q) arrays
-        What may act: a model counts if it does so with any of them.
+        Possible effects: a model counts if it explains the residuals with any of them.
     """
     cases = [observations.with_shared(nuisance) for nuisance in nuisances]
 

@@ -1,4 +1,4 @@
-"""Which effects a geometry can tell apart, and how small an effect it can find: without data."""
+"""Separability of effects in a geometry, and minimal detectable sizes, without data."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ class Separability:
     Parameters
     ----------
     names : tuple of c str
-        Of each parameter: "range_bias", "lever_arm up".
+        Name of each parameter: "range_bias", "lever_arm up".
     effects, units : tuples of c str
     normal : (c, c) array
         A^T V^-1 A of the parameters.
@@ -31,7 +31,7 @@ class Separability:
 
     @property
     def correlation(self) -> np.ndarray:
-        """Of the parameters: (c, c)."""
+        """Correlation of the parameters: (c, c)."""
         length = np.sqrt(np.diag(self.normal))
         return self.normal / np.outer(length, length)
 
@@ -42,7 +42,7 @@ class Separability:
 
     @property
     def classes(self) -> tuple[tuple[str, ...], ...]:
-        """Effects of which some parameters can't be told apart, in the order in which they come."""
+        """Effects with some parameters that are not separable, in order of appearance."""
         same = self.correlation**2 > SETTINGS.same
         group = np.arange(len(self.effects))
         for i, j in zip(*np.nonzero(np.triu(same, 1)), strict=True):
@@ -54,13 +54,13 @@ class Separability:
         return tuple(members for members in classes if len(members) > 1)
 
     def same(self, effect: str, estimate: np.ndarray | None = None) -> tuple[str, ...]:
-        """Effects that shift the rows as one does, with a squared correlation of one class.
+        """Return effects that shift the rows like one, with a squared correlation of one class.
 
         Parameters
         ----------
         effect : str
         estimate : (p,) array, optional
-            Of its parameters; without it any of them alone counts.
+            Of its parameters; without it any single one counts.
         """
         number = len(self._rows(effect))
         if number == 0:
@@ -76,7 +76,7 @@ class Separability:
         )
 
     def share(self, effect: str, estimate: np.ndarray, other: str) -> float:
-        """Share of an effect's squared signal that the best parameters of another explain.
+        """Share of an effect's squared signal explained by the best parameters of another.
 
         Parameters
         ----------
@@ -98,7 +98,7 @@ class Separability:
 
 
 def explained_square(normal: np.ndarray, across: np.ndarray) -> float:
-    """Squared signal that the best amplitudes of some columns explain.
+    """Squared signal explained by the best amplitudes of some columns.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def explained_square(normal: np.ndarray, across: np.ndarray) -> float:
 def compare_signatures(
     observations: Observations, signatures: Sequence[Signature], model: ErrorModel = STATED
 ) -> Separability:
-    """Compare the signatures that are no events: one that has many members is left out.
+    """Compare the signatures that are not events; those with many members are omitted.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Heavy tails: single odd values are allowed for, so that no effect is found to explain them."""
+"""Heavy tails: single outliers are allowed, so that no effect is found to explain them."""
 
 from dataclasses import dataclass
 
@@ -16,14 +16,14 @@ def without_tails(
 ) -> tuple[Observations, np.ndarray]:
     """Give odd observations the variance that they show.
 
-    A surveyed target that is odd as a whole is left for target_outlier to name.
+    A surveyed target that is odd as a whole is left to target_outlier.
 
     Parameters
     ----------
     observations : Observations
     rows : Rows
     nuisance : (n, q) array
-        May act: what an effect makes of a row is not odd.
+        Possible effects, whose changes of a row are not odd.
 
     Returns
     -------
@@ -37,7 +37,7 @@ def without_tails(
     whitener = observations.with_shared(nuisance).whitener(flexible)
     weights, precision = whitener.solve(residual)
     score = weights[:, 0] / np.sqrt(precision)
-    score /= max(1.0, 1.4826 * np.median(np.abs(score)))  # all of them are off: not single ones
+    score /= max(1.0, 1.4826 * np.median(np.abs(score)))  # all of them are wrong, not single ones
     is_odd = (np.abs(score) > SETTINGS.tail) & ~_odd_target(observations, rows, score)
     limit = SETTINGS.tail_rows * len(is_odd)
     if is_odd.sum() > limit:
@@ -48,7 +48,7 @@ def without_tails(
 
 
 def _odd_target(observations, rows, score):
-    """Which observations (n,) belong to the oddest target, if all passes agree that it is odd."""
+    """Flag (n,) of observations of the oddest target, if all passes agree that it is odd."""
     target = rows.survey_item[observations.row]
     is_odd = (target >= 0) & (np.abs(score) > SETTINGS.tail)
     if not is_odd.any():
@@ -66,7 +66,7 @@ def _odd_target(observations, rows, score):
 
 @dataclass(frozen=True)
 class MixtureFit:
-    """What fits columns of values best, a share of which is odd; (k,) each.
+    """Best fit to columns of values, some of which are odd; (k,) each.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class MixtureFit:
     weight : (k,) array
         1 / variance of the offset.
     share : (k,) array
-        That is odd.
+        Odd share.
     """
 
     best: np.ndarray
@@ -85,7 +85,9 @@ class MixtureFit:
     share: np.ndarray
 
     def log_likelihood(self, sigma: float) -> np.ndarray:
-        """With the offset integrated over N(0, sigma^2), by Laplace's approximation: (k,)."""
+        """Log likelihood with the offset integrated over N(0, sigma^2), by Laplace's
+        approximation: (k,).
+        """
         spread = sigma**2 + 1 / self.weight
         return self.best - 0.5 * (self.offset**2 / spread + np.log(spread * self.weight))
 
@@ -93,11 +95,11 @@ class MixtureFit:
 def fit_mixture(
     values: np.ndarray, mean: np.ndarray, variance: np.ndarray, density: float
 ) -> MixtureFit:
-    """Fit columns of values of which a share is odd, and that have an offset in common.
+    """Fit columns of values with a share of odd ones and a common offset.
 
-    Each value is normal, or with an unknown chance it is anything at all, such as a crown of
-    leaves or a kerb among patches of road and wall (Box and Tiao 1968, A Bayesian approach to some
-    outlier problems).
+    Each value is normal or, with an unknown probability, arbitrary, such as a crown of leaves or a
+    curb among patches of road and wall (Box and Tiao 1968, A Bayesian approach to some outlier
+    problems).
 
     Parameters
     ----------
@@ -105,7 +107,7 @@ def fit_mixture(
     mean, variance : (q,) array
         Of what is not odd.
     density : float
-        Of odd values: they lie anywhere in an interval of 1 / density.
+        Density of odd values, which are anywhere in an interval of 1 / density.
     """
     columns = np.ascontiguousarray(values.T - mean)
     return MixtureFit(*_fit(columns, variance, density, *SETTINGS.odd_shares).T)
@@ -113,7 +115,7 @@ def fit_mixture(
 
 @loop
 def _fit(columns, variance, density, smallest, first, largest):
-    """Rows of log likelihood, offset, weight, share, by expectation and maximisation."""
+    """Rows of log likelihood, offset, weight, share, by expectation maximization."""
     k, q = columns.shape
     fitted = np.empty((k, 4))
     scale = 1 / np.sqrt(2 * np.pi * variance)
@@ -122,7 +124,7 @@ def _fit(columns, variance, density, smallest, first, largest):
         offset = 0.0
         share = first
         held = 0.0
-        for _ in range(3):  # the shares of so few odd values hardly move
+        for _ in range(3):  # the shares of so few odd values hardly change
             held = 0.0
             pulled = 0.0
             total_odd = 0.0

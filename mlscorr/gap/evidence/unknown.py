@@ -1,5 +1,6 @@
-"""What no known effect explains, in general terms: an error in some direction that varies with
-something. The blocks of functions that find it also say in words where to look.
+"""General blocks for errors that no known effect explains.
+
+They describe an error in some direction that varies with a covariate, and give a hint in words.
 """
 
 from dataclasses import dataclass
@@ -30,7 +31,7 @@ PLACES = ("east", "north", "height")
 BODY = ("right", "forward", "height")
 TURNS = ("roll", "pitch", "yaw")
 BEAMS = ("beam", "scan", "across")
-ANY = tuple(DIRECTIONS)  # what is smooth in anything may be an error in any direction
+ANY = tuple(DIRECTIONS)  # smooth functions of any covariate may act in any direction
 FUNCTIONS = {  # name: words, directions
     "constant": ("that is constant", (*BODY, *BEAMS, *TURNS, "clock")),
     "pass": ("that differs between passes", (*PLACES, *BODY[:2], "beam", "scan", *TURNS, "clock")),
@@ -80,9 +81,9 @@ DRIFT_FUNCTIONS = ("time", "slow time", "location", "slow place", "pass", "elaps
 
 @dataclass(frozen=True)
 class UnknownBlock:
-    """One direction times one function: columns (m, p) of the rows, and the lead in words.
+    """One direction times one function: columns (m, p) of the rows, and the hint in words.
 
-    is_drift tells that the POS's own drift looks like it.
+    is_drift is True if the POS's own drift may appear the same.
     """
 
     lead: str
@@ -91,11 +92,11 @@ class UnknownBlock:
 
 
 def unknown_blocks(rows: Rows, survey: Survey) -> tuple[UnknownBlock, ...]:
-    """Blocks of functions for what no effect explains.
+    """Make blocks of functions for errors that no effect explains.
 
-    Directions and functions whose covariate the survey doesn't vary, or doesn't know, are left
-    out. Errors of places appear once for all rows, and once for the surveyed targets alone where
-    there are other rows too: those are errors of the control.
+    Directions and functions whose covariate is constant or unknown in the survey are omitted.
+    Position-dependent errors appear once for all rows and, if there are other rows, once for the
+    surveyed targets only, as errors of the control.
 
     Parameters
     ----------
@@ -122,7 +123,7 @@ def unknown_blocks(rows: Rows, survey: Survey) -> tuple[UnknownBlock, ...]:
             along[has] += projected[:, None] * values[view]
         if only is not None:
             along[~only] = 0.0
-        if np.abs(along).max(initial=0.0) > 1e-6:  # else nothing of it is to be seen
+        if np.abs(along).max(initial=0.0) > 1e-6:  # otherwise it is not visible
             what = DIRECTIONS[direction] + ("" if only is None else " of the surveyed targets")
             drift = only is None and direction in PLACES + BODY and name in DRIFT_FUNCTIONS
             blocks.append(UnknownBlock(f"{what} {FUNCTIONS[name][0]}", along, drift))
@@ -139,7 +140,7 @@ def unknown_blocks(rows: Rows, survey: Survey) -> tuple[UnknownBlock, ...]:
 
 
 def _functions(views):
-    """Values (k, p) of the functions of each name at the looks."""
+    """Values (k, p) of the functions of each name at the views."""
     c = views.covariates
     parts = (_of_time, _of_place, _of_beam, _of_motion, _of_pass, _of_scan_angle)
     values: dict[str, np.ndarray] = {}
@@ -219,14 +220,14 @@ def _of_scan_angle(c):
 
 
 def _centred(values):
-    """Values from -1 to 1 over their span."""
+    """Values scaled to -1 to 1 over their span."""
     low = values.min()
     high = values.max()
     return (2 * values - low - high) / max(high - low, 1e-9)
 
 
 def _without_gaps(time):
-    """Times (k,) with long steps in which nothing was seen cut to the spacing of knots."""
+    """Times (k,) with long unobserved steps reduced to the spacing of knots."""
     order = np.argsort(time)
     steps = np.minimum(np.diff(time[order], prepend=time[order][:1]), SETTINGS.knots)
     short = np.empty_like(time)
@@ -239,7 +240,7 @@ def _waves(angle, orders):
 
 
 def _smooth(name, values):
-    """Functions of a covariate (k,): smooth, and as fine as half of what a block may hold."""
+    """Smooth functions of a covariate (k,), as fine as half of a block's size."""
     fine = SETTINGS.functions // 2
     return {f"smooth {name}": _splines(values, 5), f"fine {name}": _splines(values, fine)}
 

@@ -1,12 +1,12 @@
-"""Where observed and simulated differ by more than the simulator itself predicts.
+"""Location of differences beyond those that the simulator itself predicts.
 
 With u the innovations of the residuals in the order of time and sigma_i their predicted sigmas,
 
     G^2 = mean of sigma_i^2 (u_i^2 - 1)
 
-is what the simulator doesn't account for: zero on average when it is right, negative as often as
-positive. Each row has one term, so G^2 adds up over any split of the rows. Lengths are printed
-as sign(G^2) |G^2|^(1/2), in mm.
+is the part that the simulator does not explain: zero on average if it is correct, and negative as
+often as positive. Each row has one term, so G^2 is additive over any split of the rows. Lengths are
+printed as sign(G^2) |G^2|^(1/2), in mm.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from mlscorr.gap.evidence.observations import STATED, ErrorModel, Observations
 from mlscorr.gap.evidence.settings import SETTINGS
 from mlscorr.gap.residuals import Background, Rows
 
-CUTS = 400  # of a covariate at most between which a stretch is looked for: a pass to half a second
+CUTS = 400  # largest number in a search for an interval: a pass to half a second
 SPLITS = (
     *("time", "location", "range", "incidence", "scan_angle", "intensity"),
     *("speed", "turn_rate", "pass", "axis", "channel"),
 )
-NAMES = {  # what a number of a split is called, and its unit
+NAMES = {  # name and unit of a number of a split
     "time": ("time", "s"),
     "location": ("location", "m"),
     "range": ("range", "m"),
@@ -48,27 +48,27 @@ AXES = ("E", "N", "H")
 
 @dataclass(frozen=True)
 class Split:
-    """The gap by one covariate.
+    """Gap by one covariate.
 
     Parameters
     ----------
     by : str
         One of SPLITS.
     edges : (b + 1,) array or None
-        Of continuous ones; angles in degrees.
+        For continuous ones; angles in degrees.
     bins : tuple of str
-        Otherwise.
+        For discrete ones.
     count : (b,) int array
         Rows in each.
     before, after : (b,) array
         Signed gap of the rows of each bin. Units: mm.
     share : (b,) array
-        Of the squares of what the cause moves rows by, and of the variance that it adds; without a
-        cause, of the squared gap of all rows. Sums to one.
+        Share of the squared shifts by the cause and of its added variance; without a cause, of the
+        squared gap of all rows. Sums to one.
     band : (b, 2) array
-        95 % of what each bin's gap is when nothing is wrong. Units: mm.
+        95 % interval of each bin's gap if nothing is wrong. Units: mm.
     extent : Extent or None
-        Of a continuous covariate: the stretch in which the cause acts.
+        For a continuous covariate: the interval in which the cause acts.
     """
 
     by: str
@@ -84,17 +84,17 @@ class Split:
 
 @dataclass(frozen=True)
 class Where:
-    """The gap and its splits.
+    """Gap and its splits.
 
     Parameters
     ----------
     before, after : float
-        Signed; after is with the cause taken off. Units: mm.
+        Signed; after removal of the cause. Units: mm.
     null_band : (float, float)
-        95 % of what it is when nothing is wrong. Units: mm.
+        95 % interval if nothing is wrong. Units: mm.
     splits : tuple of Split
     row : (n,) int array
-        Which row each innovation is of.
+        Row of each innovation.
     gps_time : (n,) array
         Units: s.
     innovation : (n, 2) array
@@ -123,24 +123,24 @@ def locate(
     extra: np.ndarray | None = None,
     acts: tuple[float, float] | None = None,
 ) -> Where:
-    """Where the gap lies, before and after a cause is taken off.
+    """Locate the gap, before and after a cause is removed.
 
     Parameters
     ----------
     rows : Rows
     background : Background
     shift : (m,) array
-        What the cause makes of the residuals; zero for none.
+        Shift of the residuals by the cause; zero for none.
     rng : numpy.random.Generator
     replicas : sequence of ErrorModel
-        Of each replica for the null band: a survey in which nothing acts, whose POS errs, and whose
-        noise has tails, as this one's do once the cause is taken off.
+        Model of each replica for the null band: a survey without effects, with the POS errors and
+        noise tails of this one after removal of the cause.
     model : ErrorModel
-        Of V after: another one than stated when the cause is in the noise of the POS.
+        Model of V after; it differs from the stated one if the cause is noise of the POS.
     extra : (m,) array, optional
-        Variance that a noise of the rows' own adds, after.
+        Variance added by noise of the rows' own, after.
     acts : (float, float), optional
-        When the cause acts, where it is known better than by the rows. Units: s.
+        Interval in which the cause acts, if known better than from the rows. Units: s.
     """
     observed = Observations.of(rows, background)
     columns = observed.columns(np.column_stack([rows.residual, rows.residual - shift]))
@@ -191,14 +191,14 @@ def locate(
 
 
 def _moved(observed, shift, model, extra):
-    """Square (n,) of what a cause moves observations by, and the variance that it adds. m^2."""
+    """Squared shift (n,) of observations by a cause, and its added variance. m^2."""
     stated = simulated_variance(observed, STATED)
     more = simulated_variance(observed, model, extra) - stated
     return shift[observed.row] ** 2 + np.maximum(more, 0.0)
 
 
 def _timed(splits, rows, row, square, acts):
-    """Splits with the extent in time that is known."""
+    """Splits with the known extent in time."""
     first = rows.reference.start
     time = rows.gps_time[row]
     inside = (time >= acts[0]) & (time <= acts[1])
@@ -208,7 +208,7 @@ def _timed(splits, rows, row, square, acts):
 
 
 def _split(rows, row, by, terms, explained, is_moved):
-    """The gap by one covariate, or None where it is not known or the same for all rows."""
+    """Gap by one covariate, or None if that is unknown or equal for all rows."""
     edges, bins, number = _bins(rows, row, by)
     if number is None:
         return None
@@ -259,16 +259,16 @@ def _bins(rows, row, by):
 
 @dataclass(frozen=True)
 class Extent:
-    """A stretch of a covariate.
+    """Interval of a covariate.
 
     Parameters
     ----------
     low, high : float
         In the covariate's unit; an angle may pass 180 deg.
     share : float
-        Of the squares of what the cause moves, that lie in it.
+        Share of the squared shifts within it.
     rows : float
-        Share of the rows that lie in it.
+        Share of the rows within it.
     """
 
     low: float
@@ -278,21 +278,21 @@ class Extent:
 
     @property
     def excess(self) -> float:
-        """By how much the share is more than that of the rows: zero of what acts everywhere."""
+        """Excess of the share over that of the rows: zero for a cause that acts everywhere."""
         return self.share - self.rows
 
 
 def extent_of(values: np.ndarray, square: np.ndarray, turn: float | None = None) -> Extent | None:
-    """The stretch in which a cause acts most; None where it acts everywhere or nowhere alike.
+    """Interval in which a cause acts most; None if it acts uniformly or not at all.
 
     Parameters
     ----------
     values : (n,) array
         Of the covariate.
     square : (n,) array
-        Of what the cause moves each row by, or adds to its variance.
+        Squared shift of each row by the cause, or its added variance.
     turn : float, optional
-        After which values repeat.
+        Period of the values.
 
     >>> time = np.arange(100.0)
     >>> moved = np.exp(-0.5 * ((time - 40.0) / 6.0) ** 2)
@@ -333,7 +333,7 @@ def extent_of(values: np.ndarray, square: np.ndarray, turn: float | None = None)
 
 
 def _opened(values, turn):
-    """Values that repeat, cut where the widest stretch of them is without rows."""
+    """Periodic values, cut at their widest interval without rows."""
     if turn is None or len(values) < 2:
         return values
     known = np.sort(values)

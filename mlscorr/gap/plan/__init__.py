@@ -1,4 +1,4 @@
-"""What a survey will be able to show, and what more would tell its causes apart."""
+"""Expected results of a survey, and additions that would separate its causes."""
 
 from mlscorr.gap.plan._planned_rows import event_sizes, planned_rows
 from mlscorr.gap.plan.additions import NextData, next_data

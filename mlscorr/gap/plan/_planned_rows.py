@@ -1,4 +1,4 @@
-"""The rows that a survey will have, from its geometry alone: before anyone drives."""
+"""Rows of a planned survey, from its geometry only."""
 
 from collections.abc import Iterable
 
@@ -18,10 +18,10 @@ from mlscorr.targets import SETTINGS as TARGETS
 
 
 def planned_rows(survey: Survey) -> Rows:
-    """Rows of targets, and of a reference surface where there is one, as they will be seen.
+    """Make the expected rows of targets, and of a reference surface if there is one.
 
-    Each is seen once a pass, when the scan plane sweeps over it near enough; the residuals are
-    zero. The cloud isn't read.
+    Each is observed once per pass, when the scan plane sweeps over it close enough; residuals are
+    zero. The cloud is not read.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def planned_rows(survey: Survey) -> Rows:
     Raises
     ------
     ValueError
-        Without a mounting, or when nothing will be seen.
+        If there is no mounting, or nothing will be observed.
     """
     if survey.mounting is None:
         raise SurveyFileError(
@@ -88,7 +88,7 @@ def _targets(survey, targets):
 
 
 def _facets(survey, rng):
-    """Rows of a sample of the reference's facets, by their areas, that nothing hides."""
+    """Rows of visible facets of the reference, sampled by area."""
     origin = np.round(survey.trajectory.position.mean(axis=0))
     mesh = read_mesh(SceneScenario(kind="mesh", file=survey.reference), origin)
     a, b, c = np.moveaxis(mesh.triangles, 1, 0)
@@ -131,7 +131,7 @@ def _facets(survey, rng):
 
 
 def _sweeps(survey, place):
-    """When the scan plane sweeps over places (k, 3), once a pass, where the scanner is nearest.
+    """Index, time and pass, (n,) each, of the scan plane's nearest sweep over positions (k, 3).
 
     Index, time and pass, (n,) each.
     """
@@ -160,9 +160,9 @@ def _sweeps(survey, place):
 def event_sizes(
     observed: Observations, signs: Iterable[Signature]
 ) -> dict[str, tuple[tuple[str, ...], tuple[str, ...], np.ndarray]]:
-    """Minimal detectable bias of events, the median over their bank.
+    """Minimal detectable biases of events, as the median over their bank.
 
-    The others are in Separability.
+    Those of other effects are in Separability.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def event_sizes(
     Returns
     -------
     dict of (names of p parameters, units, (p,) array)
-        By the events' names.
+        By name of the event.
     """
     whitener = observed.whitener()
     events = {}

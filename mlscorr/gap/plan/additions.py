@@ -1,7 +1,7 @@
-"""What to measure next: which cheap addition to this survey tells the open causes apart.
+"""Next measurements: low-cost additions to this survey that separate the open causes.
 
-Each addition is made of the survey's own geometry, turned, timed or placed anew, and judged by its
-signatures alone: no data are needed.
+Each addition is derived from the survey's own geometry, with other headings, times or positions,
+and judged only by its signatures, without data.
 """
 
 from collections.abc import Iterable
@@ -21,13 +21,13 @@ from mlscorr.survey import ControlPoints, Survey, Trajectory
 
 @dataclass(frozen=True)
 class NextData:
-    """What to measure next, and why.
+    """Next measurement, and its reason.
 
     Parameters
     ----------
     survey, why : str
     before, after : float, optional
-        Squared correlation of the causes that it tells apart.
+        Squared correlation of the causes that it separates.
     """
 
     survey: str
@@ -37,9 +37,9 @@ class NextData:
 
 
 def additions(rows: Rows, survey: Survey) -> dict[str, tuple[Rows, Survey]]:
-    """The cheap additions that a survey allows: what to do, and rows and survey with it.
+    """Make the low-cost additions for a survey: description, and rows and survey with it.
 
-    The residuals of these rows say nothing.
+    The residuals of these rows have no meaning.
 
     Parameters
     ----------
@@ -72,18 +72,19 @@ def next_data(
     effects: Iterable[str],
     compared: Separability,
 ) -> tuple[NextData, ...]:
-    """Which additions tell effects apart that this survey can't, best first.
+    """Find additions that separate effects that this survey cannot separate, best first.
 
     Parameters
     ----------
     rows : Rows
     survey : Survey
     kinds : iterable of Effect classes
-        Those to consider.
+        Classes to consider.
     effects : tuple of str
-        Open causes: the verdict's set, or a class. Events are no matter of geometry: left out.
+        Open causes: the verdict's set, or a class. Events do not depend on geometry and are
+        omitted.
     compared : Separability
-        Of the survey as it is.
+        Separability of the present survey.
     """
     names = tuple(name for name in effects if name in compared.effects)
     if len(names) < 2:
@@ -116,7 +117,7 @@ def _largest(compared, names):
 
 
 def _another_pass(rows, survey, backwards=False, faster=1.0):
-    """All targets and surfaces once more, from the same places at other times."""
+    """All targets and surfaces again, from the same positions at other times."""
     once = rows.select(rows.metric & ~rows.two_times)
     trajectory = survey.trajectory
     first, last = trajectory.gps_time[[0, -1]]
@@ -136,7 +137,7 @@ def _another_pass(rows, survey, backwards=False, faster=1.0):
 
 
 def _followed(trajectory, rows, time, **changed):
-    """A trajectory, and some of its epochs once more: at other times, in a session of their own."""
+    """Trajectory with some of its epochs repeated at other times, in a separate session."""
     more = replace(trajectory.select(rows), gps_time=time, **changed)
     if more.session is not None:
         more = replace(more, session=trajectory.session.max() + 1 + more.session)
@@ -144,7 +145,7 @@ def _followed(trajectory, rows, time, **changed):
 
 
 def _more_targets(rows, survey, items, farther=1.0):
-    """Targets like the items, half an interval later or sooner, seen under the same angles."""
+    """Targets like the items, half an interval later or earlier, observed at the same angles."""
     once = rows.select((rows.channel == "target") & np.isin(rows.item, items))
     trajectory = survey.trajectory
     visits = np.sort(np.unique(once.gps_time))
@@ -164,7 +165,7 @@ def _more_targets(rows, survey, items, farther=1.0):
 
 
 def _stop(rows, survey, items):
-    """The items' targets set up around one place, where the vehicle stands."""
+    """Targets of the items set up around one position, where the vehicle stops."""
     trajectory = survey.trajectory
     once = rows.select((rows.channel == "target") & np.isin(rows.item, items))
     middle = trajectory.at(
@@ -180,14 +181,14 @@ def _stop(rows, survey, items):
     high = once.gps_time.max()
 
     def anew(recorded):
-        share = (recorded - low) / max(high - low, 1.0)  # pulses come before and after their target
+        share = (recorded - low) / max(high - low, 1.0)  # pulses before and after their target
         return start + np.clip(share, 0.0, 1.0) * (time[-1] - start)
 
     return _new_targets(rows, replace(survey, trajectory=longer), once, anew, 1.0)
 
 
 def _new_targets(rows, survey, once, anew, farther):
-    """Rows of new targets, which stand to the vehicle as those of `once` did."""
+    """Rows of new targets, with the same geometry to the vehicle as those of `once`."""
     trajectory = survey.trajectory
     arm = np.zeros(3)
     if survey.mounting is not None:
@@ -217,7 +218,7 @@ def _new_targets(rows, survey, once, anew, farther):
 
 
 def _placed(once, survey, anew, place, survey_item):
-    """Rows like those of `once` at other times, with pulses at other places."""
+    """Rows like those of `once` at other times, with pulses at other positions."""
     old = once.pulses
     pulses = sample_pulses(
         survey, old.item, old.weight, place(old), anew(old.gps_time), old.intensity, old.normal

@@ -1,6 +1,6 @@
-"""What acts in a made-up survey: effects that are unlike each other, or a mechanism unlike all.
+"""Random causes of a synthetic survey: dissimilar effects, or a mechanism unlike all of them.
 
-Their sizes are so many minimal detectable biases in the geometry of that survey.
+Their sizes are multiples of the minimal detectable bias in the geometry of that survey.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from mlscorr.gap.signatures import Bench, Signature, signature
 from mlscorr.simulate import Described, RecordedPoints
 from mlscorr.survey import Survey
 
-EVENT_WIDTHS = (2.0, 30.0)  # s, drawn evenly by their logs: a lost fix to a tunnel
-LEAST_SIZE = 0.5  # MDB: an effect that stays below at its largest credible value doesn't show
-ATTEMPTS = 12  # names or surveys, estimated: where half show nothing, one case in 4000 fails
-LIKENESS = 0.8  # squared correlation with an effect, estimated: more is that effect by another name
+EVENT_WIDTHS = (2.0, 30.0)  # s, log-uniform: a lost fix to a tunnel
+LEAST_SIZE = 0.5  # MDB: an effect below it at its largest credible value is not visible
+ATTEMPTS = 12  # names or surveys, estimated: if half are not visible, one case in 4000 fails
+LIKENESS = 0.8  # squared correlation with an effect, estimated: above it, the same by another name
 
 
 @dataclass(frozen=True)
 class Ruler:
-    """A survey without effects, and how large an effect is beside its errors.
+    """Survey without effects, as a measure of the size of effects.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class Ruler:
     survey : Survey
     observations : Observations
     whitener : Whitener
-        Of the covariance that its residuals without effects make most likely.
+        For the most likely covariance, given its residuals without effects.
     """
 
     rows: Rows
@@ -52,35 +52,35 @@ class Ruler:
 
     @classmethod
     def of(cls, rows: Rows, survey: Survey) -> Ruler:
-        """Ruler of the rows of a survey in which nothing acts."""
+        """Make the Ruler of the rows of a survey without effects."""
         observed = Observations.of(rows, background(rows, survey))
         residual = observed.columns(rows.residual[:, None])
         best = max(error_models(), key=lambda model: model_likelihood(observed, model, residual)[0])
         return cls(rows, survey, observed, observed.whitener(best))
 
     def normal(self, columns: np.ndarray) -> np.ndarray:
-        """A^T V^-1 A (p, p) of columns (m, p)."""
+        """Return A^T V^-1 A (p, p) of columns (m, p)."""
         white = self.whitener.whiten(self.observations.columns(columns))
         return white.product(white)
 
     def size(self, shift: np.ndarray) -> float:
-        """Size of a shift (m,) of the rows, in minimal detectable biases."""
+        """Return the size of a shift (m,) of the rows, in minimal detectable biases."""
         return float(np.sqrt(max(self.normal(shift[:, None])[0, 0], 0.0)) / SETTINGS.detectable)
 
 
 @dataclass(frozen=True)
 class SizedEffect:
-    """An effect of a known size.
+    """Effect of a known size.
 
     Parameters
     ----------
     effect : Effect
     parameters : dict
-        As a diagnosis would name and estimate them.
+        With the names of a diagnosis.
     mdb : float
         Size in minimal detectable biases.
     shift : (m,) array
-        What it makes of the residuals, to the first order.
+        Its shift of the residuals, to first order.
     normal : (p, p) array
         Of its magnitudes: A^T V^-1 A.
     """
@@ -95,10 +95,10 @@ class SizedEffect:
 def draw_effect(
     ruler: Ruler, kind: type[Effect], mdb: float, rng: np.random.Generator
 ) -> SizedEffect | None:
-    """Effect of a class in a random direction, of a chosen size; None where it doesn't show.
+    """Draw an effect of a class in a random direction with a given size; None if it is not visible.
 
-    It is capped at the largest credible value. Events get a time within the survey and a width,
-    outliers a target. A random effect's MDB is the size whose square is so many sigmas.
+    It is limited to the largest credible value. Events get a time within the survey and a width,
+    outliers a target. The MDB of a random effect is the size whose square is that many sigmas.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def _systematic(ruler, sign, mdb, rng):
 
 
 def _random(ruler, sign, mdb):
-    """Magnitude (1,) of an effect that shows as noise or lost returns."""
+    """Magnitude (1,) of an effect that appears as noise or lost returns."""
     size = detectable_size(ruler.rows, ruler.observations, sign, mdb)
     if np.isfinite(size):
         return np.array([size])
@@ -147,9 +147,9 @@ def _random(ruler, sign, mdb):
 
 
 def _credible(sign, way, mdb):
-    """Parameters within the largest credible value, and the size that is left."""
+    """Parameters within the largest credible value, and the resulting size."""
     quantities = sign.kind.quantities()
-    largest = quantities["magnitude"].largest * (1 - 1e-3)  # rounding can't take it beyond
+    largest = quantities["magnitude"].largest * (1 - 1e-3)  # rounding cannot exceed it
     if sign.kind.is_wave():
         size = np.hypot(*way)
     else:
@@ -159,7 +159,7 @@ def _credible(sign, way, mdb):
 
 
 def _fixed(kind, ruler, rng):
-    """What an effect has besides its magnitude, at random; None where nothing was seen."""
+    """Random circumstances of an effect besides its magnitude; None if nothing was observed."""
     rows = ruler.rows
     fixed = {}
     if kind.is_on_target():
@@ -171,7 +171,7 @@ def _fixed(kind, ruler, rng):
         times = np.sort(rows.gps_time[rows.metric])
         if len(times) == 0:
             return None
-        time = np.quantile(times, rng.random())  # as dense in time as what was seen
+        time = np.quantile(times, rng.random())  # as dense in time as the observations
         fixed["time"] = float(round(time - rows.reference.start, 3))
     if "width" in kind.moment():
         fixed["width"] = float(np.exp(rng.uniform(*np.log(EVENT_WIDTHS))))
@@ -179,13 +179,13 @@ def _fixed(kind, ruler, rng):
 
 
 def shift_by(ruler: Ruler, move: Callable[[RecordedPoints], np.ndarray]) -> np.ndarray:
-    """Shift (m,) of the residuals when points are recorded elsewhere.
+    """Shift (m,) of the residuals if points are displaced.
 
     Parameters
     ----------
     ruler : Ruler
     move : function
-        From points to displacements (k, 3) on the map, as DisplacedSurvey has it. Units: m.
+        From points to displacements (k, 3) on the map; see DisplacedSurvey. Units: m.
     """
     rows = ruler.rows
     pulses = ruler.rows.pulses
@@ -208,7 +208,7 @@ def likeness(ruler: Ruler, shift: np.ndarray, known: Sequence[Signature]) -> dic
     shift : (m,) array
         Of the residuals.
     known : sequence of Signature
-        All that the library has in this survey; of an event the best of its times counts.
+        All signatures of the library in this survey; for an event the best time counts.
     """
     known = [sign for sign in known if sign.jacobian[ruler.rows.metric].any()]
     if not shift[ruler.rows.metric].any():
@@ -230,7 +230,7 @@ def likeness(ruler: Ruler, shift: np.ndarray, known: Sequence[Signature]) -> dic
 def names_to_try(
     pool: Sequence[str], rng: np.random.Generator, first: Iterable[str] = ()
 ) -> Iterator[str]:
-    """ATTEMPTS names and those that come first, drawn when they are asked for.
+    """Yield ATTEMPTS names after the first ones, drawn on demand.
 
     Parameters
     ----------
@@ -250,18 +250,17 @@ def draw_effects(
     mdb: float,
     rng: np.random.Generator,
 ) -> list[tuple[SizedEffect, dict[str, float]]] | None:
-    """Effects that are unlike each other, each with its likeness to all that is known; None where
-    the geometry shows too few.
+    """Draw dissimilar effects, each with its likeness to known ones; None if too few are visible.
 
     Parameters
     ----------
     ruler : Ruler
     known : sequence of Signature
-        All that the library has in this survey.
+        All signatures of the library in this survey.
     names : iterable of str
-        That are tried.
+        Names to try.
     number : int
-        Of effects.
+        Number of effects.
     mdb : float
         Size in minimal detectable biases.
     rng : numpy.random.Generator
@@ -283,7 +282,7 @@ def draw_effects(
 
 @dataclass(frozen=True)
 class SizedMechanism:
-    """A mechanism that no library knows, of a known size: moves points when it is called.
+    """Mechanism outside the library, of a known size, which displaces points when called.
 
     Parameters
     ----------
@@ -291,7 +290,7 @@ class SizedMechanism:
     function : function
         From points, a size and a generator to displacements (k, 3). Units: m.
     chance : int
-        Seed of what it draws.
+        Seed of its random numbers.
     size : float
         In its unit.
     """
@@ -302,7 +301,7 @@ class SizedMechanism:
     size: float = 1.0
 
     def __call__(self, points: RecordedPoints) -> np.ndarray:
-        """Displacements (k, 3) of points on the map. Units: m."""
+        """Return displacements (k, 3) of points on the map. Units: m."""
         return self.function(points, self.size, np.random.default_rng(self.chance))
 
 
@@ -314,15 +313,14 @@ def draw_mechanism(
     mdb: float,
     rng: np.random.Generator,
 ) -> tuple[SizedMechanism, np.ndarray, dict[str, float]] | None:
-    """A mechanism that is unlike all effects, the shift (m,) of residuals that it makes, and its
-    likeness; None where the geometry shows none.
+    """Draw a mechanism unlike all effects, with its shift (m,) and likeness; None if there is none.
 
     Parameters
     ----------
     ruler, known, names, mdb, rng
-        As of draw_effects.
+        See draw_effects.
     mechanisms : dict
-        Function, unit with largest size, and lead, by name.
+        Function, unit with largest size, and hint, by name.
     """
     for name in names:
         function, (_, largest), _ = mechanisms[name]

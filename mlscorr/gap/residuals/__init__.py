@@ -1,4 +1,4 @@
-"""What is compared: rows of observed minus simulated, and what each was measured under."""
+"""Compared data: rows of observed minus simulated, and their circumstances."""
 
 from mlscorr.gap.residuals._surfaces import gate
 from mlscorr.gap.residuals.absence import Absence, find_absence

@@ -1,8 +1,7 @@
-"""Patches of the cloud against what they should lie on: each other, where two looks see one plane,
-and a reference surface, where the believed beams meet it.
+"""Patches compared with each other in overlaps, and with a reference surface.
 
-Looks pair within a gate of the stated sigma; those that disagree with all others about their time
-are of something else.
+Views are paired within a gate of the stated sigma; those that disagree with all others close in
+time belong to something else.
 """
 
 from dataclasses import dataclass, replace
@@ -27,7 +26,7 @@ from mlscorr.survey import SEARCH_RADIUS, Columns, Survey
 
 
 def moved_by(correction: Correction | None, xyz: np.ndarray, gps_time: np.ndarray) -> np.ndarray:
-    """What a correction adds to points (n, 3); nothing without one. Units: m.
+    """Return the increments of points (n, 3) by a correction; zero without one. Units: m.
 
     Parameters
     ----------
@@ -43,7 +42,7 @@ def moved_by(correction: Correction | None, xyz: np.ndarray, gps_time: np.ndarra
 def places(
     survey: Survey, patches: Patches, correction: Correction | None
 ) -> list[tuple[Survey, Patches]]:
-    """The survey and its patches as recorded, and where a correction puts them.
+    """Yield the survey and its patches as recorded, and after a correction.
 
     Parameters
     ----------
@@ -61,7 +60,7 @@ def places(
 
 
 def support(residual: np.ndarray) -> float:
-    """How much speaks for the places that leave residuals (n,) in m: the nearer, the more.
+    """Support for the positions that leave residuals (n,) in m: larger for smaller residuals.
 
     Parameters
     ----------
@@ -72,7 +71,7 @@ def support(residual: np.ndarray) -> float:
 
 
 def gate(survey: Survey, gps_time: np.ndarray) -> np.ndarray:
-    """Largest credible distance of a surface from where it should be.
+    """Largest credible distance of a surface from its expected position.
 
     Parameters
     ----------
@@ -91,17 +90,17 @@ def gate(survey: Survey, gps_time: np.ndarray) -> np.ndarray:
 
 
 def consistent(gps_time: np.ndarray, direction: np.ndarray, residual: np.ndarray) -> np.ndarray:
-    """Which differences agree with one shift of their window of time.
+    """Flag of differences that agree with one shift within their interval of time.
 
-    What doesn't is another surface: a car, a curb that the reference lacks. The shift is the one
-    of least absolute differences, by reweighting; in windows with little in them, all agree.
+    Others belong to another surface: a car, or a curb missing in the reference. The shift minimizes
+    absolute differences, by reweighting; in intervals with few data, all agree.
 
     Parameters
     ----------
     gps_time : (n,) array
         Units: s.
     direction : (n, 3) array
-        Along which the differences are measured.
+        Direction of each difference.
     residual : (n,) array
         Units: m.
 
@@ -116,7 +115,7 @@ def consistent(gps_time: np.ndarray, direction: np.ndarray, residual: np.ndarray
     begins = np.flatnonzero((np.diff(group) != 0) | (np.diff(moment) != 0)) + 1
     agree = np.ones(len(gps_time), dtype=bool)
     for rows in np.split(order, begins):
-        if len(rows) >= size // 3:  # three unknowns: fewer don't tell which of them is off
+        if len(rows) >= size // 3:  # three unknowns: fewer do not show which of them is wrong
             left = residual[rows] - _shift(direction[rows], residual[rows])
             scatter = 1.4826 * np.median(np.abs(left))  # a normal distribution's sigma
             agree[rows] = np.abs(left) <= max(SETTINGS.odd_distance, SETTINGS.odd_sigmas * scatter)
@@ -124,7 +123,7 @@ def consistent(gps_time: np.ndarray, direction: np.ndarray, residual: np.ndarray
 
 
 def _shift(direction, residual):
-    """What a shift of least absolute differences makes of each of the directions (n,). m."""
+    """Fit of a shift of least absolute differences to each of the directions (n,). m."""
     weight = np.ones(len(residual))
     for _ in range(15):
         normal = (direction * weight[:, None]).T @ direction + 1e-3 * np.eye(3) * weight.sum()
@@ -134,9 +133,9 @@ def _shift(direction, residual):
 
 
 def spread(columns: list[np.ndarray], limit: int, rng: np.random.Generator) -> np.ndarray:
-    """Choose at most `limit` of n things, evenly spread over the values of each column.
+    """Choose at most `limit` of n items, evenly spread over the values of each column.
 
-    Each column is cut into equal bins; a thing's chance grows with the emptiness of its bins.
+    Each column is split into equal bins; an item in emptier bins is more likely.
 
     Parameters
     ----------
@@ -160,7 +159,7 @@ def spread(columns: list[np.ndarray], limit: int, rng: np.random.Generator) -> n
         span = np.ptp(values) or 1.0
         number = ((values - values.min()) / span * SETTINGS.spread_bins).astype(int)
         chance += 1 / np.bincount(number)[number]
-    keys = rng.exponential(size=n) / chance  # the least of these are a sample without replacement
+    keys = rng.exponential(size=n) / chance  # the smallest are a sample without replacement
     return np.sort(np.argpartition(keys, limit)[:limit])
 
 
@@ -171,19 +170,19 @@ def shared_rows(
     limit: int = SETTINGS.patches // 2,
     correction: Correction | None = None,
 ) -> Rows | None:
-    """Rows of the planes that were seen twice, or None where there are none.
+    """Make rows of the planes in overlaps, or None if there are none.
 
-    The residual is how far the earlier look lies from the later one, along their mean normal.
+    The residual is the offset of the earlier view from the later one, along their mean normal.
 
     Parameters
     ----------
     survey : Survey
     patches : Patches
     rng : numpy.random.Generator
-        Chooses where there are more pairs than the limit.
+        For the selection if there are more pairs than the limit.
     limit : int
     correction : Correction, optional
-        By which two looks at one plane find each other, where more do than as recorded.
+        Used to pair two views of one plane, if it gives more pairs than the recorded positions.
     """
     tried = [(there, *_pairs(near)) for there, near in places(survey, patches, correction)]
     there, early, late, normal, between, residual = max(tried, key=lambda pair: support(pair[-1]))
@@ -221,17 +220,17 @@ def shared_rows(
 
 
 def compare_planes(first: Patches, second: Patches) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Mean normal (n, 3), way between the middles (n, 3), and its part along the normal (n,).
+    """Mean normal (n, 3), vector between the middles (n, 3), and its normal component (n,).
 
     Parameters
     ----------
     first, second : Patches
-        Of n planes each, looked at twice.
+        Two views of n planes.
 
     Returns
     -------
     three arrays
-        Units of the way and its part: m.
+        Units of the last two: m.
     """
     normal = first.normal + second.normal
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
@@ -240,8 +239,8 @@ def compare_planes(first: Patches, second: Patches) -> tuple[np.ndarray, np.ndar
 
 
 def _pairs(patches):
-    """Rows (n,), (n,) of two looks at one plane, the earlier one first, and compare_planes of
-    them; each is in one pair at most with any other pass.
+    """Rows (n,), (n,) of two views of one plane, the earlier one first, and their
+    compare_planes; each is in at most one pair with any other pass.
     """
     radius = SETTINGS.pair_distance * SETTINGS.cell
     pairs = cKDTree(patches.centre).query_pairs(radius, output_type="ndarray")
@@ -257,7 +256,7 @@ def _pairs(patches):
     order = np.argsort(np.linalg.norm(patches.centre[early] - patches.centre[late], axis=1))
     early = early[order]
     late = late[order]
-    for forward in (True, False):  # the nearest partner in each pass, of both
+    for forward in (True, False):  # mutual nearest partners in each pass
         a = early
         b = late
         if not forward:
@@ -271,15 +270,14 @@ def _pairs(patches):
 
 
 def plane_noise(first: Patches, second: Patches, square: np.ndarray) -> np.ndarray:
-    """Variance (n,) of the difference: of both means, of the normal over the way between them,
-    and of the surface, which is no plane.
+    """Variance (n,) of the difference, from both means, the normal and surface roughness.
 
     Parameters
     ----------
     first, second : Patches
         Of n planes each.
     square : (n,) array
-        Of the distance between their middles. Units: m^2.
+        Squared distance between their middles. Units: m^2.
     """
     mean = [patches.variance / patches.points for patches in (first, second)]
     tilt = [m / patches.spread**2 for m, patches in zip(mean, (first, second), strict=True)]
@@ -288,18 +286,18 @@ def plane_noise(first: Patches, second: Patches, square: np.ndarray) -> np.ndarr
 
 @dataclass(frozen=True, repr=False)
 class OnReference(Columns):
-    """Patches that the reference surface has too.
+    """Patches that also exist in the reference surface.
 
     Parameters
     ----------
     patch : (m,) int array
-        Their numbers.
+        Their indices.
     direction : (m, 3) array
-        Normal of the reference, towards the scanner.
+        Normal of the reference, toward the scanner.
     residual : (m,) array
-        How far they lie from it along the direction. Units: m.
+        Offset from it along the direction. Units: m.
     noise : (m,) array
-        Variance of that. Units: m^2.
+        Variance of the residual. Units: m^2.
     """
 
     patch: np.ndarray
@@ -311,12 +309,12 @@ class OnReference(Columns):
 def on_reference(
     survey: Survey, patches: Patches, correction: Correction | None = None
 ) -> OnReference:
-    """Compare patches with [scene] reference: OnReference.
+    """Compare patches with [scene] reference.
 
-    Each patch's beams are cast into the reference from where the scanner is believed to have
-    been. The residual is the mean distance of the patch's plane from the facets met, where the
-    beams met them. Patches that meet nothing parallel within the gate are something that the
-    reference lacks, and so are those that disagree with all others about their time.
+    Each patch's beams are cast into the reference from the recorded position of the scanner. The
+    residual is the mean distance of the patch's plane from the facets at the beams. Patches without
+    a parallel facet within the gate are missing in the reference, and so are those that disagree
+    with all others close in time.
 
     Parameters
     ----------
@@ -324,13 +322,13 @@ def on_reference(
         With a reference.
     patches : Patches
     correction : Correction, optional
-        By which patches find their like in the mesh, where more do than as recorded: control
-        points may be what is off.
+        Used to find patches in the mesh, if it finds more than the recorded positions; control
+        points may be wrong.
 
     Raises
     ------
     ValueError
-        For a mesh that can't be used, and for one in other coordinates.
+        If the mesh is unusable, or in other coordinates.
     """
     origin = np.round(patches.centre.mean(axis=0))
     mesh = read_mesh(SceneScenario(kind="mesh", file=survey.reference), origin)
@@ -346,7 +344,7 @@ def on_reference(
 
 
 def _compare(survey, patches, mesh, origin):
-    """Direction (p, 3), residual (p,) and whether the patch met its like in the mesh (p,)."""
+    """Direction (p, 3), residual (p,) and flag (p,) of patches that exist in the mesh."""
     p, samples = patches.time.shape
     start = scanner_origin(survey, patches.time.ravel()) - origin
     end = patches.xyz.reshape(-1, 3) - origin
@@ -374,7 +372,7 @@ def _compare(survey, patches, mesh, origin):
 
 
 def _elsewhere(survey, patches, mesh, origin):
-    """The sentence for a reference surface that lies where the cloud is not."""
+    """Sentence on a reference surface away from the cloud."""
     centre = (patches.centre - origin).astype(np.float32)
     apart = mesh.caster.compute_closest_points(centre)["points"].numpy() - centre
     distance = np.median(np.linalg.norm(apart, axis=1))
@@ -394,7 +392,7 @@ def _elsewhere(survey, patches, mesh, origin):
 def patch_pulses(
     survey: Survey, patches: Patches, item: np.ndarray, sign: float = 1.0
 ) -> SamplePulses:
-    """Pulses of patches.
+    """Make the pulses of patches.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Surveyed targets that should have been seen and were not: what they say is said by no row."""
+"""Surveyed targets that should have been observed but were not, and thus have no row."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,18 +9,18 @@ import numpy as np
 from mlscorr.matching import Matches
 from mlscorr.survey import Survey
 
-LEAST_RUN = 2  # neighbours in time: one target alone is hidden by a parked car
+LEAST_RUN = 2  # consecutive in time: a single target may be hidden by a parked car
 
 
 @dataclass(frozen=True)
 class AbsentRun:
-    """Neighbours in time that were within sight and were not found, or found and refused.
+    """Consecutive targets in sight that were not found, or were found and refused.
 
     Parameters
     ----------
     name : tuple of k str
     gps_time : tuple of k float
-        When each was refused, or would have been nearest. Units: s.
+        Time at which each was refused, or would have been nearest. Units: s.
     reason : tuple of k str
     """
 
@@ -30,12 +30,12 @@ class AbsentRun:
 
     @property
     def distinct(self) -> list[str]:
-        """The names, each once: what hides a target in one pass hides it in the next."""
+        """Names, each once, because an obstacle in one pass also hides a target in the next."""
         return list(dict.fromkeys(self.name))
 
     @property
     def lead(self) -> str:
-        """What the run looks like, in words."""
+        """Description of the run in words."""
         return (
             f"stretch from {self.gps_time[0]:.1f} to {self.gps_time[-1]:.1f} s in which the "
             f"{len(self.distinct)} surveyed targets {', '.join(self.distinct)} were within sight "
@@ -43,7 +43,7 @@ class AbsentRun:
         )
 
     def document(self) -> dict:
-        """The run as gap.json has it."""
+        """Return the run as in gap.json."""
         return {
             "names": list(self.name),
             "gps_time": list(self.gps_time),
@@ -53,18 +53,18 @@ class AbsentRun:
 
 @dataclass(frozen=True)
 class Absence:
-    """What is missing of a survey's targets.
+    """Missing targets of a survey.
 
     Parameters
     ----------
     runs : tuple of AbsentRun
-        The longest first.
+        Longest run first.
     sightings : int
-        Number of targets and passes that were, or should have been, seen.
+        Number of targets and passes that were, or should have been, observed.
     missing : int
-        How many of these were not.
+        Number of those that were not.
     moved : tuple of str
-        Control points whose targets were found elsewhere than they were surveyed.
+        Control points whose targets were found away from their surveyed positions.
     """
 
     runs: tuple[AbsentRun, ...] = ()
@@ -74,10 +74,10 @@ class Absence:
 
     @property
     def chance(self) -> float:
-        """Bound on the probability of such runs when targets are missed one by one.
+        """Bound on the probability of such runs if targets are missed independently.
 
-        There are fewer than n places for a run of r, each of probability q^r; q is the share that
-        is missing outside the runs, by Laplace's rule of succession.
+        There are fewer than n positions for a run of r, each with probability q^r; q is the share
+        missing outside the runs, by Laplace's rule of succession.
         """
         lengths = np.array([len(run.distinct) for run in self.runs], dtype=int)
         inside = sum(len(run.name) for run in self.runs)
@@ -86,7 +86,7 @@ class Absence:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """A sentence on each run, with all reasons."""
+        """Return a sentence on each run, with all reasons."""
         return tuple(
             f"No residual tells of the {run.lead}: "
             + " ".join(
@@ -98,10 +98,10 @@ class Absence:
 
 
 def find_absence(survey: Survey, matches: Matches) -> Absence:
-    """Runs of surveyed targets that passed within sight and have no residual.
+    """Find runs of surveyed targets in sight without a residual.
 
-    Within sight is what came as near to the POS as the farthest target that was matched. A target
-    that one pass saw counts in another only where it was found there and refused.
+    A target is in sight if it is as close to the POS as the farthest matched target. A target
+    observed in one pass counts in another only if it was found there and refused.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def find_absence(survey: Survey, matches: Matches) -> Absence:
 
 
 def _absence(sightings: Sequence[tuple[float, str, str | None]], moved: tuple[str, ...]) -> Absence:
-    """The Absence of sightings (time, name, reason or None) in order of time."""
+    """Absence of sightings (time, name, reason or None) in order of time."""
     runs = []
     for is_missing, group in groupby(sightings, key=lambda sighting: sighting[2] is not None):
         part = list(group)

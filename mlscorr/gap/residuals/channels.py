@@ -1,7 +1,7 @@
-"""What each patch tells of itself: its roughness, and how many of its pulses returned.
+"""Channels of single patches: roughness, and share of returning pulses.
 
-Log intensity is left out: a reference surface has no reflectance, and survey.toml says nothing of
-how strength falls with range, so that there is nothing to compare it with.
+Log intensity is not used: a reference surface has no reflectance, and survey.toml does not state
+the decrease of strength with range, so there is no reference for it.
 """
 
 from dataclasses import replace
@@ -16,12 +16,12 @@ from mlscorr.survey import Survey
 
 
 def rounding_sigma() -> float:
-    """What rounding in a file adds to a coordinate, one sigma of its even errors. Units: m."""
+    """Sigma of a coordinate due to rounding in a file, with uniform errors. Units: m."""
     return SETTINGS.file_step / np.sqrt(12)
 
 
 def _believed_variance(survey, patches):
-    """Variance (p,) about the plane that range and angle noise should make. Units: m^2."""
+    """Variance (p,) about the plane expected from range and angle noise. Units: m^2."""
     p, samples = patches.time.shape
     time = patches.time.ravel()
     xyz = patches.xyz.reshape(-1, 3)
@@ -35,8 +35,8 @@ def _believed_variance(survey, patches):
 
 
 def _sweep(survey, sight, time):
-    """How a point moves (n, 3) as its scan angle grows, m per rad; as if the scanner turned about
-    the driving direction where the mounting is not known.
+    """Motion (n, 3) of a point with its scan angle, m per rad; as if the scanner turned about
+    the driving direction if the mounting is unknown.
     """
     mounting = survey.mounting
     axis = np.array([0.0, 1.0, 0.0])
@@ -48,7 +48,7 @@ def _sweep(survey, sight, time):
 def log_roughness(
     variance: np.ndarray, believed: np.ndarray, points: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Log of a variance about a plane over the believed one, without its bias, and its variance.
+    """Unbiased log of a variance about a plane over the assumed one, and its variance.
 
     Mean and variance of the logarithm of chi^2 / freedom, to the second order.
 
@@ -66,7 +66,7 @@ def log_roughness(
 def roughness(
     survey: Survey, patches: Patches
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """How rough patches are beside what the scanner is believed to make.
+    """Roughness of patches relative to the assumed scanner noise.
 
     Parameters
     ----------
@@ -76,8 +76,8 @@ def roughness(
     Returns
     -------
     tuple of four (p,) arrays
-        Log variance ratio, its variance, the believed variance (m^2), and which patches count:
-        none that is curved does, whatever the noise, nor any where the scanner's noise is assumed.
+        Log variance ratio, its variance, the assumed variance (m^2), and flags of patches that
+        count: curved ones never do, and none do if the scanner's noise is a default.
     """
     believed = _believed_variance(survey, patches)
     ratio, variance = log_roughness(patches.variance, believed, patches.points)
@@ -86,9 +86,9 @@ def roughness(
 
 
 def beside_seen_noise(rows: Rows) -> tuple[Rows, tuple[str, ...]]:
-    """Rows beside a scanner that is no noisier than the cloud, and a sentence where one was.
+    """Rows for a scanner that is not noisier than the cloud, and a sentence if it was.
 
-    Noise only adds: of a scanner that is believed too noisy no effect makes a quieter one.
+    Noise only adds: no effect makes a scanner quieter if its assumed noise is too large.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def beside_seen_noise(rows: Rows) -> tuple[Rows, tuple[str, ...]]:
         offset = float(np.median(rows.residual[rough]))
     else:
         offset = 0.0
-    if offset > -np.log(2):  # half the variance: more than planes differ by among themselves
+    if offset > -np.log(2):  # half the variance: more than planes differ among themselves
         return rows, ()
     quiet = replace(
         rows,
@@ -113,7 +113,7 @@ def beside_seen_noise(rows: Rows) -> tuple[Rows, tuple[str, ...]]:
 
 
 def return_rate(patches: Patches) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Share of pulses that returned from patches beside the believed 1.
+    """Share of returning pulses of patches, relative to the assumed 1.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def return_rate(patches: Patches) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     Returns
     -------
     tuple of three (p,) arrays
-        Share minus 1, its variance where all lose alike, and which patches count: none where the
+        Share minus 1, its variance for equal losses, and flags of patches that count: none if the
         median share is so low that the cloud must have been thinned.
     """
     fired = np.maximum(patches.fired, 1)
@@ -134,10 +134,10 @@ def return_rate(patches: Patches) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def loss_variance(share: np.ndarray, fired: np.ndarray, counted: np.ndarray) -> np.ndarray:
-    """Variance (p,) of the shares of pulses that return where all patches lose alike.
+    """Variance (p,) of the shares of returning pulses if all patches have the same loss.
 
-    It is of what the patches lose together, not each of them: few pulses are lost by chance, and a
-    patch that has lost none would seem to know so.
+    It uses the common loss of the patches instead of each single one, because few pulses are lost
+    by chance, and a patch without losses would get a variance of zero.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def loss_variance(share: np.ndarray, fired: np.ndarray, counted: np.ndarray) -> 
     fired : (p,) array
         Pulses.
     counted : (p,) bool array
-        Patches that say so; of these the tenth that loses most, crowns and edges, is left out.
+        Patches to use; the tenth of them with the largest loss, crowns and edges, is omitted.
     """
     share_lost = 1.0 - share[counted]
     if counted.any():
@@ -162,7 +162,7 @@ def loss_variance(share: np.ndarray, fired: np.ndarray, counted: np.ndarray) -> 
 
 
 def with_loss_variance(rows: Rows) -> Rows:
-    """Rows whose return rates have the variance that their losses show.
+    """Return rows whose return rates have the variance indicated by their losses.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Like with like: what a survey observed minus what its simulation says, as Rows."""
+"""Pairing of observations with their simulation, as Rows."""
 
 from dataclasses import dataclass
 
@@ -36,16 +36,16 @@ NO_INTENSITY = (
 
 @dataclass(frozen=True)
 class Pairing:
-    """A survey compared with its simulation.
+    """Survey compared with its simulation.
 
     Parameters
     ----------
     rows : Rows
-        What the diagnosis may use.
+        Rows for the diagnosis.
     check : Rows
-        Check points: never used in an estimate, kept apart to be held out.
+        Check points, never used in an estimate, only for the final test.
     notes : tuple of str
-        What could not be compared, and why.
+        Items that could not be compared, with reasons.
     """
 
     rows: Rows
@@ -61,30 +61,31 @@ def build_rows(
     limit: int = SETTINGS.patches,
     correction: Correction | None = None,
 ) -> Pairing:
-    """Compare a survey with what its simulator believes: targets, surfaces, channels.
+    """Compare a survey with its simulator's assumptions: targets, surfaces, channels.
 
-    The believed simulation puts targets where they were surveyed, surfaces where the reference
-    is, planes of two passes on each other. Check points go to ``check``.
+    The simulation has targets at their surveyed positions, surfaces on the reference, and planes of
+    two passes on each other. Check points go to ``check``.
 
     Parameters
     ----------
     survey : Survey
     matched : TargetObservations
-        Matched ones of control and check points.
+        Matched observations of control and check points.
     candidates : Candidates
-        The points near targets, as find_targets returns them.
+        Points near targets, from find_targets.
     patches : Patches or None
-        Of its clouds, as find_patches gives them.
+        Patches of its clouds, from find_patches.
     limit : int
-        Of the patches on surfaces, and as many in shared planes: the same choice each time.
+        Largest number of patches on surfaces, and of those in shared planes; the choice is
+        reproducible.
     correction : Correction, optional
-        By which patches find their like, where metres of drift put them before something else.
-        What is compared is as recorded.
+        Used to pair patches if drift of meters would pair them wrongly. Recorded positions are
+        compared.
 
     Raises
     ------
     ValueError
-        For a reference surface that can't be used, or when there is nothing to compare.
+        If the reference surface is unusable, or there is nothing to compare.
 
     >>> import numpy as np, tempfile
     >>> from mlscorr.gap.residuals.patches import find_patches
@@ -124,17 +125,17 @@ def build_rows(
 
 
 def target_rows(survey: Survey, matched: TargetObservations, candidates: Candidates) -> Rows:
-    """Rows of matched targets, three each: along the axes of the extraction's covariance.
+    """Make rows of matched targets, three each, along the axes of the extraction's covariance.
 
-    So their noise is independent; where it is diagonal the axes are E, N and H. The item is the
-    observation's row, its pulses are points within the target's outline.
+    Their noise is then independent; for a diagonal covariance the axes are E, N and H. The item is
+    the observation's row; its pulses are points within the target's outline.
 
     Parameters
     ----------
     survey : Survey
     matched : TargetObservations
     candidates : Candidates
-        The points on them.
+        Points on the targets.
     """
     pairs = Matched.by_name(matched, survey.surveyed)
     axes, variance = _axes(matched.covariance)
@@ -163,7 +164,7 @@ def target_rows(survey: Survey, matched: TargetObservations, candidates: Candida
 def _axes(covariance):
     """Unit axes (n, 3, 3), in rows, of covariances (n, 3, 3), and the variances (n, 3) along them.
 
-    Each row is the axis nearest to E, N or H, in turn, and points that way.
+    Each row is the axis nearest to E, N or H, with positive direction.
     """
     variance, axes = np.linalg.eigh(covariance)
     axes = axes.swapaxes(1, 2)
@@ -191,7 +192,7 @@ def _near(matched, candidates):
 
 
 def _target_pulses(survey, matched, i, cloud):
-    """Pulses on one observed target, evenly taken; its centre alone where no point is near."""
+    """Pulses on one observed target, evenly sampled; only its center if no point is near."""
     if len(cloud) == 0:
         xyz = matched.position[[i]]
         time = matched.gps_time[[i]]
@@ -214,7 +215,7 @@ def _no_pulses():
 
 
 def _patch_rows(survey, patches, limit, correction, notes):
-    """Parts of the Rows that patches give; appends to the notes what they don't."""
+    """Parts of the Rows from patches; adds notes on what is missing."""
     parts = []
     rng = np.random.default_rng(0)
     shared = shared_rows(survey, patches, rng, limit, correction)
@@ -248,9 +249,9 @@ def _covered(survey, patches):
 
 
 def patch_rows(survey: Survey, patches: Patches, surface: OnReference | None = None) -> Rows:
-    """Rows of patches: distance from the reference where it is given, roughness, return rate.
+    """Make rows of patches: distance from the reference if given, roughness, return rate.
 
-    The item is the patch's number, shared by its rows.
+    The item is the patch's index, shared by its rows.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""Flat pieces of the cloud: small in space and in time, each with the plane that fits it.
+"""Flat patches of the cloud: small in space and in time, each with its fitted plane.
 
-They are found while the cloud is streamed; of each patch only its moments and some points stay in
-memory.
+They are found while the cloud is streamed; only the moments and some points of each patch are kept
+in memory.
 """
 
 from collections.abc import Callable, Iterable
@@ -27,7 +27,7 @@ from mlscorr.targets import SETTINGS as TARGETS
 
 @dataclass(frozen=True, repr=False)
 class Patches(Columns):
-    """Flat pieces of the cloud, in no order.
+    """Flat patches of the cloud, unordered.
 
     Parameters
     ----------
@@ -37,25 +37,25 @@ class Patches(Columns):
     centre : (p, 3) array
         Mean of the points on the plane. Units: m.
     normal : (p, 3) array
-        Towards the scanner.
+        Toward the scanner.
     variance : (p,) array
-        About the plane, with the plane's three parameters reckoned. Units: m^2.
+        Variance about the plane, accounting for its three parameters. Units: m^2.
     spread : (p,) array
         One sigma of the points along the plane's narrow direction. Units: m.
     ripple : (p,) array
-        Variance about the plane over that between points which follow each other: about 1 for
-        noise, more for what is curved.
+        Variance about the plane over that between consecutive points: about 1 for noise, more for
+        curved surfaces.
     points : (p,) int array
         On the plane.
     fired, returned : (p,) int array
-        Pulses between the first and the last return of each scan line on it; zeros where the time
-        stamps have no regular step.
+        Pulses between the first and the last return of each scan line on it; zero without regular
+        time stamps.
     block : (p,) array
-        Random number from 0 to 1, the same for neighbours.
+        Random number from 0 to 1, the same for neighbors.
     xyz : (p, 12, 3), time, intensity : (p, 12) arrays
-        Points of each patch, evenly taken in time.
+        Points of each patch, evenly sampled in time.
     cloud : (p,) array of PointCloud
-        Points on each plane in order of time, at most 400, for the simulator to fire again.
+        Points on each plane in order of time, at most 400, for replay in the simulator.
     """
 
     pass_number: np.ndarray
@@ -76,15 +76,15 @@ class Patches(Columns):
 
 
 def fit_patches(survey: Survey, cloud: PointCloud, number: np.ndarray) -> Patches | None:
-    """Patches of a part of a pass, without its number; None where there is none.
+    """Fit patches in a part of a pass, without its number; None if there are none.
 
     Parameters
     ----------
     survey : Survey
     cloud : PointCloud
-        n points: all of their moments.
+        n points, with complete moments.
     number : (n,) int array
-        Of each in its file: points of numbers that follow each other were measured so.
+        Index of each in its file; consecutive indices were measured consecutively.
     """
     search = search_planes(cloud, survey.trajectory.position[0])
     rows = search.rows
@@ -127,7 +127,9 @@ def fit_patches(survey: Survey, cloud: PointCloud, number: np.ndarray) -> Patche
 
 
 def _is_whole(centre, normal, variance):
-    """Whether each plane (g,) shows all its noise: near a cell's face, along it, half is beyond."""
+    """Flag (g,) of planes that show all their noise; close and parallel to a cell's face, half
+    is beyond.
+    """
     inside = centre - cell_corner(centre)
     depth = np.minimum(inside, SETTINGS.cell - inside)
     return (depth > SETTINGS.trims[-1] * np.sqrt(variance)[:, None] * np.abs(normal)).all(axis=1)
@@ -150,7 +152,7 @@ def _points_on_planes(cloud, rows, group):
 
 
 def _taken(rows, points):
-    """Places (g, 12) of rows (n,) of planes (g,), evenly spread; repeated where few are."""
+    """Positions (g, 12) of rows (n,) of planes (g,), evenly spread; repeated if there are few."""
     begin = np.cumsum(points) - points
     step = points[:, None] * (np.arange(SETTINGS.samples) + 0.5) / SETTINGS.samples
     return rows[begin[:, None] + step.astype(int)]
@@ -164,10 +166,10 @@ def _sight(survey, chunk, sample):
 
 
 def _misses(gps_time, number, first, group):
-    """Pulses fired and returned within the scan lines of a group, their ends not counted.
+    """Pulses fired and returned within the scan lines of a group, excluding their ends.
 
-    The step of pulses is the least one of the group. Nothing is counted where pauses are not whole
-    multiples of it (jitter, another order), or too many are long (a cloud that was thinned there).
+    The pulse step is the smallest one of the group. Nothing is counted if pauses are not multiples
+    of it (jitter, another order), or too many are long (a thinned cloud).
     """
     pause = np.diff(gps_time, append=gps_time[-1])
     follows = np.append((np.diff(number) == 1) & (np.diff(group) == 0), False) & (pause > 0)
@@ -185,16 +187,16 @@ def _misses(gps_time, number, first, group):
     whole = count(near & (np.abs(pulses % 1 - 0.5) > 0.4))
     interrupted = count(longer)
     regular = (whole >= SETTINGS.rule * pauses) & (interrupted <= (1 - SETTINGS.rule) / 2 * pauses)
-    # a line's first and last returns are there by choice: what lies between them counts
+    # a line's first and last returns are selected: only those in between count
     fired = np.add.reduceat(np.round(pulses).astype(int), first) - lines
     return np.where(regular, fired, 0), np.where(regular, pauses - lines, 0)
 
 
 class PatchCollector:
-    """Keeps at most `pool` flat patches of the chunks that it is given, spread over the place.
+    """Collector of at most `pool` flat patches of chunks, spread over the area.
 
-    A hash of their place chooses the blocks of the ground: the same in all passes.
-    Patches do not depend on chunks, where points come about in order of time (see MomentStream).
+    Ground blocks are selected by a hash of their position, the same in all passes. Patches do not
+    depend on chunks if points are roughly in order of time (see MomentStream).
 
     Parameters
     ----------
@@ -211,7 +213,7 @@ class PatchCollector:
         self._stream = MomentStream(survey.trajectory)
 
     def add(self, file: CloudFile, chunk: PointCloud) -> None:
-        """Take a chunk of a file; the chunks of a file follow each other."""
+        """Add a chunk of a file; the chunks of a file must be in sequence."""
         source = self._survey.clouds.index(file)
         if source != self._source:
             self._fit(np.inf)
@@ -226,16 +228,18 @@ class PatchCollector:
         self._fit(chunk.gps_time[-1] if len(chunk) else np.inf)
 
     def _fit(self, time):
-        """Keep the patches of the moments that are whole at a time (s)."""
-        for segment, cloud, number in self._stream.moments(time):  # memory follows the largest
+        """Keep the patches of the moments that are complete at a time (s)."""
+        for segment, cloud, number in self._stream.moments(time):  # memory depends on the largest
             patches = fit_patches(self._survey, cloud, number)
             if patches is not None:
-                group = self._source * self._starts.shape[1] + segment  # until all is read
+                group = self._source * self._starts.shape[1] + segment  # until everything is read
                 patches = replace(patches, pass_number=np.full(len(patches), group))
                 self._patches.add(patches, patches.block)
 
     def patches(self) -> Patches | None:
-        """Patches of all chunks, of which none follows, by pass and place; None where none is."""
+        """Return the patches of all chunks, after the last one, by pass and position; None
+        without any.
+        """
         self._fit(np.inf)
         parts = self._patches.parts()
         if not any(map(len, parts)):
@@ -251,19 +255,19 @@ def find_patches(
     pool: int = SETTINGS.pool,
     chunks: Callable[[CloudFile], Iterable[PointCloud]] = read_chunks,
 ) -> Patches | None:
-    """Stream all clouds of a survey and keep at most `pool` flat patches: see PatchCollector.
+    """Stream all clouds of a survey and keep at most `pool` flat patches; see PatchCollector.
 
     Parameters
     ----------
     survey : Survey
     pool : int
     chunks : function of a CloudFile
-        Gives an iterator of PointCloud.
+        Returns an iterator of PointCloud.
 
     Returns
     -------
     Patches or None
-        None where the clouds hold no flat patch.
+        None if the clouds have no flat patch.
     """
     collector = PatchCollector(survey, pool)
     for file in survey.clouds:

@@ -1,6 +1,4 @@
-"""Observed minus simulated as scalar rows: what each is, what the POS is believed to err by in it,
-and what it may depend on: when, where and how a thing was seen.
-"""
+"""Observed minus simulated as scalar rows, with POS errors and covariates."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
@@ -21,7 +19,7 @@ METRIC = ("target", "surface", "shared")  # in m along a direction; the others h
 
 @dataclass(frozen=True, repr=False)
 class SamplePulses(Columns):
-    """A few pulses of each item, as recorded: what effects are applied to, with and without.
+    """A few recorded pulses of each item, to which effects are applied.
 
     Parameters
     ----------
@@ -32,9 +30,9 @@ class SamplePulses(Columns):
     gps_time : (k,) array
         Units: s.
     xyz : (k, 3) array
-        On the map, georeferenced with what was recorded. Units: m.
+        Map coordinates, georeferenced with the recorded data. Units: m.
     scanner_xyz : (k, 3) array
-        In the scanner's frame; NaN where the mounting is not known. Units: m.
+        In the scanner's frame; NaN if the mounting is unknown. Units: m.
     intensity : (k,) array
         Counts of 16 bits.
     normal : (k, 3) array
@@ -55,7 +53,7 @@ class SamplePulses(Columns):
 
 @dataclass(frozen=True)
 class Rows:
-    """Observed minus simulated, one scalar a row.
+    """Observed minus simulated, one scalar per row.
 
     Rows of one item share time, place and pulses: the three of a target, patch and roughness.
 
@@ -64,34 +62,34 @@ class Rows:
     channel : (m,) str array
         target, surface, shared, roughness or return_rate.
     item : (m,) int array
-        Which observed thing: target and pass, patch, pair of patches.
+        Index of the observed item: target and pass, patch, pair of patches.
     survey_item : (m,) int array
         Row of ``targets`` whose survey error this row has; -1 for none.
     gps_time, gps_time_2 : (m,) array
-        When it was seen; for a plane that was seen twice the first and the second time, else NaN
-        as the second. Units: s.
+        Time of the observation; for a plane in an overlap the first and the second time, otherwise
+        NaN as the second. Units: s.
     position : (m, 3) array
-        Where, as observed. Units: m.
+        Observed position. Units: m.
     direction : (m, 3) array
         Unit vector on the map along which the residual is measured; zero for channels without a
         unit.
     residual : (m,) array
         Target and surface: observed - simulated along the direction (m), which is minus the
         misclosure. Shared: first - second along it (m). Roughness: log of the variance about the
-        plane over the believed one. Return rate: difference of the shares that returned.
+        plane over the assumed one. Return rate: difference of the shares that returned.
     noise : (m,) array
-        Variance of what is each row's own: extraction, mean of a patch, as the points' scatter
-        shows it, so that a noise that the simulator doesn't know is in it. In the residual's unit.
+        Variance of each row's own noise: extraction, or mean of a patch, from the points' scatter,
+        so that it includes noise unknown to the simulator. In the residual's unit.
     survey : (m,) array
         Variance of the target's survey error along the direction. Units: m^2.
     survey_factor : (m, 3) array
-        Of two rows of one survey_item, the survey error's covariance is the product of these
+        For two rows of one survey_item, the survey error's covariance is the product of these
         vectors; ``survey`` is their squared length. Units: m.
     points : (m,) int array
-        Number of returns that the row rests on.
+        Number of returns behind the row.
     believed : (m,) array
-        Variance about the plane (m^2) or share of returns that the simulator believes in; NaN for
-        the others.
+        Variance about the plane (m^2) or share of returns assumed by the simulator; NaN for the
+        others.
     partials, partials_2 : (m, 6) array
         Of the residual by the pose (position in m; rotation about map axes in rad) at each of the
         two times: direction . [I, -Phi(G)]; the second has its minus sign, and is zero without a
@@ -99,13 +97,13 @@ class Rows:
     covariates : dict of (m,) arrays
         time (s from the start), location (m along the first pass), range (m), incidence (rad),
         scan_angle (rad), intensity (log10 counts), speed (m/s), turn_rate (rad/s, to the right),
-        heading (rad), pass (from 1), axis (0, 1, 2: E, N, H, the direction's largest component;
-        -1 without one). NaN where it is not known.
+        heading (rad), pass (from 1), axis (0, 1, 2: E, N, H, the direction's largest component; -1
+        without one). NaN if unknown.
     pulses : SamplePulses
     targets : ControlPoints
-        The surveyed targets, control and check together.
+        All surveyed targets, control and check.
     reference : Reference
-        What effects refer to.
+        Reference of effects.
     """
 
     channel: np.ndarray
@@ -133,16 +131,16 @@ class Rows:
 
     @property
     def metric(self) -> np.ndarray:
-        """Which rows have a residual in m: (m,) bool."""
+        """Flag (m,) of rows with a residual in m."""
         return np.isin(self.channel, METRIC)
 
     @property
     def two_times(self) -> np.ndarray:
-        """Which rows compare two times: (m,) bool."""
+        """Flag (m,) of rows that compare two times."""
         return np.isfinite(self.gps_time_2)
 
     def select(self, rows: np.ndarray) -> "Rows":
-        """Some rows with the pulses of their items; items keep their numbers.
+        """Select some rows with the pulses of their items; items keep their indices.
 
         Parameters
         ----------
@@ -158,7 +156,7 @@ class Rows:
 
     @classmethod
     def concatenate(cls, subsets: Iterable["Rows"]) -> "Rows":
-        """All rows of parts of one survey; items are numbered anew from 0, part after part."""
+        """Concatenate rows of one survey; items are renumbered from 0, part by part."""
         parts = []
         first = 0
         for rows in subsets:
@@ -182,7 +180,7 @@ class Rows:
         )
 
     def survey_design(self) -> csr_array:
-        """U, sparse (m, 3 targets): U U^T is the covariance of the survey errors in the rows."""
+        """Sparse U (m, 3 targets), with U U^T the covariance of the survey errors in the rows."""
         rows = np.flatnonzero(self.survey_item >= 0)
         column = 3 * self.survey_item[rows, None] + np.arange(3)
         entries = self.survey_factor[rows].ravel(), (np.repeat(rows, 3), column.ravel())
@@ -190,18 +188,18 @@ class Rows:
 
 
 def _arrays(rows):
-    """Names of the fields that are arrays, of m rows each."""
+    """Names of the fields that are arrays with m rows each."""
     return [f.name for f in fields(rows) if isinstance(getattr(rows, f.name), np.ndarray)]
 
 
 @dataclass(frozen=True)
 class Background:
-    """What the POS is believed to err by, in each row: one leg for each time that a row has.
+    """Assumed POS errors of each row, with one leg for each time of a row.
 
     The error of row i is the sum over its legs of position . a(t) + attitude . b(t), with a and b
-    (3,) processes of unit variance; the factor on each, the correlation times and the families
-    are for the inference to choose, and where the stated sigma is raised a factor of its own. The
-    position's error starts anew where the POS falls back.
+    (3,) processes of unit variance; the factor on each, the correlation times and the families are
+    chosen by the inference, with a separate factor where the stated sigma is increased. The
+    position error restarts at GNSS re-acquisition.
 
     Parameters
     ----------
@@ -211,15 +209,13 @@ class Background:
     position, attitude : (l, 3) array
         Units: m.
     correlation_time : float
-        As believed. Units: s.
+        Prior correlation time. Units: s.
     windows : tuple of (start, length, factor, shape)
-        In which it is believed to be worse, see Pos.
+        Intervals in which it is assumed to be worse; see Pos.
     clock : (l,) array, optional
-        The position's own time, which leaps where its error starts anew; gps_time by default.
-        Units: s.
+        Clock of the position error, which jumps where it restarts; gps_time by default. Units: s.
     raised : (l,) int array, optional
-        Number of the stretch in which the stated sigma is raised, from 0; -1, as by default, where
-        it isn't.
+        Index of the interval with increased stated sigma, from 0; -1, the default, outside.
     """
 
     row: np.ndarray
@@ -233,13 +229,13 @@ class Background:
 
 
 def background(rows: Rows, survey: Survey) -> Background:
-    """Background of the metric rows, from the POS's own sigmas or those of survey.toml.
+    """Make the Background of the metric rows, from the POS's own sigmas or those of survey.toml.
 
     Parameters
     ----------
     rows : Rows
     survey : Survey
-        Of which they are.
+        Survey of the rows.
     """
     first = np.flatnonzero(rows.metric)
     second = np.flatnonzero(rows.two_times)
@@ -260,7 +256,7 @@ def background(rows: Rows, survey: Survey) -> Background:
 
 
 def _reference_of(survey: Survey) -> Reference:
-    """What a survey's effects refer to: its trajectory's span, the mean of all its targets.
+    """Reference of a survey's effects: its trajectory's time span, the mean of all its targets.
 
     Parameters
     ----------
@@ -276,7 +272,7 @@ def _reference_of(survey: Survey) -> Reference:
 
 
 def scanner_origin(survey: Survey, gps_time: np.ndarray) -> np.ndarray:
-    """Where the scanner was; the navigation centre where the mounting is not known.
+    """Position of the scanner, or of the navigation center if the mounting is unknown.
 
     Parameters
     ----------
@@ -293,7 +289,7 @@ def scanner_origin(survey: Survey, gps_time: np.ndarray) -> np.ndarray:
 
 
 def to_scanner_or_nan(survey: Survey, xyz: np.ndarray, gps_time: np.ndarray) -> np.ndarray:
-    """Scanner coordinates of map points; NaN where the mounting is not known.
+    """Scanner coordinates of map points; NaN if the mounting is unknown.
 
     Parameters
     ----------
@@ -322,7 +318,7 @@ def covariates(
     pass_number: np.ndarray,
     direction: np.ndarray,
 ) -> dict[str, np.ndarray]:
-    """Covariates (m,) of items or rows by their names; see Rows.
+    """Compute covariates (m,) of items or rows by name; see Rows.
 
     Parameters
     ----------
@@ -354,7 +350,7 @@ def covariates(
 
 
 def _mean_of(pulse_item, item):
-    """Function that gives an item's mean (m,) of values (k,) of the pulses."""
+    """Function that returns an item's mean (m,) of values (k,) of the pulses."""
     known, row = np.unique(pulse_item, return_inverse=True)
     count = np.bincount(row)
     place = np.searchsorted(known, item)
@@ -368,7 +364,7 @@ def _mean_of(pulse_item, item):
 def poses_about(
     trajectory: Trajectory, gps_time: np.ndarray, lag: float
 ) -> tuple[Trajectory, Trajectory]:
-    """Poses shortly before and after times (k,), within their passes.
+    """Interpolate poses shortly before and after times (k,), within their passes.
 
     Parameters
     ----------
@@ -395,7 +391,7 @@ def _motion(trajectory, gps_time):
 
 
 def _location(trajectory, gps_time, position):
-    """Way (m,) along the first pass to the place beside it; along its own pass, where that is far.
+    """Distance (m,) along the first pass, or along its own pass if that is far. Units: m.
 
     Units: m.
     """
@@ -427,13 +423,13 @@ def assemble(
     survey_factor: np.ndarray | None = None,
     believed: np.ndarray | None = None,
 ) -> Rows:
-    """Rows of a survey, with partials and covariates.
+    """Assemble rows of a survey, with partials and covariates.
 
     Parameters
     ----------
     survey : Survey
     channel, ..., believed : (m, ...) arrays
-        As in Rows. What isn't given is nothing: one time, no survey error, no belief.
+        See ``Rows``. Missing arguments mean one time, no survey error, no assumed value.
     pulses : SamplePulses
     pass_number : (m,) int array
         From 1.
@@ -470,7 +466,7 @@ def assemble(
 
 
 def _partials(survey, position, gps_time, direction):
-    """Partial derivatives (m, 6) along the directions by the pose."""
+    """Partial derivatives (m, 6) along the directions with respect to the pose."""
     return np.einsum("mi,mij->mj", direction, pose_partials(survey.trajectory, position, gps_time))
 
 
@@ -483,13 +479,13 @@ def sample_pulses(
     intensity: np.ndarray,
     normal: np.ndarray,
 ) -> SamplePulses:
-    """Pulses that made points on surfaces.
+    """Make the pulses behind points on surfaces.
 
     Parameters
     ----------
     survey : Survey
     item, weight, xyz, gps_time, intensity, normal : (k, ...) arrays
-        As in SamplePulses.
+        See ``SamplePulses``.
     """
     beam = xyz - scanner_origin(survey, gps_time)
     beam /= np.linalg.norm(beam, axis=1, keepdims=True)

@@ -1,8 +1,7 @@
-"""A survey against the clouds that a simulator made of it: by beams, targets and patches.
+"""Comparison of a survey with clouds from its simulator: by beams, targets and patches.
 
-Beams are paired by their times; a patch whose times the simulated cloud doesn't have, or has for
-beams that went elsewhere, as under another clock, is compared with the simulated patch at its
-place.
+Beams are paired by time. If the simulated cloud lacks the times of a patch, or has them for other
+beams, as with another clock, the patch is compared with the simulated patch at its position.
 """
 
 from collections.abc import Sequence
@@ -32,14 +31,14 @@ from mlscorr.targets import Candidates
 
 
 class SimulatedBeams:
-    """The simulated points of the pulses behind a survey's patches, of chunks that it is given.
+    """Simulated points of the pulses behind a survey's patches, from chunks.
 
     Parameters
     ----------
     patches : Patches
         Of the survey.
     correction : Correction, optional
-        Of the survey: a simulator may have its error, or not.
+        Of the survey; the simulator may or may not include its error.
     """
 
     def __init__(self, patches: Patches, correction: Correction | None = None):
@@ -54,7 +53,7 @@ class SimulatedBeams:
         self.xyz = np.full((len(time), 3), np.nan)
 
     def add(self, chunk: PointCloud) -> None:
-        """Take the points of the same pulses: of several of one time the nearest."""
+        """Add the points of the same pulses; the nearest one of several with one time."""
         if len(self._time) == 0 or len(chunk) == 0:
             return
         after = np.searchsorted(self._time, chunk.gps_time)
@@ -71,32 +70,32 @@ class SimulatedBeams:
         self.xyz[place[closer]] = xyz[closer]
 
     def _distance(self, xyz, place):
-        """How far points (n, 3) lie from the observed, or the corrected one at a place."""
+        """Distance of points (n, 3) from the observed, or corrected, ones at a position."""
         apart = xyz - self._observed[place]
         moved = self._moved[place]
         return np.minimum(*(np.linalg.norm(each, axis=1) for each in (apart, apart - moved)))
 
     @property
     def apart(self) -> np.ndarray:
-        """How far simulated points lie from the observed ones (n, 3); NaN without one. m."""
+        """Offset of simulated points from the observed ones (n, 3); NaN without one. m."""
         return self._observed - self.xyz
 
 
 @dataclass(frozen=True)
 class SimulatedClouds:
-    """What one reading of simulated clouds gives.
+    """Results of reading simulated clouds once.
 
     Parameters
     ----------
     name : str
-        Of their folder.
+        Name of their folder.
     matched : TargetObservations
-        Matched with the surveyed points.
+        Observations matched with the surveyed points.
     patches : Patches or None
     beams : SimulatedBeams or None
-        None where the survey has no patches.
+        None if the survey has no patches.
     correction : Correction, optional
-        By the same control points: what error the simulator has in it.
+        From the same control points: the error included in the simulation.
     """
 
     name: str
@@ -114,7 +113,7 @@ def rows_against(
     simulated: SimulatedClouds,
     correction: Correction | None = None,
 ) -> tuple[Rows, str]:
-    """Rows of observed minus simulated, NaN where nothing is paired, and a sentence on the pairs.
+    """Rows of observed minus simulated, NaN without a pair, and a sentence on the pairs.
 
     Parameters
     ----------
@@ -122,17 +121,17 @@ def rows_against(
     matched : TargetObservations
         Of the survey.
     candidates : Candidates
-        The points near its targets.
+        Points near its targets.
     patches : Patches or None
         Of the survey, for which the SimulatedBeams were collected.
     simulated : SimulatedClouds
     correction : Correction, optional
-        Of the survey, by which patches find their like. What is compared is as recorded.
+        Of the survey, for pairing of patches. Recorded positions are compared.
 
     Raises
     ------
     ValueError
-        For clouds of another survey, place or CRS.
+        If the clouds belong to another survey, location or CRS.
     """
     parts = [_against_targets(survey, matched, candidates, simulated)]
     targets = int(np.isfinite(parts[0].residual).sum()) // 3
@@ -172,7 +171,7 @@ def rows_against(
 
 
 def spread_patches(patches: Patches) -> Patches:
-    """As many patches as are compared, spread over time and directions.
+    """Choose the patches to compare, spread over time and directions.
 
     Parameters
     ----------
@@ -184,19 +183,19 @@ def spread_patches(patches: Patches) -> Patches:
 
 
 def without_unpaired(compared: Sequence[Rows]) -> list[Rows]:
-    """Rows against several simulated clouds, of what all of them have.
+    """Rows against several simulated clouds, limited to those paired in all.
 
     Parameters
     ----------
     compared : sequence of Rows
-        Of the same things, as rows_against gives them.
+        Rows of the same items, from rows_against.
     """
     keep = np.all([np.isfinite(rows.residual) for rows in compared], axis=0)
     return [rows.select(keep) for rows in compared]
 
 
 def _against_targets(survey, matched, candidates, simulated):
-    """Target rows, of the same name at about the same time."""
+    """Target rows with the same name at about the same time."""
     rows = target_rows(survey, matched, candidates)
     other = simulated.matched
     residual = np.full(len(rows), np.nan)
@@ -215,7 +214,9 @@ def _against_targets(survey, matched, candidates, simulated):
 
 
 def _by_beams(survey, patches, near, beams):
-    """Direction (p, 3), residual and its variance (p,) by pulses of the same times; else NaN."""
+    """Direction (p, 3), residual and its variance (p,) from pulses of the same times, otherwise
+    NaN.
+    """
     normal = patches.normal
     p = len(patches)
     along = np.einsum("ni,ni->n", beams.apart, normal[beams.patch])
@@ -238,7 +239,7 @@ def _by_beams(survey, patches, near, beams):
 
 
 def _credible(survey, patches, near, direction, residual):
-    """Residuals (p,) with NaN for those of another surface, as told where the patches belong."""
+    """Residuals (p,), with NaN for those on another surface, judged at the true positions."""
     left = residual + np.einsum("pi,pi->p", direction, near.centre - patches.centre)
     residual = np.where(np.abs(left) <= gate(survey, patches.gps_time), residual, np.nan)
     known = np.flatnonzero(np.isfinite(residual))
@@ -248,7 +249,7 @@ def _credible(survey, patches, near, direction, residual):
 
 
 def _nearest(patches, simulated):
-    """The simulated patch (p,) at each patch's place and time, parallel to it; -1 without one."""
+    """Simulated patch (p,) at each patch's position and time, parallel to it; -1 without one."""
     radius = SETTINGS.pair_distance * SETTINGS.cell
     near = cKDTree(simulated.centre).query_ball_point(patches.centre, radius)
     other = np.full(len(patches), -1)
@@ -263,7 +264,7 @@ def _nearest(patches, simulated):
 
 
 def _by_place(survey, patches, near, simulated, other):
-    """As _by_beams, by patches of the same places."""
+    """Same as _by_beams, from patches at the same positions."""
     pair = simulated[np.maximum(other, 0)]
     normal, between, _ = compare_planes(near, pair)
     noise = plane_noise(patches, pair, (between**2).sum(axis=1))
@@ -273,7 +274,7 @@ def _by_place(survey, patches, near, simulated, other):
 
 
 def _against_channels(rows, survey, simulated, other):
-    """Roughness and return rates less those of the simulated patches; NaN without one."""
+    """Roughness and return rates minus those of the simulated patches; NaN without one."""
     residual = rows.residual.copy()
     noise = rows.noise.copy()
     believed = rows.believed.copy()
@@ -292,13 +293,14 @@ def _against_channels(rows, survey, simulated, other):
         residual[on] = np.where(has, residual[on] - value[pair], np.nan)
         noise[on] += np.where(has, variance[pair], 0.0)
         if channel == "roughness" and has.any():
-            # a patch's own would share its chance with the residual, which then tells of noise
+            # a patch's own rate would be correlated with the residual, which would then indicate
+            # noise
             believed[on] *= np.exp(np.median(value[pair[has]]))
     return replace(rows, residual=residual, noise=noise, believed=believed)
 
 
 def _beside(survey, matched):
-    """A sentence on how far simulated targets stand from where they were surveyed."""
+    """Sentence on the offset of simulated targets from their surveyed positions."""
     misclosure = Matched.by_name(matched, survey.surveyed).misclosure
     middle = "/".join(f"{v:+.3f}" for v in -np.median(misclosure, axis=0))
     return (
@@ -308,7 +310,7 @@ def _beside(survey, matched):
 
 
 def _elsewhere(survey, patches, simulated):
-    """The sentence for clouds that have nothing of the survey."""
+    """Sentence on clouds that do not overlap the survey."""
     where = "holds neither a flat patch nor a matched target"
     if patches is not None and simulated.patches is not None:
         away, _ = cKDTree(simulated.patches.centre).query(patches.centre)

@@ -1,4 +1,4 @@
-"""What each effect does to the rows."""
+"""Signatures: the change of the rows by each effect."""
 
 from mlscorr.gap.signatures._displacements import displacements
 from mlscorr.gap.signatures._signatures import (

@@ -1,4 +1,4 @@
-"""Which way the errors of a vehicle and its scanner would move an item, each time it was seen."""
+"""Displacement directions of items by errors of a vehicle and its scanner, for each view."""
 
 from dataclasses import dataclass, replace
 
@@ -10,13 +10,13 @@ from mlscorr.survey import Survey
 
 @dataclass(frozen=True)
 class Displacements:
-    """Of each item, each time it was seen: k, two for a plane that was seen twice.
+    """Displacements of each view of each item: k, with two for a plane in an overlap.
 
     Parameters
     ----------
     item : (k,) int array
     sign : (k,) array
-        Of its shift in the residual.
+        Sign of its shift in the residual.
     directions : dict of (k, 3) arrays
         Displacement on the map by a unit (m, rad or s) of each error.
     covariates : dict of (k,) arrays
@@ -32,7 +32,7 @@ class Displacements:
 
 
 def displacements(rows: Rows, survey: Survey) -> Displacements:
-    """Displacements of the items behind the metric rows of a survey.
+    """Compute displacements of the items behind the metric rows of a survey.
 
     Parameters
     ----------
@@ -89,7 +89,9 @@ def _directions(survey, time, xyz):
 
 
 def _about(trajectory, time):
-    """Poses before and after times (k,): a second difference needs more time than a first one."""
+    """Poses before and after times (k,), with a longer step, because they give second
+    differences.
+    """
     return poses_about(trajectory, time, 2 * SETTINGS.motion_step)
 
 
@@ -100,8 +102,8 @@ def _turning(before, after):
 
 
 def _motion(trajectory, time):
-    """Further covariates: sines of roll and pitch, their rates (rad/s), acceleration (m/s^2), time
-    in the pass.
+    """Further covariates: sines of roll and pitch, their rates (rad/s), acceleration (m/s^2),
+    time in the pass.
     """
     start, end = trajectory.passes[trajectory.segment(time)].T
     before, after = _about(trajectory, time)

@@ -1,6 +1,6 @@
-"""How each effect shows in the rows: derivatives by its parameters, through its own function.
+"""Signatures of effects in the rows: derivatives with respect to their parameters.
 
-What a simulator's effects make of the rows is told by the same functions, beyond the first order.
+The change of the rows by a simulator's effects uses the same functions, beyond first order.
 """
 
 from collections.abc import Iterable, Sequence
@@ -18,23 +18,23 @@ from mlscorr.survey import Statement, Survey
 
 @dataclass(frozen=True)
 class Signature:
-    """How one effect, at one time or of one target where it has such, shows in the rows.
+    """Change of the rows by one effect, at one time or of one target if applicable.
 
     Parameters
     ----------
     kind : class of an Effect
     fixed : dict
-        Parameters that the columns don't stand for: time, width, target.
+        Parameters without columns: time, width, target.
     parameters, units : tuples of p str
     typical : (p,) array
         Usual size of each parameter.
     jacobian : (m, p) array
         Of the residual by each parameter.
     variance : (m,) array
-        A random effect's: of the residual's noise by the magnitude squared.
+        For a random effect: derivative of the noise variance by the squared magnitude.
     growth : (m,) array
-        A random effect's, of roughness rows: at a magnitude x their mean grows by
-        log(1 + growth x^2).
+        For a random effect in roughness rows: at a magnitude x their mean increases by log(1 +
+        growth x^2).
     """
 
     kind: type[Effect]
@@ -48,31 +48,31 @@ class Signature:
 
     @property
     def name(self) -> str:
-        """The effect's name."""
+        """Name of the effect."""
         return self.kind.name
 
     @property
     def is_noise(self) -> bool:
-        """Whether it shows in the rows' variance."""
+        """True if it affects the rows' variance."""
         return bool(self.variance.any() or self.growth.any())
 
     @property
     def is_common(self) -> bool:
-        """Whether its noise is the same for rows of one moment, not each row's own."""
+        """True if its noise is the same for rows of one moment, not independent for each row."""
         return self.is_noise and self.kind.is_of_pose()
 
     def effect(self, estimate: np.ndarray) -> Effect:
-        """The Effect with some parameters.
+        """Return the Effect with some parameters.
 
         Parameters
         ----------
         estimate : (p,) array
-            Of random ones the size alone counts.
+            For random effects only the size counts.
 
         Raises
         ------
         ValueError
-            For what no survey can have.
+            If a value is impossible.
         """
         estimate = np.asarray(estimate, dtype=float)
         if self.kind.is_wave():
@@ -93,17 +93,17 @@ def signatures(
     effects: Iterable[type[Effect]] | None = None,
     rng: np.random.Generator | None = None,
 ) -> tuple[tuple[Signature, ...], dict[str, Statement]]:
-    """Signatures of effects in the rows of a survey, and why others have none.
+    """Compute signatures of effects in the rows of a survey, and reasons for missing ones.
 
-    Deterministic effects are differentiated by steps of a tenth of their usual size to both
+    Deterministic effects are differentiated with steps of a tenth of their usual size to both
     sides. Events (effects with a time) are tried at times spread over the passes, and with several
-    widths where they have one; target outliers with each target; a phase as its two quadratures.
+    widths if they have one; target outliers for each target; a phase as its two quadratures.
 
     Parameters
     ----------
     rows : Rows
     survey : Survey
-        With what is believed of trajectory and mounting.
+        With the assumed trajectory and mounting.
     effects : iterable of Effect classes, optional
         All known ones by default.
     rng : numpy.random.Generator, optional
@@ -112,7 +112,7 @@ def signatures(
     Returns
     -------
     tuple of Signature, dict of Statement
-        By the names of effects without one; a warning where survey.toml could mend that.
+        By name of effects without one; a warning if survey.toml could provide it.
     """
     bench = Bench(rows, survey)
     signs = []
@@ -137,12 +137,12 @@ def signatures(
 
 
 def _tried(bench, kind, bank, rng):
-    """Signatures of an effect; a sentence where one of a user's own can't be tried."""
+    """Signatures of an effect; a sentence if a user's own one cannot be tried."""
     if kind in EFFECTS:
         return [signature(bench, kind, fixed, rng) for fixed in bank]
     try:
         signs = [signature(bench, kind, fixed, rng) for fixed in bank]
-    except (Exception, SystemExit) as error:  # of a user's code: it is left out, not the diagnosis
+    except (Exception, SystemExit) as error:  # of a user's code: the effect is omitted
         return str(error) or type(error).__name__
     metric = bench.rows.metric
     for sign in signs:
@@ -156,22 +156,22 @@ def _tried(bench, kind, bank, rng):
 
 
 def _too_far(rows: Rows, moved: np.ndarray, what: str) -> str:
-    """Why nobody can mean an effect: it moves the things of rows farther than any survey is off.
+    """Sentence on an effect with an implausible unit: it moves items farther than any survey error.
 
     Parameters
     ----------
     rows : Rows
     moved : (m,) array
-        By how much each row is; of each thing, the worst counts. Units: m.
+        Shift of each row; the largest one of each item counts. Units: m.
     what : str
-        Moves them.
+        Moving effect, in words.
 
     Returns
     -------
     str
-        A sentence; nothing where it may be meant.
+        A sentence; empty if it is plausible.
     """
-    # walls don't see a height, nor planes of two passes what moves all alike
+    # walls are insensitive to height, and planes of two passes to common motion
     parts = rows.channel == "target", rows.metric & ~rows.two_times
     part = next((part for part in parts if part.any()), rows.metric)
     number = np.unique(rows.item[part], return_inverse=True)[1]
@@ -188,14 +188,14 @@ def _too_far(rows: Rows, moved: np.ndarray, what: str) -> str:
 
 
 def signature(bench: Bench, kind: type[Effect], fixed: dict, rng: np.random.Generator) -> Signature:
-    """Signature of an effect class.
+    """Compute the signature of an effect class.
 
     Parameters
     ----------
     bench : Bench
     kind : class of an Effect
     fixed : dict
-        Such as the time of an event.
+        For example the time of an event.
     rng : numpy.random.Generator
         For random effects.
     """
@@ -251,8 +251,8 @@ def signature(bench: Bench, kind: type[Effect], fixed: dict, rng: np.random.Gene
 
 
 def _is_seen(rows, fixed):
-    """Whether a row lies where an event that passes is half as large as at its largest, or more:
-    of what shows by its tail alone nobody knows how large it was.
+    """True if a row is within half of the maximum of a transient event; the tail alone does not
+    determine the size.
     """
     times = np.concatenate([rows.gps_time[rows.metric], rows.gps_time_2[rows.two_times]])
     apart = np.abs(times - rows.reference.start - fixed.get("time", 0.0))
@@ -292,7 +292,7 @@ def _bank(kind, rows, survey):
 
 
 def _times(rows, survey, spacing):
-    """Times of events from reference.start, spread over the time in which things were seen. s."""
+    """Times of events from reference.start, spread over the observed time. s."""
     known = rows.gps_time[rows.metric]
     if len(known) == 0:
         return []
@@ -311,13 +311,13 @@ def _times(rows, survey, spacing):
 
 
 def select(signs: Iterable[Signature], rows: Rows, used: np.ndarray) -> tuple[Signature, ...]:
-    """Signatures in some rows alone; of events those that these rows see.
+    """Select signatures in some rows; events only if these rows observe them.
 
     Parameters
     ----------
     signs : iterable of Signature
     rows : Rows
-        Of which the signatures are.
+        Rows of the signatures.
     used : (m,) bool array
     """
     names = ("jacobian", "variance", "growth")
@@ -330,9 +330,9 @@ def select(signs: Iterable[Signature], rows: Rows, used: np.ndarray) -> tuple[Si
 
 
 def expected(rows: Rows, survey: Survey, effects: Iterable[Effect]) -> Change:
-    """What effects that a simulator has already make of the rows: one Change of all.
+    """Change of the rows by the effects already in a simulator, as one Change.
 
-    Take ``shift + log(1 + growth)`` from the residuals, add ``variance`` to their noise.
+    Subtract ``shift + log(1 + growth)`` from the residuals, and add ``variance`` to their noise.
 
     Parameters
     ----------
@@ -343,7 +343,7 @@ def expected(rows: Rows, survey: Survey, effects: Iterable[Effect]) -> Change:
     Raises
     ------
     ValueError
-        For a user's own that moves everything by more than any survey is off.
+        If a user's effect moves everything by more than any survey error.
     """
     bench = Bench(rows, survey)
     total = np.zeros((3, len(rows)))
@@ -357,9 +357,9 @@ def expected(rows: Rows, survey: Survey, effects: Iterable[Effect]) -> Change:
 
 
 def _shift(bench, effect, change):
-    """Shift (m,) that takes what was recorded to what is true: a change, or an opposite effect's.
+    """Shift (m,) from record to truth: by the negative change, or by the opposite effect.
 
-    They differ by twice the second order.
+    The two differ by twice the second order.
     """
     with suppress(ValueError):  # of an effect that has no other sign
         opposite = replace(effect, magnitude=(-np.asarray(effect.magnitude)).tolist())
@@ -368,7 +368,7 @@ def _shift(bench, effect, change):
 
 
 def without_effects(rows: Rows, survey: Survey, effects: Sequence[Effect]) -> Rows:
-    """Rows as observed minus what a simulator with effects expects.
+    """Rows as observed minus the expectation of a simulator with effects.
 
     Parameters
     ----------
@@ -378,7 +378,7 @@ def without_effects(rows: Rows, survey: Survey, effects: Sequence[Effect]) -> Ro
     """
     change = expected(rows, survey, effects)
     common = [effect for effect in effects if effect.random and effect.stage == "pos"]
-    # the noise of each row's own comes from its points, in which theirs is already
+    # each row's own noise comes from its points, and thus already includes theirs
     noise = rows.noise + expected(rows, survey, common).variance
     residual = rows.residual - change.shift - np.log1p(change.growth)
     return replace(rows, residual=residual, noise=noise)
@@ -387,19 +387,19 @@ def without_effects(rows: Rows, survey: Survey, effects: Sequence[Effect]) -> Ro
 def curvature(
     rows: Rows, survey: Survey, parts: Iterable[tuple[Signature, np.ndarray]]
 ) -> np.ndarray:
-    """What effects make of the rows beyond the first order (m,), in the unit of each.
+    """Change of the rows by effects beyond first order (m,), in the unit of each row.
 
     Parameters
     ----------
     rows : Rows
     survey : Survey
     parts : iterable of (Signature, (p,) array)
-        With their sizes. Random ones are left out.
+        With their sizes. Random ones are ignored.
     """
     bench = Bench(rows, survey)
     curved = np.zeros(len(rows))
     for part, size in (pair for pair in parts if not pair[0].kind.random):
         with suppress(ValueError):  # of an effect that has no other sign
-            # truth is what was recorded, less the effect
+            # truth is the record minus the effect
             curved -= bench.change(part.effect(-size)).shift + part.jacobian @ size
     return curved

@@ -1,7 +1,6 @@
-"""What an effect does to the rows: its own function applied, with and without, through Eq. 1.
+"""Changes of the rows by an effect: its own function applied, with and without, through Eq. 1.
 
-Effects turn what is true into what is recorded; to the first order they do the same to what is
-recorded already.
+Effects turn the truth into the record; to first order they have the same effect on the record.
 """
 
 from collections.abc import Iterable
@@ -16,22 +15,22 @@ from mlscorr.gap.residuals import Rows
 from mlscorr.gap.signatures.settings import SETTINGS
 from mlscorr.survey import Survey, Trajectory
 
-FIELDS = ("gps_time", "angle", "range")  # of Returns, in which a point can move
+FIELDS = ("gps_time", "angle", "range")  # of Returns, that move a point
 
 
 @dataclass(frozen=True)
 class Change:
-    """What one effect does to the rows.
+    """Change of the rows by one effect.
 
     Parameters
     ----------
     shift : (m,) array
         Of the residual, in its unit.
     variance : (m,) array
-        That a random effect adds to the residual; to be added to Rows.noise.
+        Variance that a random effect adds to the residual, for addition to Rows.noise.
     growth : (m,) array
-        Of a roughness row, what is added to the variance about the plane, over the believed one:
-        the row's mean grows by log(1 + growth).
+        For a roughness row, the variance added about the plane over the assumed one: the row's mean
+        increases by log(1 + growth).
     """
 
     shift: np.ndarray
@@ -41,13 +40,13 @@ class Change:
 
 @dataclass(frozen=True)
 class Bench:
-    """Rows and their survey, ready to try effects on."""
+    """Rows and their survey, prepared for trying effects."""
 
     rows: Rows
     survey: Survey
 
     def change(self, effect: Effect, rng: np.random.Generator | None = None) -> Change:
-        """What an effect does to the rows.
+        """Compute the change of the rows by an effect.
 
         Parameters
         ----------
@@ -58,7 +57,7 @@ class Bench:
         Raises
         ------
         ValueError
-            For a stage that needs the mounting where that isn't known.
+            If a stage needs the mounting and that is unknown.
         """
         m = len(self.rows)
         stage = effect.stage
@@ -86,7 +85,7 @@ class Bench:
 
     @cached_property
     def returns(self) -> Returns:
-        """The pulses as effects see them, in order of time."""
+        """Pulses as input of effects, in order of time."""
         pulses = self.rows.pulses
         x, y, z = pulses.scanner_xyz[self._order].T
         return Returns(
@@ -116,7 +115,7 @@ class Bench:
         return self._pose.attitude.inv().apply(self._pulses.xyz - self._pose.position)
 
     def _moved(self, returns=None, mounting=None):
-        """How far pulses (k, 3) move on the map when these are recorded instead. Units: m."""
+        """Shift of pulses (k, 3) on the map if these are recorded instead. Units: m."""
         body = self._body
         pose = self._pose
         recorded = self.survey.mounting
@@ -132,7 +131,7 @@ class Bench:
         return all(getattr(returns, name) is getattr(self.returns, name) for name in names)
 
     def _scanner_xyz(self, returns):
-        """X_L (k, 3) of changed returns: the elevation out of the scan plane stays. Units: m."""
+        """X_L (k, 3) of changed returns with the same elevation out of the scan plane. Units: m."""
         sine = self._pulses.scanner_xyz[:, 2] / self.returns.range
         flat = returns.range * np.sqrt(1.0 - sine**2)
         return np.column_stack(
@@ -140,32 +139,32 @@ class Bench:
         )
 
     def _held(self, gps_time):
-        """Times (k,) held within the passes of the pulses, at whose ends they may leave it."""
+        """Times (k,) limited to the passes of the pulses, which they may leave at the ends."""
         trajectory = self.survey.trajectory
         starts, ends = trajectory.passes.T
         number = trajectory.segment(self._pulses.gps_time)
         return np.clip(gps_time, starts[number], ends[number])
 
     def _along(self, moved):
-        """Shift of the residuals (m,) by moves (k, 3) of the pulses."""
+        """Shift of the residuals (m,) from moves (k, 3) of the pulses."""
         return np.einsum("mi,mi->m", self.rows.direction, self._weights @ moved)
 
     @cached_property
     def _weights(self):
-        """Sparse (m, k): the weights of the pulses behind each row."""
+        """Sparse weights (m, k) of the pulses behind each row."""
         items, number = np.unique(self._pulses.item, return_inverse=True)
         entries = self._pulses.weight, (number, np.arange(len(number)))
         return csr_array(entries)[np.searchsorted(items, self.rows.item)]
 
     def _mean(self, values):
-        """Sum (m, ...) over the visits of each row's item of the mean of values (k, ...) of its
+        """Sum (m, ...) over the views of each row's item of the mean of values (k, ...) of its
         pulses.
         """
         return abs(self._weights) @ values
 
     @cached_property
     def _speeds(self):
-        """How pulses move per unit of each of FIELDS: name -> (k, 3)."""
+        """Speeds of pulses per unit of each of FIELDS: name -> (k, 3)."""
         speeds = {}
         for name, step in zip(FIELDS, (1e-4, 1e-5, 1e-3), strict=True):
             if name != "gps_time" and self.survey.mounting is None:
@@ -178,7 +177,7 @@ class Bench:
         return speeds
 
     def _scatter(self, effect, rng):
-        """Variance and growth (m,) by noise of each pulse's own."""
+        """Variance and growth (m,) from independent noise of each pulse."""
         _, single, pulse = np.unique(self.returns.gps_time, return_index=True, return_inverse=True)
         pulses = self.returns[single]
         sums = {}
@@ -203,7 +202,7 @@ class Bench:
         return variance / np.maximum(rows.points, 1), growth
 
     def _lost(self, effect, rng):
-        """Shift (m,) of the share that returns."""
+        """Shift (m,) of the share of returns."""
         replicas = SETTINGS.random_replicas if effect.random else 1
         kept = sum(
             effect.apply(self.returns, self.rows.reference, rng).kept for _ in range(replicas)
@@ -213,8 +212,8 @@ class Bench:
 
     @cached_property
     def _trajectory(self):
-        """The recorded trajectory, thinned as far as its gaps stay what they are, and with the
-        epochs about each row, between which alone a jump may pass for a slope.
+        """Recorded trajectory, thinned without changing its gaps, and with the epochs around
+        each row, where a jump may otherwise become a slope.
         """
         whole = self.survey.trajectory
         last = len(self.survey.trajectory) - 1
@@ -231,7 +230,7 @@ class Bench:
         return whole
 
     def _pose_shift(self, changed):
-        """Shift (m,) of the residuals when this is recorded instead of the thinned trajectory."""
+        """Shift (m,) of the residuals if this is recorded instead of the thinned trajectory."""
         recorded = self._trajectory
         pose = np.zeros((len(recorded), 6))
         pose[:, :3] = changed.position - recorded.position
@@ -241,8 +240,8 @@ class Bench:
 
     @cached_property
     def _by_pose(self):
-        """Derivative, sparse (m, 6 e), of the rows by the poses at the e epochs: each look, the
-        first and the second, lies between two of them.
+        """Sparse derivative (m, 6 e) of the rows by the poses at the e epochs: each view is
+        between two of them.
         """
         rows = self.rows
         epochs = self._trajectory.gps_time
@@ -259,13 +258,13 @@ class Bench:
         return sum(legs)
 
     def _pose_variance(self, effect, rng):
-        """Variance (m,) by noise of the recorded trajectory, which rows of a moment share."""
+        """Variance (m,) from noise of the recorded trajectory, which rows of a moment share."""
         given = (self._trajectory, self.rows.reference, rng)
         replicas = SETTINGS.random_replicas
         return sum(self._pose_shift(effect.apply(*given)) ** 2 for _ in range(replicas)) / replicas
 
     def _control_shift(self, effect):
-        """Shift (m,) of the residuals, observed - surveyed, by moved surveyed targets."""
+        """Shift (m,) of the residuals, observed - surveyed, from moved surveyed targets."""
         rows = self.rows
         targets = self.rows.targets
         shift = np.zeros(len(rows))
@@ -278,7 +277,7 @@ class Bench:
 
 
 def check_mounting(survey: Survey, effects: Iterable[Effect]) -> None:
-    """Refuse effects on beams that nobody knows.
+    """Refuse effects on beams if the mounting is unknown.
 
     Parameters
     ----------
@@ -288,7 +287,7 @@ def check_mounting(survey: Survey, effects: Iterable[Effect]) -> None:
     Raises
     ------
     ValueError
-        For an effect on the beams of a survey without a mounting.
+        If an effect acts on the beams of a survey without a mounting.
     """
     for effect in effects:
         if survey.mounting is None and effect.needs_mounting():

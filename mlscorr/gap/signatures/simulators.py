@@ -1,4 +1,4 @@
-"""The survey as a simulator believes in it, and the simulator with a cause added."""
+"""Survey with a simulator's assumptions, and the simulator with an added cause."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, replace
@@ -13,11 +13,11 @@ from mlscorr.survey import Survey, SurveyFileError
 
 
 def as_believed(survey: Survey, simulator: Simulator) -> tuple[Survey, tuple[Effect, ...]]:
-    """A survey whose scanner and POS are as a simulator believes, and the simulator's effects.
+    """Return a survey with a simulator's scanner and POS, and the simulator's effects.
 
-    A mounting in the simulator that differs from the survey's is what the simulator takes for the
-    true one: the difference becomes the effects lever_arm and boresight. Where the trajectory has
-    sigmas of its own, the simulator's factor on those of survey.toml goes to them.
+    A mounting in the simulator that differs from the survey's is treated as the true one: the
+    difference becomes the effects lever_arm and boresight. If the trajectory has its own sigmas,
+    the simulator's factor on those of survey.toml is applied to them.
 
     Parameters
     ----------
@@ -27,8 +27,7 @@ def as_believed(survey: Survey, simulator: Simulator) -> tuple[Survey, tuple[Eff
     Raises
     ------
     ValueError
-        For a difference of mountings that no survey can have, or a simulator with a mounting where
-        the survey has none.
+        If mountings differ by an impossible amount, or only the simulator has a mounting.
     """
     recorded = survey.mounting
     believed = simulator.mounting
@@ -60,19 +59,19 @@ def as_believed(survey: Survey, simulator: Simulator) -> tuple[Survey, tuple[Eff
 
 
 def with_cause(simulator: Simulator, survey: Survey, cause: Any) -> Simulator:
-    """A simulator with a cause in it, for simulator.toml.
+    """Add a cause to a simulator, for simulator.toml.
 
     Parameters
     ----------
     simulator : Simulator
     survey : Survey
     cause : Cause
-        Its effects, and its Setting of what the POS errs by.
+        Its effects and its model of the POS errors.
 
     Raises
     ------
     ValueError
-        For a size that no survey can have.
+        If a size is impossible.
     """
     added = cause.effects
     if simulator.mounting is not None:  # differences of the mounting have become effects
@@ -80,7 +79,7 @@ def with_cause(simulator: Simulator, survey: Survey, cause: Any) -> Simulator:
     effects = reduce(joined, added, list(simulator.effects))
     scale = cause.model.scale
     pos = simulator.pos
-    if scale != 1.0:  # what was found is no default any more
+    if scale != 1.0:  # an estimated value is no longer a default
         sigmas = "position_sigma", "attitude_sigma"
         pos = replace(
             pos,
@@ -94,7 +93,7 @@ def with_cause(simulator: Simulator, survey: Survey, cause: Any) -> Simulator:
 
 
 def joined(effects: Sequence[Effect], new: Effect) -> list[Effect]:
-    """Effects with one more; one of the same kind and place is joined with it.
+    """Add an effect to others; it is merged with one of the same kind and target.
 
     Parameters
     ----------
@@ -107,7 +106,7 @@ def joined(effects: Sequence[Effect], new: Effect) -> list[Effect]:
             a = np.asarray(old.magnitude, float)
             b = np.asarray(new.magnitude, float)
             total = np.hypot(a, b) if new.random else a + b
-            if new.name == Dropout.name:  # of the pulses that are left
+            if new.name == Dropout.name:  # of the remaining pulses
                 total = a + b - a * b
             size = float(total) if total.ndim == 0 else total.tolist()
             return [*effects[:i], replace(old, magnitude=size), *effects[i + 1 :]]

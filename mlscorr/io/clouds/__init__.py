@@ -1,7 +1,7 @@
-"""Clouds: LAS, LAZ and COPC byte by byte; E57, PLY and NPZ by way of a LAZ.
+"""Clouds: LAS, LAZ and COPC byte by byte; E57, PLY and NPZ through a LAZ.
 
-- las, las_layout, time_order: points by chunks, all or within spans of time
-- las_checks, las_crs, copies: what is wrong with a file before it is read
+- las, las_layout, time_order: points in chunks, all or within intervals of time
+- las_checks, las_crs, copies: checks of a file before it is read
 - las_copy, las_writer, copc_writer: corrected copies and new files
 - conversion, cloud_sources, e57, ply: other formats, and meshes
 """

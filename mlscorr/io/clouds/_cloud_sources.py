@@ -1,4 +1,4 @@
-"""Clouds that are no LAS: what their headers say, and their points block by block."""
+"""Clouds in formats other than LAS: the data of their headers, and their points in blocks."""
 
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from mlscorr.io.settings import SETTINGS
 
 @dataclass(frozen=True)
 class SourceBlock:
-    """Some points of a cloud, as they stand in it.
+    """Some points of a cloud, as stored.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ class SourceBlock:
     intensity : (n,) array or None
     colours : (n, 3) array or None
     invalid : int
-        Number of points that were left out, as the file calls them invalid.
+        Number of points omitted because the file marks them as invalid.
     """
 
     xyz: np.ndarray
@@ -34,24 +34,24 @@ class SourceBlock:
 
 @dataclass(frozen=True)
 class CloudSource:
-    """A cloud by its header.
+    """Cloud described by its header.
 
     Parameters
     ----------
     path : Path
     points : int
     parts : str
-        Half a sentence on what the points are of.
+        Half a sentence on the origin of the points.
     dropped : tuple of str
-        Names of fields that a correction has no use for.
+        Names of fields that a correction does not use.
     colour_limit : float
-        The largest value of a colour.
+        Largest value of a color.
     crs : str or None
         As WKT.
     intensities : function of a number of points
-        Gives the intensities block by block, nothing where there are none.
+        Yields the intensities in blocks, or nothing if there are none.
     blocks : function of a number of points
-        Gives SourceBlocks of so many points at most.
+        Yields SourceBlocks of at most that many points.
     """
 
     path: Path
@@ -65,7 +65,7 @@ class CloudSource:
 
 
 def _check_single(path, what, largest, limit, cause):
-    """Refuse numbers of single precision where their steps are coarser than a limit."""
+    """Refuse single-precision numbers whose resolution is coarser than a limit."""
     step = float(np.spacing(np.float32(largest)))
     if step > limit:
         raise ValueError(
@@ -77,22 +77,22 @@ def _check_single(path, what, largest, limit, cause):
 def check_precision(
     path: Path, singles: Collection[str], xyz: np.ndarray, time: np.ndarray
 ) -> None:
-    """Refuse coordinates and times that single precision has spoilt.
+    """Refuse coordinates and times degraded by single precision.
 
     Parameters
     ----------
     path : Path
     singles : collection of str
-        Which of ``coordinates`` and ``times`` are in single precision.
+        ``coordinates`` or ``times``, or both, if in single precision.
     xyz : (n, 3) array
-        As stored. Units: m.
+        Stored coordinates. Units: m.
     time : (n,) array
         Units: s.
 
     Raises
     ------
     ValueError
-        Says the step that is left.
+        With the remaining resolution.
     """
     if "coordinates" in singles and len(xyz):
         cause = "What is lost can't be had back: export it in double precision, or as LAS."
@@ -103,17 +103,17 @@ def check_precision(
 
 
 def lacking_time(path: Path, fields: Collection[str], where: str, names: str) -> ValueError:
-    """The sentence on a cloud without times.
+    """Error for a cloud without times.
 
     Parameters
     ----------
     path : Path
     fields : collection of str
-        What it has.
+        Its fields.
     where : str
         Part of the file, or nothing.
     names : str
-        What fields of time are called.
+        Names of time fields.
     """
     return ValueError(
         f"{path} holds no time of its points{where}, so they cannot be placed on the trajectory. "

@@ -1,10 +1,10 @@
-"""Writing points as a COPC file: LAZ in chunks, each a node of an octree (COPC 1.0, copc.io).
+"""COPC writer: LAZ in chunks, each a node of an octree (COPC 1.0, copc.io).
 
 Each node takes one point of each occupied cell of a grid over its cube, and its children the rest:
-each level of all nodes is a sample of the cloud, twice as dense as the one above. So do Untwine and
-PDAL's writers.copc, with as many cells. Points are parted on disk into cubes that memory holds;
-these are taken one by one in an order in which each cube above closes as soon as it is left, so
-that memory holds the points of one such cube and of the nodes above it.
+each level is a sample of the cloud, twice as dense as the level above. Untwine and PDAL's
+writers.copc do the same, with the same number of cells. Points are split on disk into cubes that
+fit into memory. The cubes are processed depth first, so that memory contains the points of one cube
+and of the nodes above it.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ from mlscorr.io.store import Spool, check_space
 from mlscorr.survey import Columns
 
 GRID_BITS = 7  # 128 cells along the edge of a node, as in Untwine and PDAL
-DOUBLE_BITS = np.finfo(float).nmant  # of a coordinate
-PART_BITS = 6  # 64 cubes along an edge, into which points are parted at a time: counts of 2 MB
+DOUBLE_BITS = np.finfo(float).nmant  # bits of a coordinate
+PART_BITS = 6  # 64 cubes along an edge, into which points are split at a time: counts of 2 MB
 
 
 class _Key(NamedTuple):
-    """A node of an octree: its level, and its place among the cubes of that level."""
+    """Node of an octree: its level, and its position among the cubes of that level."""
 
     level: int = 0
     x: int = 0
@@ -51,7 +51,7 @@ class _Key(NamedTuple):
     z: int = 0
 
     def above(self, level: int) -> _Key:
-        """The node of a lower level that holds this one.
+        """Return the node of a lower level that contains this one.
 
         Parameters
         ----------
@@ -61,7 +61,7 @@ class _Key(NamedTuple):
         return _Key(level, self.x >> up, self.y >> up, self.z >> up)
 
     def holds(self, key: _Key) -> bool:
-        """Whether a node of a higher level lies within this one.
+        """True if a node of a higher level is within this one.
 
         Parameters
         ----------
@@ -70,14 +70,14 @@ class _Key(NamedTuple):
         return key.above(self.level) == self
 
     def below(self, bits: int, place: tuple[int, int, int]) -> _Key:
-        """A node of some levels more within this one.
+        """Return a node some levels deeper within this one.
 
         Parameters
         ----------
         bits : int
             Number of the levels.
         place : three int
-            Among the cubes there.
+            Position among the cubes of that level.
         """
         x, y, z = ((old << bits) + int(new) for old, new in zip(self[1:], place, strict=True))
         return _Key(self.level + bits, x, y, z)
@@ -88,12 +88,12 @@ _ROOT = _Key()
 
 @dataclass(frozen=True)
 class _Cube:
-    """The cube of an octree, so placed that the bounds of all nodes are numbers without rounding.
+    """Cube of an octree, placed so that the bounds of all nodes are exact numbers.
 
     Parameters
     ----------
     corner : (3,) array
-        In whole metres.
+        In whole meters.
     edge : float
         A power of two. Units: m.
     bits : int
@@ -106,7 +106,7 @@ class _Cube:
 
     @classmethod
     def around(cls, box: np.ndarray, scale: np.ndarray) -> _Cube:
-        """The smallest such cube about the corners of a box.
+        """Make the smallest such cube around the corners of a box.
 
         Parameters
         ----------
@@ -125,7 +125,7 @@ class _Cube:
             edge *= 2
 
     def contains(self, box: np.ndarray) -> bool:
-        """Whether the corners (2, 3) of a box lie within (m).
+        """True if the corners (2, 3) of a box are within the cube (m).
 
         Parameters
         ----------
@@ -134,7 +134,7 @@ class _Cube:
         return bool(((box >= self.corner) & (box < self.corner + self.edge)).all())
 
     def places(self, xyz: np.ndarray) -> np.ndarray:
-        """Where points lie in the cube, in steps of its edge halved so often: (n, 3) int array.
+        """Positions of points in the cube, as integers (n, 3) in steps of its halved edge.
 
         Parameters
         ----------
@@ -146,7 +146,7 @@ class _Cube:
 
 @dataclass(frozen=True, repr=False)
 class _Part(Columns):
-    """Some points: their records (n,), and where they lie in the cube (n, 3)."""
+    """Some points: their records (n,) and their positions in the cube (n, 3)."""
 
     records: np.ndarray
     places: np.ndarray
@@ -154,20 +154,20 @@ class _Part(Columns):
 
 @dataclass
 class _Node:
-    """A node that points may still come to."""
+    """Node that may still receive points."""
 
     key: _Key
     records: list[np.ndarray] = field(default_factory=list)
     is_taken: np.ndarray = field(default_factory=lambda: np.zeros(1 << 3 * GRID_BITS, bool))
 
     def sample(self, part, bits):
-        """Keep a point of each cell that was empty; returns the part that is left."""
+        """Keep a point for each cell that was empty; return the remaining part."""
         chosen = _sample(part.places, bits - self.key.level - GRID_BITS, self.is_taken)
         self.records.append(part.records[chosen])
         return part[~chosen]
 
     def done(self):
-        """Its key and its points, unless it has none."""
+        """Key and points of the node, unless it is empty."""
         records = np.concatenate(self.records)
         if len(records):
             yield self.key, records
@@ -175,7 +175,7 @@ class _Node:
 
 @loop
 def _sample(places, shift, is_taken):
-    """Which points (n,) are the first of their cell, which is then taken."""
+    """Flag (n,) of points that are the first of their cell, which is then taken."""
     chosen = np.zeros(len(places), np.bool_)
     mask = (1 << GRID_BITS) - 1
     for i in range(len(places)):
@@ -188,16 +188,16 @@ def _sample(places, shift, is_taken):
 
 
 class _Octree:
-    """The nodes of an octree over some points.
+    """Nodes of an octree over some points.
 
     Parameters
     ----------
     layout : LasLayout
-        Says what the records hold.
+        Describes the records.
     blocks : function
-        Gives all records anew each time, (n,) at a time, as bytes of each.
+        Yields all records at each call, (n,) at a time, as bytes of each.
     folder : path
-        For the file that holds all records meanwhile, which has no name there.
+        For an unnamed temporary file with all records.
     """
 
     def __init__(self, layout: LasLayout, blocks: Blocks, folder: Path):
@@ -206,7 +206,7 @@ class _Octree:
         self._folder = folder
         limit = SETTINGS.largest_coordinate
         cube = _Cube.around(np.nan_to_num(cloud_box(layout)).clip(-limit, limit), layout.scale)
-        while True:  # once more where points have left the cube about the box of the header
+        while True:  # again if points have left the header's box
             self.cube, box = cube, np.array([np.full(3, np.inf), np.full(3, -np.inf)])
             self._counts = self._count(self._watched(box), _ROOT)
             cube = _Cube.around(box, layout.scale)
@@ -214,7 +214,7 @@ class _Octree:
                 break
 
     def _watched(self, box):
-        """All records, whose bounds (2, 3) are kept in a box."""
+        """Yield all records, and keep their bounds (2, 3) in a box."""
         for records in self._blocks(False):
             xyz = self._xyz(records)
             box[:] = np.minimum(box[0], xyz.min(axis=0)), np.maximum(box[1], xyz.max(axis=0))
@@ -232,17 +232,17 @@ class _Octree:
         return self.cube.bits - GRID_BITS
 
     def nodes(self) -> Iterator[tuple[_Key, np.ndarray]]:
-        """Each node with its records, those above it later.
+        """Yield each node with its records, children before parents.
 
         Yields
         ------
         key : Key
         records : (n,) array
-            At least one.
+            At least one record.
         """
         needed = int(self._counts.sum()) * self._layout.record_length
         check_space(self._folder, needed, "to sort points into an octree beside the output.")
-        path: list[_Node] = []  # from the root to the node above the last part
+        path: list[_Node] = []  # from the root to the parent of the last part
         for key, records in self._parts(partial(self._blocks, True), _ROOT, self._counts):
             while path and (path[-1].key.level >= key.level or not path[-1].key.holds(key)):
                 yield from path.pop().done()
@@ -255,7 +255,7 @@ class _Octree:
             yield from path.pop().done()
 
     def _split(self, key, part, above):
-        """The nodes of a part of the points that memory holds; a few go into the node above."""
+        """Nodes of a part that fits into memory; a few points go into the parent."""
         if above is not None and len(part) < 1 << GRID_BITS:
             above.records.append(part.records)
             return
@@ -272,7 +272,7 @@ class _Octree:
         yield from node.done()
 
     def _parts(self, blocks, above, counts):
-        """Cubes with the records in each, which memory holds, one beside the other."""
+        """Cubes with the records in each, which fit into memory, in depth-first order."""
         groups = []
         numbers = np.zeros(counts.shape, int)
         _merge(counts, above, groups, numbers)
@@ -297,14 +297,14 @@ class _Octree:
         return counts
 
     def _cells(self, records, above, size):
-        """Where points lie among the cubes of a node: three int arrays."""
+        """Positions of points among the cubes of a node: three int arrays."""
         places = self.cube.places(self._xyz(records))
         levels = above.level + size.bit_length() - 1
         return tuple((places >> (self.cube.bits - levels) & (size - 1)).T)
 
 
 def _merge(counts, key, groups, numbers):
-    """Join cubes up to as many points as memory holds; writes the number of each group."""
+    """Merge cubes up to as many points as fit into memory; store the number of each group."""
     total = int(counts.sum())
     if total and (total <= SETTINGS.chunk_points or len(counts) == 1):
         numbers[...] = len(groups)
@@ -317,21 +317,21 @@ def _merge(counts, key, groups, numbers):
 
 
 class CopcWriter:
-    """Writes points and what follows them behind the head of a file, which is completed.
+    """Writer of points and trailing records after the head of a file, which it completes.
 
     Parameters
     ----------
     layout : LasLayout
-        Of a COPC file, with the VLRs that the new one has.
+        Layout of a COPC file, with the VLRs of the new one.
     output : binary file
-        Open for writing, empty.
+        Empty and open for writing.
     folder : path
-        As of _Octree.
+        See ``_Octree``.
     """
 
     def __init__(self, layout: LasLayout, output: BinaryIO, folder: Path):
         for user, record in {layout.owner(start) for start, _ in layout.vlrs} - {COPC}:
-            if user == COPC[0]:  # of an octree that is no more
+            if user == COPC[0]:  # of an octree that no longer exists
                 layout = replace(layout, head=layout.head_with(user, record, None))
         self._layout = layout
         self._output = output
@@ -346,19 +346,19 @@ class CopcWriter:
         self._times = np.array([np.inf, -np.inf])
 
     def write(self, blocks: Blocks, file: BinaryIO) -> None:
-        """Write points in the nodes of an octree, and the EVLRs of another file behind them.
+        """Write points in the nodes of an octree, followed by the EVLRs of another file.
 
         Parameters
         ----------
         blocks : function
-            As of _Octree.
+            See ``_Octree``.
         file : binary file
-            That of the layout, open for reading.
+            File of the layout, open for reading.
         """
         octree = _Octree(self._layout, blocks, self._folder)
         start = len(self.head)
         self._output.write(self.head)
-        self._output.write(bytes(8))  # for the position of the table of chunks
+        self._output.write(bytes(8))  # position of the chunk table
         for batch in _batches(octree.nodes()):
             self._write_nodes(batch)
         table = io.BytesIO()
@@ -370,7 +370,7 @@ class CopcWriter:
         self._output.write(struct.pack("<Q", table_start))
 
     def _write_nodes(self, batch):
-        """Append the chunks of some nodes, the points of each in order of time."""
+        """Append the chunks of some nodes, the points of each sorted by time."""
         chunks = []
         for key, records in batch:
             times = records.view(self._layout.record)["gps_time"]
@@ -389,7 +389,7 @@ class CopcWriter:
         self._output.write(part.read(sum(size for _, size in sizes)))
 
     def _write_evlrs(self, file):
-        """Append the EVLRs of a file with a new hierarchy; returns start and size of its page."""
+        """Append the EVLRs of a file with a new hierarchy; return start and size of its page."""
         start = self._output.tell()
         kept = 0
         for position, size in evlrs(self._layout, file):
@@ -411,7 +411,7 @@ class CopcWriter:
         return page, entries.nbytes
 
     def _set_info(self, octree, page):
-        """State the octree in the first VLR of the head."""
+        """Describe the octree in the first VLR of the head."""
         cube = octree.cube
         half = cube.edge / 2
         if np.isfinite(self._times).all():
@@ -424,7 +424,7 @@ class CopcWriter:
 
 
 def _batches(nodes) -> Iterator[list[tuple[_Key, np.ndarray]]]:
-    """Some nodes at a time, about as many points as memory holds."""
+    """Yield some nodes at a time, with about as many points as fit into memory."""
     batch = []
     points = 0
     for node in nodes:

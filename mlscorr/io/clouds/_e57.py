@@ -1,8 +1,8 @@
 """Clouds in E57 files (ASTM E2807), by libE57Format in pye57.
 
-Times of points count from the acquisitionStart of their scan, by the standard; many programs write
-seconds of the GPS week all the same. They count from the start where they fit between it and the
-acquisitionEnd, or into a day where none is given.
+By the standard, times of points count from the acquisitionStart of their scan, but many programs
+write seconds of the GPS week. Times count from the start if they fit between it and the
+acquisitionEnd, or into a day if none is given.
 """
 
 from collections.abc import Iterator
@@ -29,7 +29,7 @@ FIELDS = {*CARTESIAN, *SPHERICAL, *COLOURS, *INVALID, TIME, INTENSITY}
 
 
 def open_e57(path: Path) -> CloudSource:
-    """An E57 by its header.
+    """Open an E57 file by its header.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def open_e57(path: Path) -> CloudSource:
     Raises
     ------
     ValueError
-        For a file that is damaged or none, and a scan without coordinates or times.
+        If the file is damaged or not an E57, or a scan has no coordinates or times.
     """
     with _opened(path) as root:
         scans = _scans(path, root)
@@ -70,7 +70,7 @@ def open_e57(path: Path) -> CloudSource:
 
 @contextmanager
 def _opened(path) -> Iterator[Any]:
-    """The root of a file; what libE57Format raises becomes a sentence."""
+    """Yield the root of a file; errors of libE57Format become a message."""
     try:
         from pye57 import libe57
     except ImportError:
@@ -94,7 +94,7 @@ def _opened(path) -> Iterator[Any]:
 
 
 class _Scan:
-    """One scan of a file: its fields, pose, and how its times count."""
+    """One scan of a file: its fields, pose, and reference of times."""
 
     def __init__(self, path, node, number):
         from pye57 import libe57
@@ -121,7 +121,7 @@ class _Scan:
         self.end = self._value("acquisitionEnd", "dateTimeValue")
 
     def _value(self, *names):
-        """A number of the scan's header; zero where there is none."""
+        """Number from the scan's header, zero without one."""
         node = self.node
         for name in names:
             if not node.isDefined(name):
@@ -131,7 +131,7 @@ class _Scan:
 
     @property
     def colour_limit(self):
-        """The largest value of a colour: that of the limits, or of the field where it has one."""
+        """Largest value of a color: from the limits, or from the field if it has one."""
         largest = max(self._value("colorLimits", f"{name}Maximum") for name in COLOURS)
         field = max((float(self._prototype[name].maximum()) for name in self.colours), default=0.0)
         if largest:
@@ -142,7 +142,7 @@ class _Scan:
 
     @cached_property
     def singles(self):
-        """What is stored in single precision."""
+        """Names of what is stored in single precision."""
         from pye57 import libe57
 
         groups = {"coordinates": self.axes[0], "times": TIME}
@@ -155,14 +155,16 @@ class _Scan:
 
     @cached_property
     def starts(self):
-        """Whether times count from the scan's start: its first ones tell."""
+        """True if times count from the scan's start, judged by the first ones."""
         with closing(self.read([TIME], SETTINGS.sampled_points)) as blocks:
             first = next(blocks)[TIME]
         span = self.end - self.start if self.end > self.start else DAY
         return bool(self.start > 0 and first.min() >= -1.0 and first.max() <= span + 1.0)
 
     def read(self, names, size):
-        """Blocks as dicts of name to (n,) array, each in the memory of the one before."""
+        """Yield blocks as dicts of name to (n,) array; each reuses the memory of the previous
+        one.
+        """
         from pye57 import libe57
 
         size = min(size, self.points)
@@ -191,14 +193,14 @@ class _Scan:
 
 
 def _scans(path, root):
-    """Scans that hold points."""
+    """Scans that contain points."""
     count = len(root["data3D"])
     scans = [_Scan(path, scan, f"{k + 1} of {count}") for k, scan in enumerate(root["data3D"])]
     return [scan for scan in scans if scan.points]
 
 
 def _intensities(path, size):
-    """Intensities of a file block by block."""
+    """Yield intensities of a file in blocks."""
     with _opened(path) as root:
         for scan in _scans(path, root):
             if INTENSITY in scan.fields:
@@ -207,7 +209,7 @@ def _intensities(path, size):
 
 
 def _blocks(path, size):
-    """SourceBlocks of a file."""
+    """Yield SourceBlocks of a file."""
     with _opened(path) as root:
         for scan in _scans(path, root):
             marks = [name for name in INVALID if name in scan.fields]
@@ -219,7 +221,7 @@ def _blocks(path, size):
 
 
 def _source_block(scan, block, marks, start):
-    """A SourceBlock of a block of a scan, without the points that are marked as invalid."""
+    """Make a SourceBlock of a block of a scan, without points marked as invalid."""
     places = np.column_stack([block[name] for name in scan.axes])
     is_valid = np.isfinite(places).all(axis=1)
     for name in marks:

@@ -1,9 +1,9 @@
-"""Points of a COPC file in the order in which they were measured.
+"""Points of a COPC file in the order of measurement.
 
-All that looks for targets and ties wants points as a scanner gives them. An octree scatters each
-second over all of its nodes, so the points are put in order first, in a plain LAS among temporary
-files (which TMPDIR names). It stays until another file is put in order and nobody reads this one.
-Memory holds a chunk, or the points of one second where these are more.
+Searches for targets and ties need points in the order of measurement. An octree scatters each
+second over all of its nodes, so the points are first sorted into an uncompressed LAS among the
+temporary files (TMPDIR). It is kept until another file is sorted and this one is no longer read.
+Memory contains a chunk, or the points of one second if these are more.
 """
 
 import tempfile
@@ -28,33 +28,33 @@ from mlscorr.survey import counted_on
 
 
 def in_time_order(layout: LasLayout, new_week: float = -np.inf) -> LasLayout:
-    """The layout itself, or that of a copy in order of time where the file is a COPC.
+    """Return the layout itself, or that of a copy sorted by time if the file is a COPC.
 
-    Of equal times, as of the echoes of a pulse, the first return comes first. Times that are not
-    a number come last. Within a glance a long file stays as it is.
+    For equal times, such as the echoes of a pulse, the first return comes first. Times that are not
+    numbers come last. In a quick look, a long file is not sorted.
 
     Parameters
     ----------
     layout : LasLayout
     new_week : float
-        As of CloudFile. Units: s.
+        See ``CloudFile``. Units: s.
 
     Raises
     ------
     ValueError
-        For points that cannot be decoded.
+        If points cannot be decoded.
     OSError
-        Where the disk has no room for the points.
+        If the disk has no space for the points.
     """
     limit = looked_points()
-    if not layout.is_copc or (limit is not None and layout.points > limit):  # seconds do not do
+    if not layout.is_copc or (limit is not None and layout.points > limit):  # too many seconds
         return layout
     return _in_order(layout, new_week, file_state(layout.path))
 
 
 @lru_cache(maxsize=1)
 def _in_order(layout, new_week, _state):
-    """The LasLayout of a file's points in order of time."""
+    """LasLayout of a file's points sorted by time."""
     path = layout.path
     what = f"to put the points of {path} in order of time. Let TMPDIR name another disk."
     folder = Path(tempfile.mkdtemp(dir=temporary_folder()))
@@ -85,7 +85,7 @@ def _in_order(layout, new_week, _state):
 
 
 def _count_seconds(layout, new_week, done):
-    """The whole seconds in which points were measured, in order, and the number of points of each.
+    """Count the points in each whole second, sorted by time.
 
     Units: s.
     """
@@ -100,6 +100,6 @@ def _count_seconds(layout, new_week, done):
 
 
 def _second(records, new_week):
-    """The second of each time; infinite of what is not a number."""
+    """Second of each time; infinite for what is not a number."""
     time = counted_on(records["gps_time"], new_week)
     return np.floor(np.nan_to_num(time, nan=np.inf, posinf=np.inf, neginf=-np.inf))

@@ -1,7 +1,7 @@
-"""Clouds of other formats, put into a LAZ once, from where all is as with LAS.
+"""Conversion of other formats to a temporary LAZ, which is then processed like any LAS.
 
-The LAZ stands in a folder for temporary files (which TMPDIR names), and goes when the program ends.
-What is corrected is written as LAZ.
+The LAZ is in a folder for temporary files (TMPDIR), and is removed when the program ends. Corrected
+clouds are written as LAZ.
 """
 
 import shutil
@@ -33,22 +33,22 @@ from mlscorr.io.trajectories import ADJUSTMENT, NO_TIMES, lacks_time
 from mlscorr.survey import WEEK, CloudFile, PointCloud
 
 OPENERS: dict[str, Callable[[Path], CloudSource]] = {".e57": open_e57, ".ply": open_ply}
-RESOLUTION = 1e-4  # m, of coordinates: a tenth of what scanners resolve, and 214 km in 32 bits
-LARGEST = np.iinfo(np.uint16).max  # of an intensity or a colour
+RESOLUTION = 1e-4  # m, of coordinates: 1/10 of scanners' resolution, and 214 km in 32 bits
+LARGEST = np.iinfo(np.uint16).max  # of an intensity or a color
 
 
 @dataclass(frozen=True)
 class Converted:
-    """A LAZ that was made of another file.
+    """LAZ that was made from another file.
 
     Parameters
     ----------
     path : Path
     source : CloudSource
     points : int
-        In the LAZ.
+        Number of points in the LAZ.
     is_part : bool
-        Whether they are the first ones only.
+        True if they are only the first points.
     note : str
         A sentence.
     """
@@ -61,7 +61,7 @@ class Converted:
 
 
 def is_foreign(path: Path) -> bool:
-    """Whether a cloud's suffix is that of another format than LAS.
+    """True if a cloud's suffix is that of another format than LAS.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def is_foreign(path: Path) -> bool:
 
 
 def written_name(path: Path) -> str:
-    """Name of the file that a corrected cloud is written to: its own, or the LAZ of its stem.
+    """Name of the file for a corrected cloud: its own, or the LAZ of its stem.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def written_name(path: Path) -> str:
 
 
 def converted(path: Path) -> Converted:
-    """The LAZ of an E57 or PLY, made when it is first asked for.
+    """Return the LAZ of an E57 or PLY, made on first use.
 
     Parameters
     ----------
@@ -97,15 +97,15 @@ def converted(path: Path) -> Converted:
     Raises
     ------
     ValueError
-        For files that can't be read, or have no times.
+        If a file cannot be read, or has no times.
     OSError
-        When the disk refuses.
+        If the disk refuses.
     """
     return _converted(path.absolute(), *file_state(path), looked_points())
 
 
 def read_in_part(path: Path) -> bool:
-    """Whether only the first points of a cloud are read, as within a glance.
+    """True if only the first points of a cloud are read, as in a quick look.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def read_in_part(path: Path) -> bool:
 
 
 def recorded_points(file: CloudFile) -> int:
-    """Number of points of a cloud, also where only the first are read.
+    """Number of points of a cloud, even if only the first ones are read.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def _converted(path, size, changed, limit):
 
 
 def _on_disk(path):
-    """A file, or the copy of one in a store: what reads it needs a disk."""
+    """Return a file, or a local copy of one in a store, for readers that need a disk."""
     if not is_remote(path):
         return path
     copy = Path(tempfile.mkdtemp(dir=temporary_folder())) / path.name
@@ -182,8 +182,8 @@ def _convert(source, target, limit):
 
 
 def _check_extent(path, way):
-    """Refuse points so far from the first one (n, 3; m) that a LAS can't hold both."""
-    limit = RESOLUTION * (INTEGER_LIMIT - 1 / RESOLUTION)  # the header's offset is in whole metres
+    """Refuse points (n, 3; m) too far from the first one for the integers of a LAS."""
+    limit = RESOLUTION * (INTEGER_LIMIT - 1 / RESOLUTION)  # the header's offset is in whole meters
     if count := int((np.abs(way) > limit).any(axis=1).sum()):
         raise ValueError(
             f"{path} has {count} points more than {limit / 1e3:.0f} km from its first one, up to "
@@ -197,7 +197,7 @@ def _in_16_bits(values):
 
 
 def _first(blocks, end):
-    """Blocks until so many points are there."""
+    """Yield blocks up to a number of points."""
     count = 0
     for block in blocks:
         yield block
@@ -207,7 +207,7 @@ def _first(blocks, end):
 
 
 def _scale(source, size, end):
-    """What brings intensities into 16 bits: base, gain, and a phrase on it."""
+    """Mapping of intensities to 16 bits: base, gain, and a phrase on it."""
     low = np.inf
     high = -np.inf
     count = 0
@@ -229,7 +229,9 @@ def _scale(source, size, end):
 
 
 def _time_system(path, times):
-    """Whether times are written as adjusted standard GPS time, and what is taken off them (s)."""
+    """Return whether times are written as adjusted standard GPS time, and the subtracted offset
+    (s).
+    """
     times = times[np.isfinite(times)]
     if not len(times):
         raise ValueError(f"{path} has points whose times are no numbers.")
@@ -246,7 +248,7 @@ def _time_system(path, times):
 
 
 def _known_crs(wkt):
-    """A CRS that can be written, and a phrase where there is another."""
+    """Return a CRS that can be written, or a phrase if it cannot."""
     if wkt is None:
         return None, ""
     try:
@@ -257,7 +259,7 @@ def _known_crs(wkt):
 
 
 def _note(source, count, limit, phrases):
-    """The sentence on a conversion."""
+    """Sentence on a conversion."""
     if limit:
         taken = f"the first {count} points of {source.points}"
     else:

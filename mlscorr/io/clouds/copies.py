@@ -1,8 +1,8 @@
-"""Clouds that hold the same points as another one, in whatever format, order or time system.
+"""Detection of clouds with the same points, in any format, order or time system.
 
-Headers tell most clouds apart: their number of points and their bounds. Only where these agree are
-times of points read: a few at the same places of both files, and all of them where these differ,
-as in a COPC beside a LAZ.
+Headers separate most clouds by number of points and bounds. If these agree, times of points are
+read: a few at the same positions of both files, and all of them if these differ, as for a COPC and
+a LAZ.
 """
 
 import struct
@@ -25,9 +25,9 @@ from mlscorr.io.trajectories import ADJUSTMENT, WEEK
 
 
 def find_copies(paths: Iterable[Path]) -> dict[Path, Path]:
-    """Clouds with the same points as one before them, each with that one.
+    """Find clouds with the same points as an earlier one, each with that one.
 
-    Files without points that can be read are no copies; they are refused where they are read.
+    Files without readable points are not copies; they are refused when they are read.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def find_copies(paths: Iterable[Path]) -> dict[Path, Path]:
     Returns
     -------
     dict
-        From a copy to the first of the files that holds its points.
+        From a copy to the first file with its points.
     """
     of_count = defaultdict(list)
     for path in dict.fromkeys(paths):
@@ -50,7 +50,7 @@ def find_copies(paths: Iterable[Path]) -> dict[Path, Path]:
 
 
 def _announced_points(path: Path) -> int:
-    """Number of points by the header alone; zero where it can't tell."""
+    """Number of points from the header; zero if it is unknown."""
     if is_foreign(path):
         if is_remote(path):
             return 0
@@ -68,7 +68,7 @@ def _announced_points(path: Path) -> int:
 
 
 def _copies(paths: list[Path]) -> dict[Path, Path]:
-    """Copies among files with one number of points."""
+    """Copies among files with the same number of points."""
     points = []
     for path in paths:
         with suppress(OSError, ValueError):
@@ -92,7 +92,7 @@ def _copies(paths: list[Path]) -> dict[Path, Path]:
 
 @dataclass
 class _Points:
-    """The points of a cloud by their times, which are read when they are asked for.
+    """Points of a cloud by their times, which are read on demand.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ class _Points:
     _moments: np.ndarray | None = None
 
     def are_those_of(self, other: "_Points") -> bool:
-        """Return True if both clouds hold the same times in any order; False if undecodable."""
+        """Return True if both clouds have the same times in any order; False if undecodable."""
         if self.layout.points != other.layout.points:  # some of an E57 are invalid
             return False
         with suppress(OSError, ValueError):
@@ -126,19 +126,19 @@ class _Points:
         return bool(is_alike) and _differ_by_system(own[:1] - others[:1])
 
     def moments(self) -> np.ndarray:
-        """First time; last, mean and root mean square (4,) since then, whatever the order."""
+        """First time, and last, mean and root mean square (4,) since then, for any order."""
         if self._moments is None:
             self._moments = _time_moments(self.layout)
         return self._moments
 
 
 def _time_moments(layout: LasLayout) -> np.ndarray:
-    """First time; last, mean and root mean square (4,) since then of all points. Units: s."""
+    """First time, and last, mean and root mean square (4,) since then of all points. Units: s."""
     origin = records_at(layout, [0])["gps_time"][0]
     first = np.inf
     last = -np.inf
     count = 0
-    total = np.zeros(2)  # of times since the origin, and of their squares
+    total = np.zeros(2)  # times since the origin, and their squares
     for records in read_records(layout, SETTINGS.chunk_points, is_brief=True):
         since = records["gps_time"] - origin
         since = since[np.isfinite(since)]

@@ -1,7 +1,7 @@
-"""Points of LAS and LAZ files by chunks, all or within spans of time, and the noise among them.
+"""Points of LAS and LAZ files in chunks, all or within intervals of time, without noise points.
 
-lazrs shares decoding and encoding among the cores by itself; threads of our own gain nothing
-beside it (they waited on the same cores, and its single-threaded coders hold Python's lock).
+lazrs uses all cores for decoding and encoding, so further threads gain nothing (they compete for
+the same cores, and its single-threaded coders keep Python's lock).
 """
 
 import hashlib
@@ -30,19 +30,19 @@ def read_chunks(
     first: int = 0,
     end: int | None = None,
 ) -> Iterator[PointCloud]:
-    """Points of a cloud file by chunks, in file order, for all that measures.
+    """Read the points of a cloud file in chunks, in file order, for measurements.
 
-    Those of a COPC come in order of time. Points are left out that are flagged as noise: withheld,
-    or of one of the file's noise_classes; and those whose gps_time is not a number: nothing places
-    them on the trajectory.
+    Points of a COPC are sorted by time. Points flagged as noise (withheld, or in one of the file's
+    noise_classes) are omitted, and so are points whose gps_time is not a number, which have no
+    position on the trajectory.
 
     Parameters
     ----------
     cloud_file : CloudFile
     chunk_size : int
-        Points at a time.
+        Points in a chunk.
     first, end : int
-        Numbers of the points in the file at which to start, and to end before.
+        Index of the first point, and of the point after the last.
 
     Yields
     ------
@@ -52,7 +52,7 @@ def read_chunks(
     Raises
     ------
     ValueError
-        For a file that is cut off or damaged.
+        If the file is truncated or damaged.
     """
     if isinstance(cloud_file, CloudInMemory):
         yield from cloud_file.chunks(chunk_size, first, end)
@@ -78,7 +78,7 @@ def read_chunks(
 
 
 def timed_points(file: CloudFile, layout: LasLayout, records: np.ndarray) -> PointCloud:
-    """Points of records whose gps_time is a number, with times in the trajectory's system.
+    """Points of records with a valid gps_time, with times in the trajectory's system.
 
     Parameters
     ----------
@@ -103,17 +103,17 @@ def read_cloud(
     attributes: Sequence[str] = (),
     chunk_points: int = SETTINGS.chunk_points,
 ) -> Iterator[PointCloud]:
-    """Read the points of a cloud chunk by chunk, all of them, in the order of the file.
+    """Read all points of a cloud in chunks, in the order of the file.
 
     Parameters
     ----------
     file : CloudFile or path
-        One of ``survey.clouds``: its times come in the trajectory's system. Of a path of a LAS or
-        LAZ file they come as the file has them.
+        One of ``survey.clouds``, with times in the trajectory's system, or the path of a LAS or LAZ
+        file, with times as in the file.
     attributes : sequence of str
-        Names of further dimensions, as laspy calls them, as ``classification``.
+        Names of further dimensions in laspy, such as ``classification``.
     chunk_points : int
-        Points at a time.
+        Points in a chunk.
 
     Yields
     ------
@@ -122,9 +122,9 @@ def read_cloud(
     Raises
     ------
     ValueError
-        For a file that is cut off, damaged or without times, and a dimension that it has not.
+        If the file is truncated, damaged or without times or a dimension.
     OSError
-        When reading fails.
+        If reading fails.
 
     >>> import mlscorr, numpy as np, tempfile
     >>> from mlscorr.simulate import Scenario, simulate
@@ -157,7 +157,7 @@ def read_cloud(
         xyz += layout.offset
         yield PointCloud(
             xyz,
-            file.trajectory_time(own["gps_time"]) + 0.0,  # of its own memory: records are reused
+            file.trajectory_time(own["gps_time"]) + 0.0,  # own memory, because records are reused
             own["intensity"].copy(),
             {name: layout.dimension(records, name)[rows] for name in attributes},
         )
@@ -166,18 +166,18 @@ def read_cloud(
 def read_windows(
     file: CloudFile, spans: np.ndarray, limit: int = SETTINGS.chunk_points
 ) -> Iterator[PointCloud]:
-    """Points of a file that were measured about some spans of time; all of a short file.
+    """Read points of a file measured within some intervals of time; all of a short file.
 
-    Of a span with many points those about its middle are read.
+    In an interval with many points, those around its middle are read.
 
     Parameters
     ----------
     file : CloudFile
-        Its points in order of time.
+        With points in order of time.
     spans : (k, 2) array
         Starts and ends in the trajectory's time. Units: s.
     limit : int
-        Number of points up to which a file is short, and a span has not many.
+        Number of points up to which a file is short, or an interval is read completely.
 
     Yields
     ------
@@ -186,7 +186,7 @@ def read_windows(
     Raises
     ------
     ValueError
-        Where points of a long file are not in order of time, or can't be decoded.
+        If points of a long file are not in order of time, or cannot be decoded.
     """
     if isinstance(file, CloudInMemory):
         for chunk in file.chunks(limit):
@@ -201,7 +201,7 @@ def read_windows(
         return
     places, records = spread_records(layout)
     times = file.counted(records["gps_time"])
-    if not (np.diff(times) >= 0).all():  # because of points without a time, perhaps
+    if not (np.diff(times) >= 0).all():  # perhaps because of points without a time
         is_timed = ~lacks_time(records["gps_time"])
         places = places[is_timed]
         times = times[is_timed]
@@ -224,7 +224,7 @@ def read_windows(
 
 
 def _place(layout: LasLayout, file: CloudFile, places, times, time, side):
-    """Number of a point before (side 0) or behind (1) those of a time, by bisection."""
+    """Index of the first point not before (side 0) or after (1) a time, by bisection."""
     k = int(np.clip(np.searchsorted(times, time), 1, len(times) - 1))
     bounds = [int(places[k - 1]), int(places[k]) + 1]
     while bounds[1] - bounds[0] > SETTINGS.close_places:
@@ -235,7 +235,7 @@ def _place(layout: LasLayout, file: CloudFile, places, times, time, side):
 
 
 def sample_gps_times(path: str | Path) -> tuple[int, bool, np.ndarray]:
-    """Number of points, time flag and a few times of a LAS or LAZ file, which is checked.
+    """Return number of points, time flag and a few times of a LAS or LAZ file, which is checked.
 
     Parameters
     ----------
@@ -245,21 +245,21 @@ def sample_gps_times(path: str | Path) -> tuple[int, bool, np.ndarray]:
     -------
     points : int
     is_standard : bool
-        Whether the header says adjusted standard GPS time, not seconds of week.
+        True if the header states adjusted standard GPS time, not seconds of week.
     times : (65 or fewer,) array
-        gps_time of points spread over the file, in file order, that have one. Units: s.
+        Valid gps_time of points spread over the file, in file order. Units: s.
 
     Raises
     ------
     ValueError
-        When the file is missing, not LAS, cut off, or without gps_time.
+        If the file is missing, not LAS, truncated, or without gps_time.
     """
     layout = read_layout(path)
     return layout.points, layout.is_standard, timed_records(layout)["gps_time"]
 
 
 def timed_records(layout: LasLayout) -> np.ndarray:
-    """Records of points spread over a file that have a time; (0,) where none has.
+    """Records with a valid time of points spread over a file; (0,) if there is none.
 
     Parameters
     ----------
@@ -270,9 +270,9 @@ def timed_records(layout: LasLayout) -> np.ndarray:
 
 
 def spread_records(layout: LasLayout) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers of points spread over a file, first and last among them, and their records.
+    """Indices of points spread over a file, including the first and last, and their records.
 
-    In the order of the file; records as of records_at.
+    Both are in the order of the file; for records see records_at.
 
     Parameters
     ----------
@@ -300,13 +300,13 @@ def _spread_records(
 
 
 def records_at(layout: LasLayout, places: ArrayLike) -> np.ndarray:
-    """Records of a few points, of which only gps_time and point_source_id are sure to be decoded.
+    """Read records of a few points; only gps_time and point_source_id are certain to be decoded.
 
     Parameters
     ----------
     layout : LasLayout
     places : (n,) array of int
-        Numbers of the points.
+        Indices of the points.
 
     Returns
     -------
@@ -333,9 +333,9 @@ def records_at(layout: LasLayout, places: ArrayLike) -> np.ndarray:
 
 
 def count_sources(layout: LasLayout) -> np.ndarray:
-    """Number of points (65536,) with each point_source_id.
+    """Count the points (65536,) with each point_source_id.
 
-    Where LAZ keeps the ids apart (point formats 6 to 10) that takes half the time of reading.
+    If LAZ stores the IDs separately (point formats 6 to 10), this takes half the time of reading.
 
     Parameters
     ----------
@@ -348,7 +348,7 @@ def count_sources(layout: LasLayout) -> np.ndarray:
 
 
 def sha256(path: str | Path) -> str:
-    """SHA-256 of a file.
+    """Compute the SHA-256 of a file.
 
     Parameters
     ----------
@@ -365,12 +365,12 @@ def sha256(path: str | Path) -> str:
 
 @dataclass
 class NoiseCount:
-    """Points that were left out as noise.
+    """Count of points omitted as noise.
 
     Parameters
     ----------
     parts : dict
-        Numbers of points flagged and read, by file and the part of it that was read (None for all).
+        Numbers of flagged and read points, by file and part of it (None for all).
     """
 
     parts: dict[CloudFile, dict[tuple[int, int] | None, tuple[int, int]]] = field(
@@ -378,13 +378,13 @@ class NoiseCount:
     )
 
     def add(self, file: CloudFile, part: tuple[int, int] | None, flagged: int, read: int) -> None:
-        """Count what was read once, however often it is read again.
+        """Count a part once, however often it is read again.
 
         Parameters
         ----------
         file : CloudFile
         part : (int, int) or None
-            First point, and the one behind the last; None for all of the file.
+            Index of the first point, and of the one after the last; None for the whole file.
         flagged, read : int
             Number of points.
         """
@@ -392,7 +392,7 @@ class NoiseCount:
 
     @property
     def totals(self) -> tuple[int, int]:
-        """Number of points flagged as noise, and of all that were read."""
+        """Number of points flagged as noise, and of all points read."""
         flagged = read = 0
         for own in self.parts.values():
             for counts in [own[None]] if None in own else own.values():
@@ -402,7 +402,7 @@ class NoiseCount:
 
     @property
     def sentence(self) -> str:
-        """Sentence on them; empty where there are none."""
+        """Sentence on these points; empty without any."""
         flagged, read = self.totals
         if not flagged:
             return ""
@@ -427,7 +427,7 @@ def _noise_sentence(flagged: int, points: int, classes: list[int]) -> str:
 
 @contextmanager
 def counted_noise() -> Iterator[NoiseCount]:
-    """Count the points that reading leaves out as noise until the block ends.
+    """Count the points omitted as noise until the block ends.
 
     Yields
     ------

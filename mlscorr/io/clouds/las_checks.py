@@ -1,4 +1,4 @@
-"""LAS and LAZ files, checked against their bytes before their points are read."""
+"""Checks of LAS and LAZ files against their bytes before their points are read."""
 
 import struct
 from collections.abc import Iterator, Sequence
@@ -14,7 +14,7 @@ from mlscorr.io.clouds.las_layout import COPC, LasLayout, decoding
 from mlscorr.io.settings import SETTINGS
 from mlscorr.io.store import as_path, file_state, is_there, open_file
 
-INFO = struct.Struct("<5d2Q2d88x")  # centre, half edge, spacing; root page; first and last time
+INFO = struct.Struct("<5d2Q2d88x")  # center, half edge, spacing; root page; first and last time
 ENTRY = np.dtype([("key", "(4,)<i4"), ("start", "<u8"), ("size", "<i4"), ("points", "<i4")])
 HEADER_SIZES = (227, 227, 227, 235, 375, 393)  # bytes, of LAS 1.0 to 1.5
 COPC_FORMATS = (6, 7, 8)  # COPC 1.0
@@ -22,9 +22,9 @@ EVLR_HEADER = struct.Struct("<2x16sHQ32s")  # owner, record, length of data, des
 
 
 def read_layout(path: str | Path) -> LasLayout:
-    """LasLayout of a LAS 1.0-1.5 or LAZ file with gps_time, checked; of an E57 or PLY its LAZ's.
+    """Read and check the LasLayout of a LAS 1.0-1.5 or LAZ file with gps_time, or of an E57 or PLY.
 
-    Nothing is allocated by a number that was not checked.
+    No memory is allocated by an unchecked number.
 
     Parameters
     ----------
@@ -37,8 +37,8 @@ def read_layout(path: str | Path) -> LasLayout:
     Raises
     ------
     ValueError
-        When the file is missing, is none of these, has no points or no gps_time, or holds less
-        than its header says.
+        If the file is missing, has another format, has no points or no gps_time, or is shorter than
+        its header states.
     """
     path = as_path(path)
     if not is_there(path):
@@ -102,7 +102,7 @@ def _check_header(layout):
             f"coordinates must be numbers up to {SETTINGS.largest_coordinate:g} m, the scale above "
             "zero. Copy the file anew."
         )
-    old_points = layout.field("I", 107)[0]  # where LAS up to 1.3 has it, zero where not in use
+    old_points = layout.field("I", 107)[0]  # LAS up to 1.3 has it, zero if unused
     if old_points not in (0, layout.points):
         raise ValueError(
             f"{path} is damaged: its header announces {layout.points} points, and "
@@ -114,7 +114,7 @@ def _check_header(layout):
 
 
 def _check_kind(layout):
-    """That a LAS 1.5 or COPC file is what these may be."""
+    """Check that a LAS 1.5 or COPC file conforms to its specification."""
     path = layout.path
     number = layout.point_format
     if layout.version >= (1, 5) and number < 6:
@@ -134,7 +134,7 @@ def _check_kind(layout):
 
 
 def _check_size(layout):
-    """Byte where uncompressed points end."""
+    """Byte at which uncompressed points end, checked."""
     start = len(layout.head)
     end = min(layout.tail, layout.size)
     whole = (end - start) // layout.record_length
@@ -154,7 +154,7 @@ def _other_count(layout, points):
 
 
 def _check_chunks(layout, file):
-    """Byte where compressed points end and the chunk table starts."""
+    """Byte at which compressed points end and the chunk table starts, checked."""
     path = layout.path
     start = len(layout.head)
     _check_laszip(layout)
@@ -174,7 +174,7 @@ def _check_chunks(layout, file):
         file.seek(start)
         chunks = lazrs.read_chunk_table(file, lazrs.LazVlr(layout.laszip))
         layout.decoder(file, threads=False)
-    while len(chunks) > 1 and chunks[-1] == (0, 0):  # which lazrs adds where chunks differ in size
+    while len(chunks) > 1 and chunks[-1] == (0, 0):  # added by lazrs if chunks differ in size
         chunks.pop()
     if (used := sum(length for _, length in chunks)) > table - start:
         raise ValueError(
@@ -182,7 +182,7 @@ def _check_chunks(layout, file):
             "Copy it anew."
         )
     _check_chunk_points(layout, [points for points, _ in chunks])
-    if layout.point_format >= 6:  # chunks of layers say behind their first point how many they are
+    if layout.point_format >= 6:  # layered chunks state their number after the first point
         file.seek(start + 8 + used - chunks[-1][1] + layout.record_length)
         whole = sum(points for points, _ in chunks[:-1])
         whole += int.from_bytes(file.read(4), "little")
@@ -194,7 +194,9 @@ def _check_chunks(layout, file):
 
 
 def _check_chunk_points(layout, points):
-    """That chunks of these points (the last may hold fewer) hold the file's, and fit memory."""
+    """Check that chunks with these points (the last may be smaller) match the file and fit
+    memory.
+    """
     path = layout.path
     whole = sum(points)
     longest = max(points)
@@ -212,7 +214,7 @@ def _check_chunk_points(layout, points):
 
 
 def _check_laszip(layout):
-    """That the LASzip VLR describes the points of the header, in a way that lazrs knows."""
+    """Check that the LASzip VLR describes the points of the header in a way that lazrs supports."""
     path = layout.path
     data = layout.laszip
     expected = lazrs.LazVlr.new_for_compression(layout.point_format, layout.extra_bytes)
@@ -231,14 +233,14 @@ def _check_laszip(layout):
 
 
 def _items(laszip):
-    """Number of items in a LASzip VLR, and kind and length of each; their versions left out."""
+    """Number of items in a LASzip VLR, and kind and length of each, without versions."""
     count = laszip[32:34]
     rows = laszip[34:]
     return count, [row[:2] for row in struct.iter_unpack("<HHH", rows[: len(rows) // 6 * 6])]
 
 
 def _check_tail(layout, file, points_end):
-    """That EVLRs and waveforms lie between the points and the end of the file."""
+    """Check that EVLRs and waveforms are between the points and the end of the file."""
     path = layout.path
     size = layout.size
     if not points_end <= layout.tail <= size:
@@ -252,7 +254,7 @@ def _check_tail(layout, file, points_end):
 
 
 def evlrs(layout: LasLayout, file: BinaryIO) -> Iterator[tuple[int, int]]:
-    """Position and size of each EVLR. Units: bytes.
+    """Yield position and size of each EVLR. Units: bytes.
 
     Parameters
     ----------
@@ -263,7 +265,7 @@ def evlrs(layout: LasLayout, file: BinaryIO) -> Iterator[tuple[int, int]]:
         return
     position, count = layout.field("QI", 235)
     for _ in range(count):
-        file.seek(min(position, layout.size))  # of a damaged file it may lie anywhere
+        file.seek(min(position, layout.size))  # in a damaged file it may be anywhere
         header = file.read(EVLR_HEADER.size)
         size = EVLR_HEADER.size + int.from_bytes(header[20:28], "little")
         yield position, size
@@ -271,7 +273,7 @@ def evlrs(layout: LasLayout, file: BinaryIO) -> Iterator[tuple[int, int]]:
 
 
 def variable_records(layout: LasLayout, user: bytes, record: int) -> list[bytes]:
-    """Data of the VLRs and EVLRs of a user and a record.
+    """Data of the VLRs and EVLRs with a user and a record ID.
 
     Parameters
     ----------
@@ -290,7 +292,7 @@ def variable_records(layout: LasLayout, user: bytes, record: int) -> list[bytes]
 
 
 def _check_hierarchy(layout: LasLayout, file: BinaryIO, chunks: Sequence[tuple[int, int]]) -> None:
-    """That each LAZ chunk of a COPC file is a node of its hierarchy, and each node a chunk."""
+    """Check that LAZ chunks of a COPC file and nodes of its hierarchy correspond."""
     info = b"".join(layout.vlr_data(*COPC))
     if len(info) != INFO.size:
         raise ValueError(
@@ -301,7 +303,7 @@ def _check_hierarchy(layout: LasLayout, file: BinaryIO, chunks: Sequence[tuple[i
     entries = np.concatenate([np.empty(0, ENTRY), *_pages(layout, file, start, size, len(chunks))])
     nodes = np.sort(entries[entries["points"] > 0], order="start")
     points, sizes = np.array(chunks, np.int64).T
-    starts = len(layout.head) + 8 + np.cumsum(sizes) - sizes  # behind the position of their table
+    starts = len(layout.head) + 8 + np.cumsum(sizes) - sizes  # after the position of their table
     same = len(nodes) == len(chunks) and (
         np.array_equal(nodes["start"], starts)
         and np.array_equal(nodes["size"], sizes)
@@ -317,7 +319,7 @@ def _check_hierarchy(layout: LasLayout, file: BinaryIO, chunks: Sequence[tuple[i
 
 
 def _pages(layout, file, start, size, chunks) -> Iterator[np.ndarray]:
-    """Entries of each page of a hierarchy."""
+    """Yield the entries of each page of a hierarchy."""
     pages = [(start, size)]
     known = {start}
     while pages:
@@ -336,9 +338,9 @@ def _pages(layout, file, start, size, chunks) -> Iterator[np.ndarray]:
         file.seek(start)
         entries = np.frombuffer(file.read(size), ENTRY)
         yield entries
-        for entry in entries[entries["points"] == -1]:  # nodes that are on a page of their own
+        for entry in entries[entries["points"] == -1]:  # nodes that have their own page
             page = int(entry["start"]), int(entry["size"])
-            if page[0] in known or len(known) > chunks:  # a page in circles
+            if page[0] in known or len(known) > chunks:  # a cycle of pages
                 raise ValueError(
                     f"{layout.path} is damaged: its COPC hierarchy has page {page[0]} twice, or "
                     f"more pages than chunks ({chunks}). Copy it anew."

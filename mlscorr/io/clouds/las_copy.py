@@ -1,4 +1,4 @@
-"""Corrected copies of LAS and LAZ files, in which only what a correction changes is new."""
+"""Corrected copies of LAS and LAZ files that change only what a correction requires."""
 
 import warnings
 from collections.abc import Callable, Sequence
@@ -23,18 +23,18 @@ from mlscorr.survey import AXES, CloudFile, CloudInMemory, Correcting, PointClou
 SIGMAS = tuple(f"sigma_{axis}" for axis in AXES)
 DISPLACEMENTS = tuple(f"displacement_{axis}" for axis in AXES)
 UINT16, INT32 = 3, 6  # numbers of the types, ASPRS LAS 1.4 R15, table 24
-PROVENANCE = (b"mlscorr", 1)  # user and record of the VLR that names what corrected a file
+PROVENANCE = (b"mlscorr", 1)  # user and record of the VLR that names the correcting program
 SOFTWARE = slice(58, 90)  # bytes of the header: generating software
 UNKNOWN = np.iinfo(np.uint16).max  # of a point without a pose
 
 
 @dataclass(frozen=True)
 class Additions:
-    """What a corrected file has beside its points' new places, nothing by default.
+    """Optional additions to a corrected file, none by default.
 
-    By default all but the places stays as it was, byte for byte, so that two files can be compared
-    and a correction by zero gives the file itself. Each of these breaks that promise, so each is
-    asked for.
+    By default everything except the coordinates is copied byte for byte, so that files can be
+    compared and a zero correction reproduces the file. Each addition breaks this rule, so each must
+    be requested.
 
     Parameters
     ----------
@@ -42,13 +42,12 @@ class Additions:
         Fields sigma_easting, sigma_northing, sigma_height of each point: uint16, 0.1 mm.
     displacement : bool
         Fields displacement_easting, displacement_northing, displacement_height of each point,
-        corrected - recorded: int32 of the file's own scale, so that the recorded integers come
-        back exactly. Zero for points that were left as they were.
+        corrected - recorded: int32 of the file's own scale, so that the recorded integers can be
+        restored exactly. Zero for unchanged points.
     provenance : str, optional
-        Text of a VLR (user id mlscorr, record id 1), which makes mlscorr the generating software,
-        too.
+        Text of a VLR (user ID mlscorr, record ID 1); mlscorr also becomes the generating software.
     version : str
-        Of mlscorr, for the header; used with provenance alone.
+        Version of mlscorr for the header; used only with provenance.
     """
 
     sigma: bool = False
@@ -58,7 +57,7 @@ class Additions:
 
     @property
     def has_fields(self) -> bool:
-        """Whether points get longer."""
+        """True if points get longer."""
         return self.sigma or self.displacement
 
 
@@ -67,22 +66,22 @@ NOTHING_ADDED = Additions()
 
 @dataclass(frozen=True)
 class CorrectedPart:
-    """Points of a file, and how they are corrected.
+    """Points of a file, and their correction.
 
     Parameters
     ----------
     file : CloudFile
-        All of the file, or those of one of several scanners or drives.
+        The whole file, or the points of one of several scanners or drives.
     correction : Correction, or anything else with ``apply(cloud) -> cloud``
     sigma : PointSigma, optional
         Adds the fields sigma_easting, sigma_northing and sigma_height to each point.
     watch : function, optional
-        Called for each chunk that is done with the gps_time (n,) in the trajectory's system, and
-        with which points are flagged as noise (n,).
+        Called for each finished chunk with the gps_time (n,) in the trajectory's system, and the
+        noise flags (n,).
     additions : Additions
-        Displacement and provenance; sigmas go by ``sigma``. The same for all parts of a file.
+        Displacement and provenance; for sigmas see ``sigma``. The same for all parts of a file.
     sample : function, optional
-        Called for each chunk, before it is corrected, with its points as ``read_chunks`` has them.
+        Called for each chunk, before it is corrected, with its points as from ``read_chunks``.
     """
 
     file: CloudFile
@@ -94,18 +93,18 @@ class CorrectedPart:
 
     @property
     def added(self) -> Additions:
-        """Additions with the fields of sigmas, where it has them."""
+        """Additions, including the fields of sigmas if the part has them."""
         return replace(self.additions, sigma=self.sigma is not None)
 
     def move(self, layout: LasLayout, records: np.ndarray, sigmas: np.ndarray | None) -> int:
-        """Correct its points among records in place; returns those outside the trajectory.
+        """Correct its points among records in place; return those outside the trajectory.
 
         Parameters
         ----------
         layout : LasLayout
         records : (n,) structured array
         sigmas : (n, 3) array, optional
-            Those of its points are filled in. Units: m.
+            Output for its points. Units: m.
         """
         rows = self.file.rows(records["point_source_id"])
         some = records[rows]
@@ -132,7 +131,7 @@ class CorrectedPart:
 
 
 def _write_points(part, file, target):
-    """Write points in memory, corrected, as a new file; the number of those outside."""
+    """Write corrected points from memory as a new file; return the number of those outside."""
     if part.sigma is not None:
         raise ValueError(
             f"{file.name} stands for points in memory, which are written without the fields of "
@@ -162,32 +161,32 @@ def _write_points(part, file, target):
 
 
 def write_parts(parts: Sequence[CorrectedPart], target: str | Path) -> list[int]:
-    """Copy a file with corrected coordinates; all else stays as it was, byte for byte.
+    """Copy a file with corrected coordinates; all else is copied byte for byte.
 
-    What changes: X, Y, Z of each point, the bounds in the header, and where it must, the
-    position of what follows the points; and what the parts' additions ask for. The target's suffix
-    says whether it is compressed. It appears whole or not at all: it is written beside its place as
-    ``.part``, and read again before it takes its name. A file there is replaced.
+    Changes are limited to X, Y, Z of each point, the bounds in the header, the position of data
+    after the points where necessary, and the parts' additions. The target's suffix determines
+    compression. The file is written atomically, as ``.part`` in the same folder, and checked by
+    reading before it gets its name. An existing file is replaced.
 
     Parameters
     ----------
     parts : sequence of CorrectedPart
-        Of one file, whose points several scanners may have measured; with sigmas, or without.
+        Parts of one file, possibly of several scanners; all with sigmas, or none.
     target : path
         ``.las`` or ``.laz``, not the input.
 
     Returns
     -------
     list of int
-        Number of points of each outside the trajectory, which are unchanged.
+        Number of unchanged points of each part, which are outside the trajectory.
 
     Raises
     ------
     ValueError
-        For bad input, a target that is the input, coordinates that overflow, and LAZ files with
+        For invalid input, a target equal to the input, overflowing coordinates, and LAZ files with
         waveforms (formats 9 and 10) of several scanner channels, which lazrs would damage.
     OSError
-        When the target cannot be written.
+        If the target cannot be written.
     """
     if isinstance(parts[0].file, CloudInMemory):
         return [_write_points(part, part.file, target) for part in parts]
@@ -221,16 +220,16 @@ def write_parts(parts: Sequence[CorrectedPart], target: str | Path) -> list[int]
 
 
 class _Corrected:
-    """The records of a file after their correction, and what was counted while they passed.
+    """Records of a file after their correction, and counts collected meanwhile.
 
     Attributes
     ----------
     written : LasLayout
-        Of the corrected records.
+        Layout of the corrected records.
     outside : (k,) int array
         Number of points of each part outside the trajectory.
     untimed : dict
-        Number of points by what stands in place of a time: a number (s), or NaN for none.
+        Number of points without a valid time, by the stored value (s), or NaN for none.
     bounds : (2, 3) array
         Largest and smallest integers of the coordinates.
     """
@@ -244,7 +243,9 @@ class _Corrected:
         self.written = with_additions(layout, self._added)
 
     def blocks(self, is_final):
-        """All records, (n,) at a time, as bytes of each; those who watch are told the last time."""
+        """Yield all records, (n,) at a time, as bytes of each; watchers are called in the final
+        pass.
+        """
         layout = self._layout
         added = self._added
         if is_final:
@@ -279,12 +280,12 @@ class _Corrected:
 
 
 def _integers(records):
-    """Coordinates (n, 3) of point records as they are stored."""
+    """Coordinates (n, 3) of point records, as stored."""
     return np.column_stack([records[name] for name in "XYZ"]).astype(np.int64)
 
 
 def _shift_integers(correction, xyz, scale, offset, gps_time, time_constant):
-    """Correction.shift_integers for what has only ``apply``; no point lies outside of that."""
+    """Correction.shift_integers for corrections with only ``apply``, where no point is outside."""
     old = np.column_stack(xyz)
     places = old * scale + offset
     cloud = PointCloud(places, gps_time + time_constant, np.zeros(len(gps_time)))
@@ -297,7 +298,7 @@ def _shift_integers(correction, xyz, scale, offset, gps_time, time_constant):
 
 
 def _check_channels(layout, target, records):
-    """That lazrs keeps the waveforms: it mixes them up where scanner channels alternate."""
+    """Check that lazrs preserves the waveforms, which it mixes up if scanner channels alternate."""
     is_laz = layout.is_compressed or target.suffix.lower() == ".laz"
     if not is_laz or layout.point_format not in (9, 10):
         return
@@ -322,7 +323,7 @@ def _check_target(source, target):
 
 
 def _check_copy(layout, part):
-    """That the file just written can be opened and holds the points, up to the last."""
+    """Check that the file just written can be opened and contains all points."""
     copy = read_layout(part)
     records_at(copy, [copy.points - 1])
     if copy.points != layout.points:
@@ -330,9 +331,9 @@ def _check_copy(layout, part):
 
 
 def with_additions(layout: LasLayout, additions: Additions) -> LasLayout:
-    """The LasLayout of a copy with more fields behind each point, or a VLR on its provenance.
+    """Return the LasLayout of a copy with additional point fields, or a VLR on its provenance.
 
-    Extra bytes that nobody described get a descriptor, as the new ones follow them. All VLRs stay.
+    Undescribed extra bytes get a descriptor, because the new ones follow them. All VLRs are kept.
 
     Parameters
     ----------
@@ -346,7 +347,7 @@ def with_additions(layout: LasLayout, additions: Additions) -> LasLayout:
     Raises
     ------
     ValueError
-        When the points have these fields already, or fewer bytes than described.
+        If the points already have these fields, or have fewer bytes than described.
     """
     if additions.has_fields:
         layout = _with_fields(layout, additions)
@@ -360,7 +361,7 @@ def with_additions(layout: LasLayout, additions: Additions) -> LasLayout:
 
 
 def _with_fields(layout, additions):
-    """The LasLayout with sigmas and displacements behind each point."""
+    """LasLayout with sigmas and displacements appended to each point."""
     owner = (ExtraBytesVlr.official_user_id().encode(), ExtraBytesVlr.official_record_ids()[0])
     described = b"".join(variable_records(layout, *owner))
     size = ExtraBytesStruct.size()
@@ -402,13 +403,13 @@ def _with_fields(layout, additions):
 
 
 def _sigma_steps(sigma):
-    """Sigmas (n, 3) in m as stored: NaN is unknown; what exceeds 6.5534 m is given as that."""
+    """Sigmas (n, 3) in m as stored: NaN is unknown; values above 6.5534 m are stored as that."""
     steps = np.minimum(np.rint(sigma / SETTINGS.sigma_step), UNKNOWN - 1)
     return np.where(np.isnan(steps), UNKNOWN, steps).astype("<u2")
 
 
 def _lengthened(records, columns):
-    """Bytes (k,) of point records with further columns (n, 3) behind each."""
+    """Bytes (k,) of point records with further columns (n, 3) appended to each."""
     if not columns:
         return records.view(np.uint8)
     raw = [records.view(np.uint8).reshape(len(records), -1)]
@@ -417,7 +418,7 @@ def _lengthened(records, columns):
 
 
 def _descriptor(name, description=b"", scale=None, no_data=None, **fields):
-    """Bytes that describe one field; laspy's own start states a range that nobody measured."""
+    """Bytes that describe one field; laspy's own would state a range that was never measured."""
     field = ExtraBytesStruct.from_buffer_copy(bytes(ExtraBytesStruct.size()))
     for key, value in {"name": name, "description": description, **fields}.items():
         setattr(field, key, value)

@@ -1,4 +1,4 @@
-"""The CRS that a LAS or LAZ file states in its VLRs, and whether it is that of the survey."""
+"""CRS stated in the VLRs of a LAS or LAZ file, and its agreement with that of the survey."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ GEO_KEYS = 34735
 PROJECTED = 3072
 GEOGRAPHIC = 2048
 VERTICAL = 4096
-UNITS_OF_LENGTH = (3076, 4099)  # keys, in plan and of heights
+UNITS_OF_LENGTH = (3076, 4099)  # keys, horizontal and vertical
 FEET = {9002: "feet", 9003: "US survey feet"}  # their values
 
 
 def stated_crs(layout: LasLayout) -> CRS | None:
-    """The CRS of a file's VLRs, as WKT or as EPSG codes.
+    """Return the CRS of a file's VLRs, given as WKT or as EPSG codes.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def stated_crs(layout: LasLayout) -> CRS | None:
     Returns
     -------
     pyproj.CRS or None
-        None where no VLR states one, or PROJ doesn't know it.
+        None if no VLR states one, or PROJ does not know it.
     """
     words = [
         data.split(b"\0")[0].decode("utf-8", "replace")
@@ -45,7 +45,7 @@ def stated_crs(layout: LasLayout) -> CRS | None:
     code = _code(_geo_keys(layout))
     for text in filter(None, [*words, code] if layout.states_wkt else [code, *words]):
         try:
-            with warnings.catch_warnings(action="ignore"):  # of codes that PROJ replaces
+            with warnings.catch_warnings(action="ignore"):  # codes that PROJ replaces
                 return CRS.from_user_input(text)
         except CRSError:
             continue
@@ -60,11 +60,11 @@ def _geo_keys(layout):
 
 
 def _code(keys):
-    """EPSG code (with that of heights) of GeoKeys, empty without one."""
+    """EPSG code (with that of heights) of GeoKeys, or empty."""
     plan, heights = (
         next((keys[name] for name in names if 1024 <= keys.get(name, 0) < 32767), 0)
         for names in ((PROJECTED, GEOGRAPHIC), (VERTICAL,))
-    )  # beyond are those that a user defined
+    )  # higher values are user-defined
     if plan == 0:
         return ""
     if heights:
@@ -73,17 +73,17 @@ def _code(keys):
 
 
 def crs_conflict(layout: LasLayout, crs: str, source: str = "crs of survey.toml") -> str:
-    """A sentence where a file's own CRS is not that of the survey; empty where it is, or none.
+    """Return a sentence if a file's own CRS differs from that of the survey, otherwise empty.
 
-    What counts is where the file's middle lies: two names of one CRS are no conflict.
+    The position of the file's middle counts, so two names of one CRS do not conflict.
 
     Parameters
     ----------
     layout : LasLayout
     crs : str
-        Of the survey; one that can be used.
+        CRS of the survey, which must be valid.
     source : str
-        Where that is from.
+        Its origin.
     """
     stated = stated_crs(layout)
     survey_crs = CRS.from_user_input(crs)
@@ -100,7 +100,7 @@ def crs_conflict(layout: LasLayout, crs: str, source: str = "crs of survey.toml"
 
 
 def _other_units(layout, stated):
-    """Words on coordinates that are not in metres, whatever the unit that their CRS has."""
+    """Phrase on coordinates that are not in meters, whatever the unit of their CRS."""
     keys = {} if layout.states_wkt else _geo_keys(layout)
     units = [FEET[keys[key]] for key in UNITS_OF_LENGTH if keys.get(key) in FEET]
     units += [axis.unit_name for axis in stated.axis_info if axis.unit_name != "metre"]
@@ -110,7 +110,7 @@ def _other_units(layout, stated):
 
 
 def _other_place(layout, stated, survey_crs):
-    """Words on how far apart the middle of a cloud lies by two CRS."""
+    """Phrase on the distance between the middles of a cloud in two CRS."""
     if stated.to_2d().to_epsg() == survey_crs.to_2d().to_epsg() is not None:
         return ""
     middle = cloud_box(layout).mean(axis=0)[:2]
@@ -131,7 +131,7 @@ def _other_place(layout, stated, survey_crs):
 
 
 def _other_heights(stated, survey_crs):
-    """Words on two systems of heights."""
+    """Phrase on two systems of heights."""
     if not (stated.is_compound and survey_crs.is_compound):
         return ""
     first, second = (crs.sub_crs_list[1] for crs in (stated, survey_crs))
@@ -145,7 +145,7 @@ def _other_heights(stated, survey_crs):
 
 
 def cloud_box(layout: LasLayout) -> np.ndarray:
-    """Corners (2, 3) of the box that a file's header states, the lowest first. Units: m.
+    """Corners (2, 3) of the box in a file's header, the lowest first. Units: m.
 
     Parameters
     ----------

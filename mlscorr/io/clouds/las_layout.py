@@ -1,11 +1,11 @@
-"""What a LAS or LAZ file says of itself, kept as the bytes that it is, and its point records.
+"""Header of a LAS or LAZ file, kept as bytes, and its point records.
 
-laspy says what point formats and extra bytes are made of, lazrs decodes the points. Header and
-VLRs are kept as bytes, not read and written anew by laspy, which cannot leave alone what nobody
-changes: it refuses LAS 1.0, decodes every VLR that it knows (one bad one would stop the file) and
-writes reserved fields, bytes behind the end of a text and the signature of a VLR its own way; and
-it believes counts before they are checked (2^31-1 VLRs keep it busy for good).
-Byte positions are those of the ASPRS LAS 1.4 R15 specification, and of 1.5 R00.
+laspy defines point formats and extra bytes, lazrs decodes the points. Header and VLRs are kept as
+bytes instead of being rewritten by laspy, which does not preserve unchanged parts. It refuses LAS
+1.0, decodes every VLR that it knows (a bad one would stop the file), and changes reserved fields,
+bytes after the end of a text and the signature of a VLR. It also trusts counts before they are
+checked (2^31-1 VLRs would keep it busy forever). Byte positions are those of the ASPRS LAS 1.4 R15
+specification, and of 1.5 R00.
 """
 
 from __future__ import annotations
@@ -26,30 +26,30 @@ from mlscorr.io.store import open_file
 from mlscorr.io.trajectories import ADJUSTMENT
 
 VLR_HEADER = struct.Struct("<2x16sHH32s")  # owner, record, length of data, description
-# of the VLR that says how points are compressed
+# of the VLR with the compression
 LASZIP = b"laszip encoded"
 LASZIP_RECORD = 22204
 OLD_CLASS = "raw_classification"
 NEW_CLASS = "classification"
 NEW_FLAGS = "classification_flags"
-# of the VLR and the EVLR that tell an octree
+# of the VLR and the EVLR of an octree
 COPC = (b"copc", 1)
 HIERARCHY = (b"copc", 1000)
 
 
 @dataclass(frozen=True)
 class LasLayout:
-    """Where the parts of a LAS file lie: head (header and VLRs), points, tail (EVLRs, waveforms).
+    """Parts of a LAS file: head (header and VLRs), points, tail (EVLRs, waveforms).
 
     Parameters
     ----------
     path : Path
     head : bytes
-        All that precedes the points.
+        Everything before the points.
     size : int
-        Of the whole file. Units: bytes.
+        Size of the whole file. Units: bytes.
     source : Path, optional
-        The cloud of another format that the file at path was made of.
+        Cloud in another format from which the file at path was made.
     """
 
     path: Path
@@ -59,11 +59,11 @@ class LasLayout:
 
     @property
     def cloud(self) -> Path:
-        """The cloud as survey.toml names it."""
+        """Path of the cloud as survey.toml names it."""
         return self.source or self.path
 
     def field(self, form: str, start: int) -> tuple[Any, ...]:
-        """Values of the header.
+        """Return values of the header.
 
         Parameters
         ----------
@@ -86,22 +86,22 @@ class LasLayout:
 
     @property
     def is_standard(self) -> bool:
-        """Whether gps_time is adjusted standard GPS time, not seconds of week."""
+        """True if gps_time is adjusted standard GPS time, not seconds of week."""
         return bool(self.head[6] & 1)
 
     @property
     def states_wkt(self) -> bool:
-        """Whether the CRS is stated as WKT, not by GeoKeys."""
+        """True if the CRS is stated as WKT, not by GeoKeys."""
         return bool(self.head[6] & 16)
 
     @property
     def has_time_offset(self) -> bool:
-        """Whether gps_time is standard GPS time less an offset that the header states."""
+        """True if gps_time is standard GPS time minus an offset stated in the header."""
         return self.version >= (1, 5) and bool(self.head[6] & 64)
 
     @property
     def time_offset(self) -> float:
-        """What makes gps_time adjusted standard GPS time where another offset is stated. Units: s.
+        """Offset to adjusted standard GPS time if the header states another. Units: s.
 
         Source: ASPRS LAS 1.5 R00, Time Offset, in units of 1e6 s.
         """
@@ -116,17 +116,17 @@ class LasLayout:
 
     @property
     def is_compressed(self) -> bool:
-        """Whether the points are LAZ."""
+        """True if the points are compressed (LAZ)."""
         return bool(self.head[104] & 0x80)
 
     @property
     def record_length(self) -> int:
-        """Of a point with its extra bytes. Units: bytes."""
+        """Length of a point with its extra bytes. Units: bytes."""
         return self.field("H", 105)[0]
 
     @property
     def extra_bytes(self) -> int:
-        """Of a point, behind what its format has. Units: bytes."""
+        """Number of extra bytes of a point. Units: bytes."""
         return self.record_length - PointFormat(self.point_format).size
 
     @property
@@ -138,17 +138,17 @@ class LasLayout:
 
     @property
     def scale(self) -> np.ndarray:
-        """Of X, Y, Z: (3,). Units: m."""
+        """Scale of X, Y, Z, (3,). Units: m."""
         return np.array(self.field("3d", 131))
 
     @property
     def offset(self) -> np.ndarray:
-        """Of X, Y, Z: (3,). Units: m."""
+        """Offset of X, Y, Z, (3,). Units: m."""
         return np.array(self.field("3d", 155))
 
     @property
     def record(self) -> np.dtype:
-        """Type of a point record: the fields that are used here by name, the others by length."""
+        """Data type of a point record: the fields used here by name, the others by length."""
         fields = PointFormat(self.point_format).dtype().fields
         names = ["X", "Y", "Z", "intensity", "gps_time", "point_source_id"]
         if self.point_format >= 6:
@@ -160,19 +160,19 @@ class LasLayout:
         return np.dtype(form | {"itemsize": self.record_length})
 
     def dimension(self, records: np.ndarray, name: str) -> np.ndarray:
-        """A dimension (n,) of points by its name in laspy, of its own memory.
+        """Return a dimension (n,) of points by its name in laspy, in its own memory.
 
         Parameters
         ----------
         records : (n,) structured array
-            Contiguous, as read_records gives them.
+            Contiguous, as from read_records.
         name : str
-            As ``classification``, ``return_number`` or ``scan_angle``.
+            For example ``classification``, ``return_number`` or ``scan_angle``.
 
         Raises
         ------
         ValueError
-            Where points of this format have none of that name.
+            If points of this format have no such dimension.
         """
         point_format = PointFormat(self.point_format)
         known = list(point_format.dimension_names)
@@ -191,7 +191,7 @@ class LasLayout:
         return np.array(PackedPointRecord(records.view(whole), point_format)[name])
 
     def is_noise(self, records: np.ndarray, classes: Collection[int]) -> np.ndarray:
-        """Which points are withheld or of some classes: (n,) bool.
+        """Flag points that are withheld or in some classes, (n,) bool.
 
         Source: ASPRS LAS 1.4 R15, classification of point formats 0 to 5 and of 6 to 10.
 
@@ -200,7 +200,7 @@ class LasLayout:
         records : (n,) structured array
         classes : collection of int
         """
-        is_left_out = np.zeros(256, bool)  # by the byte that holds the class
+        is_left_out = np.zeros(256, bool)  # by the byte with the class
         is_left_out[list(classes)] = True
         if self.point_format >= 6:
             return is_left_out[records[NEW_CLASS]] | ((records[NEW_FLAGS] & 4) > 0)
@@ -210,7 +210,7 @@ class LasLayout:
 
     @cached_property
     def vlrs(self) -> list[tuple[int, int]]:
-        """Start and end in head of each VLR. Raises ValueError when they don't fit."""
+        """Start and end in head of each VLR. Raises ValueError if they do not fit."""
         count = self.field("I", 100)[0]
         bounds = []
         position = self.field("H", 94)[0]
@@ -228,7 +228,7 @@ class LasLayout:
         return bounds
 
     def owner(self, start: int) -> tuple[bytes, int]:
-        """User and record of the VLR that starts at a byte of head.
+        """Return user and record of the VLR that starts at a byte of head.
 
         Parameters
         ----------
@@ -243,7 +243,7 @@ class LasLayout:
         return user.split(b"\0")[0], record
 
     def vlr_data(self, user: bytes, record: int) -> Iterator[bytes]:
-        """Data of the VLRs of a user and a record.
+        """Yield data of the VLRs with a user and a record ID.
 
         Parameters
         ----------
@@ -261,7 +261,7 @@ class LasLayout:
     def head_with(
         self, user: bytes, record: int, data: bytes | None, description: bytes = b""
     ) -> bytes:
-        """Header and VLRs with the VLRs of a user and a record replaced by one, or by none.
+        """Return header and VLRs, with the VLRs of a user and a record replaced by one, or removed.
 
         Parameters
         ----------
@@ -287,7 +287,7 @@ class LasLayout:
         return bytes(head)
 
     def with_record_length(self, length: int) -> LasLayout:
-        """The LasLayout with longer point records.
+        """Return the LasLayout with longer point records.
 
         Parameters
         ----------
@@ -304,12 +304,12 @@ class LasLayout:
 
     @property
     def is_copc(self) -> bool:
-        """Whether the points lie in the chunks of an octree, in no order of time (COPC 1.0)."""
+        """True if the points are in the chunks of an octree, not in order of time (COPC 1.0)."""
         return bool(self.vlrs) and self.owner(self.vlrs[0][0]) == COPC and self.is_compressed
 
     @property
     def chunk_size(self) -> int:
-        """Number of points that are decoded together; 1 where it is none or differs by chunk."""
+        """Number of points that are decoded together; 1 if there are no chunks or sizes differ."""
         if not self.is_compressed:
             return 1
         vlr = lazrs.LazVlr(self.laszip)
@@ -319,7 +319,7 @@ class LasLayout:
 
     @cached_property
     def laszip(self) -> bytes:
-        """Data of the LASzip VLR, which says how the points are compressed."""
+        """Data of the LASzip VLR, which describes the compression of the points."""
         starts = [(a + VLR_HEADER.size, b) for a, b in self.vlrs if self.owner(a)[0] == LASZIP]
         if not starts:
             raise ValueError(
@@ -330,29 +330,29 @@ class LasLayout:
 
     @property
     def tail(self) -> int:
-        """Byte where EVLRs or waveforms start behind the points; the size where none are."""
+        """Byte after the points at which EVLRs or waveforms start, or the file size without any."""
         starts = [self.size]
-        if self.version >= (1, 3) and self.head[6] & 2:  # waveforms inside
+        if self.version >= (1, 3) and self.head[6] & 2:  # internal waveforms
             starts += self.field("Q", 227)
         if self.version >= (1, 4) and self.field("I", 243)[0]:
             starts += self.field("Q", 235)
         return min(starts)
 
     def decoder(self, file: BinaryIO, threads: bool = True, is_brief: bool = False) -> Any:
-        """What reads the points of a file: seek(point) and decompress_many(buffer).
+        """Return a reader of a file's points, with seek(point) and decompress_many(buffer).
 
         Parameters
         ----------
         file : binary file
             Open for reading.
         threads : bool
-            Without them seeking is cheap.
+            False makes seeking cheap.
         is_brief : bool
-            Whether only gps_time and point_source_id are sure to be decoded.
+            True if only gps_time and point_source_id need to be decoded.
 
         Returns
         -------
-        lazrs decompressor, or what has its methods
+        lazrs decompressor, or an object with its methods
         """
         file.seek(len(self.head))
         if not self.is_compressed:
@@ -376,17 +376,17 @@ def read_records(
     end: int | None = None,
     is_brief: bool = False,
 ) -> Iterator[np.ndarray]:
-    """Records chunk by chunk, each in the memory of the one before.
+    """Yield records in chunks, each in the memory of the previous one.
 
     Parameters
     ----------
     layout : LasLayout
     chunk_size : int
-        Points at a time.
+        Points in a chunk.
     first, end : int
-        As of read_chunks.
+        See ``read_chunks``.
     is_brief : bool
-        Whether gps_time and point_source_id do.
+        True if gps_time and point_source_id suffice.
 
     Yields
     ------
@@ -413,7 +413,7 @@ def read_records(
 
 
 def decoding_points(layout: LasLayout, first: int, end: int) -> AbstractContextManager:
-    """Where lazrs reads some points of a file."""
+    """Context in which lazrs reads some points of a file."""
     if end - first > 1:
         points = f"Points {first} to {end - 1}"
     else:
@@ -423,12 +423,12 @@ def decoding_points(layout: LasLayout, first: int, end: int) -> AbstractContextM
 
 @contextmanager
 def decoding(message: str) -> Iterator[None]:
-    """Where lazrs works: its errors, and what it aborts with, become a sentence.
+    """Context in which errors and aborts of lazrs become a message.
 
     Parameters
     ----------
     message : str
-        What can't be read. It ends where lazrs' own words follow in brackets.
+        Subject of the error; lazrs' own words follow in brackets.
 
     Raises
     ------
@@ -437,7 +437,7 @@ def decoding(message: str) -> Iterator[None]:
     try:
         yield
     except BaseException as error:
-        # a Rust panic derives from BaseException, and has no name that could be imported
+        # a Rust panic derives from BaseException, and its class cannot be imported
         if not isinstance(error, lazrs.LazrsError) and type(error).__name__ != "PanicException":
             raise
         raise ValueError(
@@ -446,7 +446,7 @@ def decoding(message: str) -> Iterator[None]:
 
 
 class _PlainPoints:
-    """Uncompressed points, read as lazrs reads the compressed ones.
+    """Reader of uncompressed points, with the interface of lazrs.
 
     Parameters
     ----------
@@ -464,17 +464,17 @@ class _PlainPoints:
         self._length = record_length
 
     def seek(self, point: int) -> None:
-        """Go on with a point.
+        """Continue with a point.
 
         Parameters
         ----------
         point : int
-            Its number.
+            Its index.
         """
         self._file.seek(self._start + point * self._length)
 
     def decompress_many(self, buffer: bytearray | np.ndarray) -> None:
-        """Fill a buffer with the points that follow.
+        """Fill a buffer with the next points.
 
         Parameters
         ----------
@@ -483,14 +483,14 @@ class _PlainPoints:
         Raises
         ------
         lazrs.LazrsError
-            Where points are missing.
+            If points are missing.
         """
         if self._file.readinto(buffer) != len(buffer):
             raise lazrs.LazrsError("the file ends")
 
 
 class _ChunkedPoints:
-    """Reads points as lazrs' decompressors do, whose seek goes astray where chunks differ in size.
+    """Reader of points like lazrs' decompressors, whose seek fails if chunks differ in size.
 
     Parameters
     ----------
@@ -499,7 +499,7 @@ class _ChunkedPoints:
     laszip : bytes
         Data of the LASzip VLR.
     selection : lazrs.DecompressionSelection
-        Which fields are decoded.
+        Fields to decode.
     """
 
     def __init__(self, file: BinaryIO, laszip: bytes, selection: lazrs.DecompressionSelection):
@@ -510,25 +510,25 @@ class _ChunkedPoints:
         self._length = vlr.item_size()
         self._chunks = lazrs.read_chunk_table(file, vlr)  # leaves the file at the first chunk
         points, sizes = np.array(self._chunks, np.int64).T
-        self._firsts = np.cumsum(points) - points  # numbers of the chunks' first points
+        self._firsts = np.cumsum(points) - points  # indices of the chunks' first points
         self._starts = file.tell() + np.cumsum(sizes) - sizes
         self._next = 0
         self._held = np.empty(0, np.uint8)
 
     def seek(self, point: int) -> None:
-        """Go on with a point.
+        """Continue with a point.
 
         Parameters
         ----------
         point : int
-            Its number.
+            Its index.
         """
         self._next = int(np.searchsorted(self._firsts, point, side="right")) - 1
         before = point - int(self._firsts[self._next])
         self._held = self._decoded(1)[before * self._length :]
 
     def decompress_many(self, buffer: bytearray | np.ndarray) -> None:
-        """Fill a buffer with the points that follow.
+        """Fill a buffer with the next points.
 
         Parameters
         ----------
@@ -537,7 +537,7 @@ class _ChunkedPoints:
         Raises
         ------
         lazrs.LazrsError
-            Where points are missing or can't be decoded.
+            If points are missing or cannot be decoded.
         """
         rest = np.frombuffer(buffer, np.uint8)
         while len(rest):
@@ -549,7 +549,7 @@ class _ChunkedPoints:
             self._held = self._held[taken:]
 
     def _decoded(self, points):
-        """Bytes of the next chunks, which hold so many points at least, if there are as many."""
+        """Bytes of the next chunks with at least a given number of points, if there are as many."""
         if self._next == len(self._chunks):
             raise lazrs.LazrsError("the file ends")
         end = self._next + 1

@@ -1,6 +1,6 @@
-"""Writing points as LAS or LAZ, block by block.
+"""Writers of LAS or LAZ points, block by block.
 
-New clouds are LAS 1.4, format 6 or 7; copies keep the head and the tail of another file.
+New clouds are LAS 1.4, format 6 or 7; copies keep head and tail of another file.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from mlscorr.io.settings import SETTINGS
 from mlscorr.io.store import output_file
 from mlscorr.survey import PointCloud
 
-Blocks = Callable[[bool], Iterator[np.ndarray]]  # of whether they are asked for the last time
+Blocks = Callable[[bool], Iterator[np.ndarray]]  # argument: True in the last pass
 SCAN_ANGLE_UNIT = 0.006  # deg, LAS 1.4 specification, formats 6 to 10
 INTEGER_LIMIT = np.iinfo(np.int32).max  # of coordinates
 
@@ -41,23 +41,23 @@ def cloud_writer(
     is_standard: bool = False,
     has_colours: bool = False,
 ) -> Iterator[CloudWriter]:
-    """A CloudWriter for one new LAS or LAZ file, which appears whole or not at all.
+    """Open a CloudWriter for one new LAS or LAZ file, which is written atomically.
 
     Parameters
     ----------
     path : path ending in ``.las`` or ``.laz``
     corner : (3,) array
-        A place near the cloud, from which its integers count. Units: m.
+        Position near the cloud, the reference of its integers. Units: m.
     crs : str, optional
-        What pyproj understands, such as ``EPSG:32650``; written as WKT.
+        Any CRS that pyproj understands, such as ``EPSG:32650``; written as WKT.
     scale : float
         Resolution of the stored coordinates. Units: m.
     created : date, optional
         Date in the header, today if not given.
     is_standard : bool
-        Whether times are adjusted standard GPS time, not seconds of the GPS week.
+        True if times are adjusted standard GPS time, not seconds of the GPS week.
     has_colours : bool
-        Whether points have colours: format 7.
+        True if points have colors (format 7).
 
     Yields
     ------
@@ -66,9 +66,9 @@ def cloud_writer(
     Raises
     ------
     ValueError
-        When no points were written.
+        If no points were written.
     OSError
-        When the disk refuses.
+        If the disk refuses.
     """
     path = Path(path)
     header = _header(corner, crs, scale, created, 7 if has_colours else 6)
@@ -91,7 +91,7 @@ def cloud_writer(
 
 
 class CloudWriter:
-    """Appends points to an open file; ``points`` counts them.
+    """Writer that appends points to an open file; ``points`` counts them.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ class CloudWriter:
         Raises
         ------
         ValueError
-            Where a coordinate is not a number or does not fit the scale.
+            If a coordinate is not a number or does not fit the scale.
         """
         if len(cloud) == 0:
             return
@@ -155,7 +155,7 @@ class CloudWriter:
 
 
 def _check(xyz, header):
-    """That coordinates are numbers and fit 32 bit integers."""
+    """Check that coordinates are numbers and fit 32-bit integers."""
     bad = int((~np.isfinite(xyz)).any(axis=1).sum())
     if bad:
         raise ValueError(f"{bad} of {len(xyz)} points have a coordinate that is not a number.")
@@ -169,7 +169,7 @@ def _check(xyz, header):
 
 
 def _header(corner, crs, scale, created, point_format):
-    """LAS header whose offset is the corner in whole metres."""
+    """LAS header whose offset is the corner in whole meters."""
     header = laspy.LasHeader(point_format=point_format, version="1.4")
     header.scales = np.full(3, scale)
     header.offsets = np.floor(corner)
@@ -177,14 +177,14 @@ def _header(corner, crs, scale, created, point_format):
     header.creation_date = created or date.today()
     header.global_encoding.gps_time_type = laspy.header.GpsTimeType.WEEK_TIME
     if crs is not None:
-        wkt = CRS.from_user_input(crs).to_wkt("WKT1_GDAL")  # LAS 1.4 asks for WKT 1
+        wkt = CRS.from_user_input(crs).to_wkt("WKT1_GDAL")  # LAS 1.4 requires WKT 1
         header.vlrs.append(laspy.vlrs.known.WktCoordinateSystemVlr(wkt))
         header.global_encoding.wkt = True
     return header
 
 
 class LasOutput(io.BufferedWriter):
-    """A new file that keeps what interrupts its writing; lazrs hides it behind its own error.
+    """New file that remembers what interrupts its writing, which lazrs replaces by its own error.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ class LasOutput(io.BufferedWriter):
         self.interruption: BaseException | None = None
 
     def write(self, data: Any) -> int:
-        """Append bytes, as any file does.
+        """Append bytes, like any file.
 
         Parameters
         ----------
@@ -209,13 +209,13 @@ class LasOutput(io.BufferedWriter):
             raise
 
     def encode(self, function: Callable, *arguments: object) -> None:
-        """Let lazrs write here; raises what the system raised.
+        """Let lazrs write here; raise the original error of the system.
 
         Parameters
         ----------
         function : function
         *arguments
-            Its own.
+            Arguments of the function.
         """
         try:
             function(*arguments)
@@ -223,7 +223,7 @@ class LasOutput(io.BufferedWriter):
             raise self.interruption or OSError(f"{self.name}: {error}") from error
 
     def complete(self, head: bytearray, bounds: np.ndarray) -> None:
-        """Write the head again, and see that all is on the disk.
+        """Write the head again, and flush everything to disk.
 
         Parameters
         ----------
@@ -240,16 +240,16 @@ class LasOutput(io.BufferedWriter):
 
 
 class PlainWriter:
-    """Writes points in the order in which they come, and what follows them.
+    """Writer of points in the given order, followed by the tail.
 
     Parameters
     ----------
     layout : LasLayout
-        Of the other file, with the records and VLRs that the new one has.
+        Layout of the other file, with the records and VLRs of the new one.
     output : LasOutput
         Empty.
     is_laz : bool
-        Whether points are compressed.
+        True if points are compressed.
     """
 
     def __init__(self, layout: LasLayout, output: LasOutput, is_laz: bool):
@@ -258,25 +258,25 @@ class PlainWriter:
         self._is_laz = is_laz
         self._vlr = lazrs.LazVlr.new_for_compression(layout.point_format, layout.extra_bytes)
         data = bytes(self._vlr.record_data()) if is_laz else None
-        if layout.is_copc:  # and the new one is none
+        if layout.is_copc:  # the new one is not a COPC
             layout = replace(layout, head=layout.head_with(*COPC, None))
         self.head = bytearray(layout.head_with(LASZIP, LASZIP_RECORD, data, b"http://laszip.org"))
         self.head[104] = layout.point_format | (0x80 if is_laz else 0)
 
     def write(self, blocks: Blocks, file: BinaryIO) -> None:
-        """Write the head as it is so far, the points and the tail.
+        """Write the current head, the points and the tail.
 
         Parameters
         ----------
         blocks : function
-            Gives all records, (n,) at a time, as bytes of each.
+            Yields all records, (n,) at a time, as bytes of each.
         file : binary file
-            The other one, open for reading.
+            The other file, open for reading.
 
         Raises
         ------
         OSError
-            Where the disk refuses.
+            If the disk refuses.
         """
         self._output.write(self.head)
         if self._is_laz:
@@ -290,7 +290,7 @@ class PlainWriter:
         self._append_tail(file)
 
     def _append_tail(self, file):
-        """Copy what follows the points of the other file, and its positions into the head."""
+        """Copy the tail of the other file, and update its positions in the head."""
         layout = self._layout
         self._output.seek(0, io.SEEK_END)
         moved = self._output.tell() - layout.tail

@@ -18,7 +18,7 @@ OLDER = ("char", "uchar", "short", "ushort", "int", "uint", "float", "double")  
 KINDS = {np.dtype(kind).name: kind for kind in TYPES} | dict(zip(OLDER, TYPES, strict=True))
 ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
 AXES = ("x", "y", "z")
-TIMES = ("gpstime", "time", "timestamp", "t")  # plain names, the surest first
+TIMES = ("gpstime", "time", "timestamp", "t")  # plain names, the most specific first
 INTENSITIES = ("intensity", "reflectance", "amplitude")
 COLOURS = (("red", "green", "blue"), ("r", "g", "b"))
 HEADER = """\
@@ -35,7 +35,7 @@ end_header
 
 
 def open_ply(path: Path) -> CloudSource:
-    """A cloud in a PLY by its header.
+    """Open a cloud in a PLY file by its header.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def open_ply(path: Path) -> CloudSource:
     Raises
     ------
     ValueError
-        For a file that is damaged or none, and one without coordinates or times.
+        If the file is damaged, not a PLY, or without coordinates or times.
     """
     vertices = _header(path)
     names = vertices.kind.names
@@ -75,7 +75,7 @@ def open_ply(path: Path) -> CloudSource:
 
 @dataclass(frozen=True)
 class _Vertices:
-    """Where the points of a PLY are, and what their properties are."""
+    """Position and properties of the points of a PLY."""
 
     path: Path
     start: int  # bytes
@@ -85,11 +85,11 @@ class _Vertices:
 
     @property
     def names(self):
-        """Plain names of the properties to their own; CloudCompare's without their scalar."""
+        """Properties by their plain names; those of CloudCompare without the prefix scalar."""
         return {plain(name).removeprefix("scalar"): name for name in reversed(self.kind.names)}
 
     def first(self, names):
-        """The property that has the first of some plain names, None without one."""
+        """Property with the first of some plain names, None without one."""
         return next((self.names[name] for name in names if name in self.names), None)
 
     @property
@@ -99,7 +99,7 @@ class _Vertices:
         return [self.names[name] for name in next(known, ())]
 
     def read(self, size):
-        """Records block by block."""
+        """Yield records in blocks."""
         if not self.is_text:
             whole = np.memmap(self.path, self.kind, "r", self.start, self.points)
             yield from (whole[start : start + size] for start in range(0, self.points, size))
@@ -118,7 +118,7 @@ class _Vertices:
 
 
 def _header(path) -> _Vertices:
-    """The points of a PLY. Raises ValueError where there can be none."""
+    """Read the header of a PLY's points. Raises ValueError if there are none."""
     with path.open("rb") as file:
         head = file.read(1 << 16).split(b"end_header", 1)
         if not head[0].startswith(b"ply") or len(head) < 2:
@@ -155,13 +155,13 @@ def _cut_off(path, there, announced):
 
 
 def _intensities(vertices, intensity, size) -> Iterator[np.ndarray]:
-    """Intensities block by block."""
+    """Yield intensities in blocks."""
     if intensity is not None:
         yield from (rows[intensity].astype(float) for rows in vertices.read(size))
 
 
 def _blocks(vertices, time, intensity, size) -> Iterator[SourceBlock]:
-    """SourceBlocks of a PLY."""
+    """Yield SourceBlocks of a PLY."""
     axes = [vertices.names[axis] for axis in AXES]
     named = {"coordinates": axes[0], "times": time}
     singles = [
@@ -185,7 +185,7 @@ def _blocks(vertices, time, intensity, size) -> Iterator[SourceBlock]:
 
 
 def write_ply(path: str | Path, triangles: np.ndarray) -> None:
-    """Write triangles as a binary PLY of doubles; corners at exactly the same place are merged.
+    """Write triangles as a binary PLY of doubles; identical corners are merged.
 
     Parameters
     ----------
@@ -203,7 +203,7 @@ def write_ply(path: str | Path, triangles: np.ndarray) -> None:
 
 
 def announced_faces(path: str | Path) -> int:
-    """How many faces a PLY file announces in its header.
+    """Number of faces that a PLY file announces in its header.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ def announced_faces(path: str | Path) -> int:
     Returns
     -------
     int
-        Zero where there is no such header.
+        Zero without such a header.
     """
     with open(path, "rb") as file:
         head = file.read(1 << 16).split(b"end_header")[0]

@@ -1,11 +1,11 @@
-"""Files of a disk or of a store (fsspec): paths, reading by ranges, writing whole or not at all.
+"""Files on a disk or in a store (fsspec): paths, reading of ranges, atomic writing.
 
 - storage: a path or a URL, patterns of them, and the bytes behind them
-- text_files, toml_file: encodings, TOML read into pydantic models, what is left open in it
-- inputs: which file this is, and whether it is still the one that was read
-- output, publishing: results that appear whole or not at all, and the lock of a run
+- text_files, toml_file: encodings, TOML read into pydantic models, open values in it
+- inputs: identity of files, and detection of changes
+- output, publishing: results written atomically, and the lock of a run
 - task_store, spool: results of tasks, arrays longer than memory
-- preparation: how many points of a cloud are read first, and where they are put
+- preparation: number of points of a cloud that are read first, and their location
 """
 
 from mlscorr.io.store.inputs import FileIdentity, check_unchanged, input_file

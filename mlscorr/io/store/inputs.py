@@ -1,6 +1,6 @@
-"""Files that are read: which each is, and whether it is still the one that was read.
+"""Identity of input files, and detection of changes after reading.
 
-A file is told by its size, time of change, and bytes of its head and tail.
+A file is identified by size, time of change, and bytes of its head and tail.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from mlscorr.survey import InputFile
 
 @dataclass(frozen=True)
 class FileIdentity:
-    """What a file is told by without reading all of it.
+    """Identity of a file without reading all of it.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class FileIdentity:
     changed : int or str
         Time of the last change (ns), or a store's ETag.
     digest : str
-        SHA-256 of its first and last bytes; of none where an ETag tells contents apart.
+        SHA-256 of its first and last bytes; of no bytes if an ETag identifies the contents.
     """
 
     size: int
@@ -35,7 +35,7 @@ class FileIdentity:
 
     @classmethod
     def of(cls, path: str | Path) -> FileIdentity:
-        """That of a file as it stands.
+        """Return the identity of a file as it is now.
 
         Parameters
         ----------
@@ -44,7 +44,7 @@ class FileIdentity:
         Raises
         ------
         OSError
-            Where it can't be read.
+            If it can't be read.
         """
         size, changed = file_state(path)
         hashed = hashlib.sha256()
@@ -57,19 +57,19 @@ class FileIdentity:
 
     @property
     def content(self) -> FileIdentity:
-        """The same without the time of the last change, where the digest tells of the contents."""
+        """Identity without the time of the last change, if the digest covers the contents."""
         if str(self.changed).startswith(ETAG):
             return self
         return replace(self, changed=0)
 
 
 def input_file(what: str, path: str | Path) -> InputFile:
-    """An InputFile as it stands now.
+    """Make an InputFile of a file as it is now.
 
     Parameters
     ----------
     what : str
-        What it is, in words.
+        Description of the file.
     path : path
 
     Returns
@@ -81,9 +81,9 @@ def input_file(what: str, path: str | Path) -> InputFile:
 
 
 def check_unchanged(inputs: Sequence[InputFile]) -> None:
-    """Refuse files that were replaced or written to since they were read.
+    """Refuse files that were replaced or modified since they were read.
 
-    Results would be of no file: what was read first of the old one, the rest of the new one.
+    Results would otherwise mix the old and the new file.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def check_unchanged(inputs: Sequence[InputFile]) -> None:
     Raises
     ------
     OSError
-        Names the first.
+        Names the first such file.
     """
     changed = [file for file in inputs if _state(file.path) != file.state]
     if changed:
@@ -111,7 +111,7 @@ def check_unchanged(inputs: Sequence[InputFile]) -> None:
 def _state(path):
     """Size, time of change and digest of a file; zeros without one.
 
-    Not the time of its inode: a backup that links it changes that, and so do other rights.
+    The inode's time is not used, because hard links of backups and changed permissions change it.
     """
     try:
         return astuple(FileIdentity.of(path))

@@ -1,6 +1,6 @@
-"""Results: a folder of a disk that appears whole or not at all, single files, and JSON documents.
+"""Results: folders written atomically, single files, and JSON documents.
 
-What isn't whole yet stands beside its place, locked by the process that writes it.
+Incomplete results are next to their destination, locked by the process that writes them.
 """
 
 import ctypes
@@ -23,9 +23,9 @@ from mlscorr.survey import InputFile
 
 try:
     import fcntl
-except ImportError:  # Windows: no folder or run has a lock, and what killed runs leave stays
+except ImportError:  # Windows: no locks on folders or runs, and leftovers of killed runs remain
     fcntl = None
-PART = ".part"  # ends the name of what isn't whole yet
+PART = ".part"  # suffix of names of incomplete results
 
 
 def check_output(
@@ -34,24 +34,24 @@ def check_output(
     overwrite: bool = False,
     folders: Iterable[str] = (),
 ) -> None:
-    """Refuse an output folder that holds an input, or anything that may not be replaced.
+    """Refuse an output folder that contains an input, or anything that must not be replaced.
 
     Parameters
     ----------
     out : path
     inputs : iterable of path
-        Files that must stay as they are.
+        Files that must not change.
     overwrite : bool
-        Whether files of the same name may be replaced.
+        True if files of the same name may be replaced.
     folders : iterable of str
-        Names of folders in it that get results, too.
+        Names of subfolders that also receive results.
 
     Raises
     ------
     ValueError
-        For a folder that can't be meant.
+        If the folder is unsuitable.
     OSError
-        When it can't be written.
+        If it can't be written.
     """
     if is_remote(out):
         raise ValueError(
@@ -68,7 +68,7 @@ def check_output(
     if out.exists() and not out.is_dir():
         raise ValueError(f"{out} is a file; the results need a folder. Choose another name.")
     files = [Path(path) for path in inputs if not is_remote(path)]
-    # a link to an input counts where it stands and where it leads
+    # a link to an input counts at both ends
     places = [(path.resolve().parent, path.parent.resolve()) for path in files]
     own = {(out / name).resolve(): Path(name) for name in (*folders, "")}
     pairs = zip(files, places, strict=True)
@@ -79,7 +79,7 @@ def check_output(
 
 
 def _entries(out):
-    """Names in a folder, but those of results that aren't whole yet."""
+    """Names in a folder, except those of incomplete results."""
     if not out.is_dir():
         return []
     names = sorted(path.name for path in out.iterdir())
@@ -91,10 +91,10 @@ def _prefix(out):
 
 
 def _place(out):
-    """The folder for what isn't whole yet: beside out, or inside where that is another disk.
+    """Folder for incomplete results: next to out, or inside it if that is another disk.
 
-    A folder is made there, moved into out if there is one, and removed: what can't be written is
-    told early.
+    A folder is created there, moved into out if it exists, and removed, so that missing permissions
+    are reported early.
     """
     above = next(path for path in out.resolve().absolute().parents if path.exists())
     probe = _part(out, above)
@@ -114,15 +114,15 @@ def _place(out):
         raise OSError(
             f"the output folder {out} can't be {lacks}: {refusal}. Choose another place."
         ) from None
-    finally:  # wherever an interruption left it
+    finally:  # at any stage of an interruption
         for folder in (probe, inside):
-            with suppress(OSError):  # not there, or on a disk that can only be read
+            with suppress(OSError):  # missing, or on a read-only disk
                 folder.rmdir()
     return out.resolve().parent
 
 
 def _part(out, place):
-    """A name for what isn't whole yet, known before it is made, so that it can be removed."""
+    """Name for an incomplete result, known in advance so that it can be removed."""
     return place / f"{_prefix(out)}{secrets.token_hex(8)}{PART}"
 
 
@@ -133,20 +133,20 @@ def output_folder(
     overwrite: bool = False,
     folders: Iterable[str] = (),
 ) -> Iterator[Path]:
-    """A folder to write into, which takes its name only when all went well.
+    """Open a folder to write into, which gets its name only on success.
 
-    It stands beside its place until then, locked by this process. What processes left there that
-    were killed is removed.
+    Until then it is next to its destination, locked by this process. Leftovers of killed processes
+    are removed.
 
     Parameters
     ----------
     out : path
     inputs : sequence of InputFile
-        Files that must stay as they are, and be what they were when they were read.
+        Files that must not change, and must be unchanged since they were read.
     overwrite : bool
-        Whether files of the same name are replaced; others stay.
+        True to replace files of the same name; others are kept.
     folders : iterable of str
-        As of check_output.
+        See ``check_output``.
 
     Yields
     ------
@@ -156,9 +156,9 @@ def output_folder(
     Raises
     ------
     ValueError
-        As check_output.
+        See ``check_output``.
     OSError
-        When an input has changed, another run has written into the folder, or the disk refuses.
+        If an input has changed, another run has written into the folder, or the disk refuses.
     """
     check_output(out, [file.path for file in inputs], overwrite, folders)
     check_unchanged(inputs)
@@ -175,22 +175,22 @@ def output_folder(
 
 @contextmanager
 def _locked(part):
-    """Make a folder, hold its lock, which ends with the process, and remove what is left of it."""
+    """Create a folder with a lock that ends with the process, and remove its remains."""
     with ExitStack() as ends:
         ends.callback(remove, part)
-        while not part.exists():  # at first, and where another run took it for an abandoned one
+        while not part.exists():  # first time, or another run removed it as abandoned
             part.mkdir()
             if fcntl is None:
                 break
             lock = os.open(part, os.O_RDONLY)
             ends.callback(os.close, lock)
-            with suppress(OSError):  # a disk that knows no locks
+            with suppress(OSError):  # a disk without locks
                 fcntl.flock(lock, fcntl.LOCK_EX)
         yield
 
 
 def _remove_abandoned(out, place):
-    """Remove what runs into the same folder left that were killed: nobody holds its lock."""
+    """Remove leftovers of killed runs in the same folder: their locks are free."""
     if fcntl is None:
         return
     for part in place.glob(f"{glob.escape(_prefix(out))}*{PART}"):
@@ -204,7 +204,7 @@ def _remove_abandoned(out, place):
 
 
 def _finish(part, out, overwrite):
-    """Give the folder its name, all at once where out is on the disk of its parent."""
+    """Give the folder its name, atomically if out is on the disk of its parent."""
     is_inside = part.parent == out
     try:
         if not is_inside:
@@ -228,7 +228,7 @@ def _finish(part, out, overwrite):
 
 
 def _take_along(out: Path, part: Path) -> None:
-    """Link into part what out holds beside it, so that part can take its place."""
+    """Link other contents of out into part, so that part can replace it."""
     for path in sorted(out.rglob("*")):
         twin = part / path.relative_to(out)
         is_folder = path.is_dir() and not path.is_symlink()
@@ -240,12 +240,12 @@ def _take_along(out: Path, part: Path) -> None:
         else:
             try:
                 os.link(path, twin, follow_symlinks=False)
-            except OSError:  # a disk that knows no links, or files of another user
+            except OSError:  # a disk without links, or files of another user
                 shutil.copy2(path, twin, follow_symlinks=False)
 
 
 def _exchange(out: Path, part: Path) -> None:
-    """Exchange two folders, at once where the system can."""
+    """Exchange two folders, atomically if the system can."""
     rename = None
     if os.name != "nt":
         rename = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
@@ -257,7 +257,7 @@ def _exchange(out: Path, part: Path) -> None:
 
 
 def _move_into(out: Path, part: Path) -> None:
-    """Move the files of part into out file by file; on failure what they replace is put back."""
+    """Move the files of part into out one by one; on failure, replaced files are restored."""
     files = [path.relative_to(part) for path in sorted(part.rglob("*")) if path.is_file()]
     replaced = Path(tempfile.mkdtemp(dir=part))
     made = []
@@ -284,7 +284,7 @@ def _move_into(out: Path, part: Path) -> None:
 
 
 def remove(folder: Path) -> None:
-    """Remove a folder, also when an impatient user interrupts once more."""
+    """Remove a folder, even if the user interrupts again."""
     while folder.exists():
         try:
             shutil.rmtree(folder, ignore_errors=True)
@@ -295,9 +295,9 @@ def remove(folder: Path) -> None:
 
 @contextmanager
 def output_file(path: str | Path) -> Iterator[Path]:
-    """A file to write into, which takes its name only when all went well.
+    """Open a file to write into, which gets its name only on success.
 
-    It stands beside the path until then. A file there is replaced.
+    Until then it is next to the path. An existing file is replaced.
 
     Parameters
     ----------
@@ -323,7 +323,7 @@ def output_file(path: str | Path) -> Iterator[Path]:
 
 
 def document(name: str, content: dict) -> dict:
-    """A JSON document with its schema first; values that are not finite become None.
+    """Make a JSON document with its schema first; non-finite values become None.
 
     Parameters
     ----------
@@ -349,7 +349,7 @@ def _finite(value):
 
 
 def write_json(path: str | Path, content: dict) -> None:
-    """Write a document as JSON, whole or not at all.
+    """Write a document as JSON, atomically.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Clouds whose points must be put into another file before they are read: how many, where to."""
+"""Preparation of clouds that must be converted before reading: number of points and location."""
 
 import atexit
 import shutil
@@ -17,7 +17,7 @@ _progress: ContextVar[Any] = ContextVar("progress", default=None)
 
 @contextmanager
 def _holding(variable: ContextVar, value: Any) -> Iterator[None]:
-    """Give a variable a value until the block ends."""
+    """Set a variable to a value until the block ends."""
     token = variable.set(value)
     try:
         yield
@@ -26,48 +26,48 @@ def _holding(variable: ContextVar, value: Any) -> Iterator[None]:
 
 
 def glance(points: int = SETTINGS.glanced_points) -> AbstractContextManager[None]:
-    """Take the first points of large files only, for what must be done in seconds.
+    """Use only the first points of large files, for quick tasks.
 
     Parameters
     ----------
     points : int
-        How many of each file.
+        Number of points of each file.
     """
     return _holding(_limit, points)
 
 
 def announced(progress: Any) -> AbstractContextManager[None]:
-    """Say which stage runs, and how far conversions and results have come.
+    """Announce stages, and the progress of conversions and results.
 
     Parameters
     ----------
     progress : function
-        progress(title, total) begins a stage, and gives a function of the number of points just
-        done. Without a total the end is not known.
+        progress(title, total) starts a stage and returns a function of the number of points just
+        done. Without a total, the end is unknown.
     """
     return _holding(_progress, progress)
 
 
 def looked_points() -> int | None:
-    """Number of points that do within a glance; None where there is none."""
+    """Number of points that suffice for a quick look; None without a limit."""
     return _limit.get()
 
 
 def progress_of(title: str, total: int | None = None) -> Callable[[int], object]:
-    """Begin a stage, and give a function of the number of points just done in it.
+    """Start a stage, and return a function of the number of points just done in it.
 
     Parameters
     ----------
     title : str
     total : int, optional
-        Number of points; None where the end is not known.
+        Number of points; None if unknown.
     """
     return (_progress.get() or (lambda *_: lambda _: None))(title, total)
 
 
 @cache
 def temporary_folder() -> str:
-    """A folder that goes when the program ends."""
+    """Temporary folder that is removed when the program ends."""
     folder = tempfile.mkdtemp(prefix="mlscorr-")
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return folder

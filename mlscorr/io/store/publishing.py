@@ -1,4 +1,4 @@
-"""What is written into a folder of a disk or of a store: whole files or none, and a lock."""
+"""Atomic writing into a folder on a disk or in a store, and a lock."""
 
 import io
 import os
@@ -16,11 +16,11 @@ from mlscorr.io.settings import SETTINGS
 from mlscorr.io.store.storage import WEB, asking, check_bucket, is_remote, is_there, read_bytes
 from mlscorr.wording import counted
 
-S3 = ("s3", "s3a")  # schemes of stores that take a file in parts, side by side
+S3 = ("s3", "s3a")  # schemes of stores that accept a file in parallel parts
 
 
 def names_in(folder: Any) -> list[str]:
-    """Names in a folder, in order; none where there is no folder.
+    """Sorted names in a folder; empty without a folder.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ def names_in(folder: Any) -> list[str]:
     Raises
     ------
     OSError
-        Where a store doesn't tell, or its bucket is missing.
+        If a store does not respond, or its bucket is missing.
     """
     if not is_remote(folder):
         if folder.is_dir():
@@ -46,7 +46,7 @@ def names_in(folder: Any) -> list[str]:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder; a store has none.
+    """Make a folder; stores do not need one.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def make_folder(folder: Path) -> None:
 
 
 def remove_files(folder: Any, pattern: str) -> None:
-    """Remove files in a folder by a pattern; all else stays.
+    """Remove files in a folder by a pattern; others are kept.
 
     Parameters
     ----------
@@ -75,18 +75,18 @@ def remove_files(folder: Any, pattern: str) -> None:
 
 
 def publish(source: Path, target: Any) -> None:
-    """Give a whole file its place; what is there is replaced.
+    """Move a complete file to its destination, replacing an existing one.
 
     Parameters
     ----------
     source : Path
-        On the disk of the target, or on any where that is in a store.
+        On the disk of the target, or on any disk if the target is in a store.
     target : Path
 
     Raises
     ------
     OSError
-        When it can't be written: the target is then as it was.
+        If it cannot be written; the target is then unchanged.
     """
     if not is_remote(target):
         os.replace(source, target)
@@ -102,19 +102,19 @@ def publish(source: Path, target: Any) -> None:
 def check_store_output(
     out: Path, inputs: Iterable[Path], overwrite: bool, folders: Iterable[str] = ()
 ) -> None:
-    """Refuse an output folder in a store that holds an input, or anything that may not be replaced.
+    """Refuse an output folder in a store with an input, or with anything not to be replaced.
 
     Parameters
     ----------
     out, inputs, overwrite, folders
-        As of check_output.
+        See ``check_output``.
 
     Raises
     ------
     ValueError
-        For a folder that can't be meant.
+        If the folder is unsuitable.
     OSError
-        As names_in.
+        See names_in.
     """
     if cast(Any, out).protocol in WEB:
         raise ValueError(
@@ -127,20 +127,20 @@ def check_store_output(
 
 
 def check_contents(out: Path, held: Sequence[str], present: Sequence[str]) -> None:
-    """Refuse an output folder for what it holds.
+    """Refuse an output folder because of its contents.
 
     Parameters
     ----------
     out : Path
     held : sequence of str
-        Names of the inputs in it, or in folders of it.
+        Names of the inputs in it, or in its subfolders.
     present : sequence of str
         Names that may not be replaced.
 
     Raises
     ------
     ValueError
-        Where there are any.
+        If there are any.
     """
     if held:
         raise ValueError(
@@ -156,7 +156,7 @@ def check_contents(out: Path, held: Sequence[str], present: Sequence[str]) -> No
 
 
 class _StoredText(io.StringIO):
-    """Text that is put into a store beat by beat, and in the end."""
+    """Text that is written to a store at every heartbeat and at the end."""
 
     def __init__(self, path):
         super().__init__()
@@ -168,7 +168,7 @@ class _StoredText(io.StringIO):
     def flush(self):
         if monotonic() >= self.due:
             self.due = monotonic() + SETTINGS.beat
-            with suppress(OSError), asking(self.path):  # what it tells of matters more than the log
+            with suppress(OSError), asking(self.path):  # its events matter more than the log
                 self.path.fs.pipe_file(self.path.path, self.getvalue().encode())
 
     def close(self):
@@ -178,7 +178,7 @@ class _StoredText(io.StringIO):
 
 
 def appended(path: Path) -> TextIO:
-    """A text file to write on, behind what is there.
+    """Open a text file for appending.
 
     Parameters
     ----------
@@ -191,29 +191,29 @@ def appended(path: Path) -> TextIO:
 
 @contextmanager
 def scratch_folder() -> Iterator[Path]:
-    """A folder among those for temporary files (which TMPDIR names), gone in the end."""
+    """Temporary folder (see TMPDIR), removed at the end."""
     with tempfile.TemporaryDirectory(prefix="mlscorr-") as name:
         yield Path(name)
 
 
 @contextmanager
 def locked_in_store(lock: Any, beat: float = SETTINGS.beat) -> Iterator[None]:
-    """Keep other runs out by an object, rewritten beat by beat, which goes in the end.
+    """Lock out other runs by an object that is rewritten at every heartbeat and finally removed.
 
-    One that stays the same for three beats is of a run that was killed, and is taken over: no clock
-    of another machine is trusted.
+    A lock that does not change for three heartbeats belongs to a killed run and is taken over.
+    Clocks of other machines are not trusted.
 
     Parameters
     ----------
     lock : Path
-        In a store.
+        Path in a store.
     beat : float
         Units: s.
 
     Raises
     ------
     ValueError
-        Where another run is at work.
+        If another run is at work.
     """
     owner = f"{socket.gethostname()}, process {os.getpid()}"
     ended = threading.Event()
@@ -223,7 +223,7 @@ def locked_in_store(lock: Any, beat: float = SETTINGS.beat) -> Iterator[None]:
 
     def keep():
         while not ended.wait(beat):
-            with suppress(OSError), asking(lock):  # the next beat may come through
+            with suppress(OSError), asking(lock):  # the next heartbeat may succeed
                 lock.fs.pipe_file(lock.path, sign().encode())
 
     _take(lock, beat, sign)
@@ -238,10 +238,10 @@ def locked_in_store(lock: Any, beat: float = SETTINGS.beat) -> Iterator[None]:
 
 
 def _take(lock, beat, sign):
-    """Make a lock, or take over that of a run which was killed.
+    """Create a lock, or take over that of a killed run.
 
-    Of two that take it over at once the first one's may be removed by the second: so it counts
-    once it has stayed for a beat.
+    If two runs take it over at once, the second may remove the first one's lock, so a lock counts
+    only after it has existed for one heartbeat.
     """
     is_own = _is_new(lock, own := sign())
     while not is_own:
@@ -253,13 +253,13 @@ def _take(lock, beat, sign):
 
 
 def _remove(lock):
-    """Remove a lock, if it is there."""
+    """Remove a lock, if it exists."""
     with suppress(OSError), asking(lock):
         lock.fs.rm_file(lock.path)
 
 
 def _is_new(lock, content):
-    """Whether a lock could be made where none was."""
+    """True if a lock could be created where none was."""
     try:
         with asking(lock):
             lock.fs.invalidate_cache()
@@ -270,7 +270,7 @@ def _is_new(lock, content):
 
 
 def _wait_for_end(lock, beat):
-    """Return once a lock has not changed for three beats, or is gone; refuse one that changes."""
+    """Return if a lock has not changed for three heartbeats or is gone; refuse one that changes."""
     first = _content(lock)
     end = monotonic() + 3 * beat
     while monotonic() < end:
@@ -285,7 +285,7 @@ def _wait_for_end(lock, beat):
 
 
 def _content(lock):
-    """Text of a lock, nothing where it is gone."""
+    """Text of a lock, empty if it is gone."""
     try:
         with asking(lock):
             return lock.fs.cat_file(lock.path).decode()

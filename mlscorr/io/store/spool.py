@@ -1,6 +1,6 @@
-"""Arrays longer than memory, on disk: records parted into groups, and .npz files that grow.
+"""Arrays longer than memory, on disk: records split into groups, and growing .npz files.
 
-With both goes the space that they need there.
+Also checks of the disk space that both need.
 """
 
 import errno
@@ -21,12 +21,12 @@ from mlscorr.io.store.storage import is_remote
 
 
 class Spool:
-    """Groups of records in a file, each in one run whose length is known before.
+    """Groups of records in a file, each contiguous with a length known in advance.
 
     Parameters
     ----------
     file : binary file
-        Open for reading and writing. From its position on it holds the records, as they are.
+        Open for reading and writing. The records follow its current position.
     counts : (g,) int array
         Number of records of each group.
     record_length : int
@@ -56,7 +56,7 @@ class Spool:
             self._filled[number] += len(part)
 
     def blocks(self, group: int, size: int = SETTINGS.chunk_points) -> Iterator[np.ndarray]:
-        """Records of a group, in the order in which they were put, so many at a time.
+        """Yield records of a group in the order of insertion, some at a time.
 
         Parameters
         ----------
@@ -72,7 +72,7 @@ class Spool:
             yield np.frombuffer(self._file.read(count * self._length), f"V{self._length}")
 
     def get(self, group: int) -> np.ndarray:
-        """All records of a group: (n,) array of bytes of each.
+        """Return all records of a group: (n,) array of bytes of each.
 
         Parameters
         ----------
@@ -81,7 +81,7 @@ class Spool:
         return next(self.blocks(group, int(self.counts[group])))
 
     def replace(self, group: int, records: np.ndarray) -> None:
-        """Put a group's records in another order.
+        """Replace a group's records by the same ones in another order.
 
         Parameters
         ----------
@@ -93,11 +93,11 @@ class Spool:
 
 
 class NpzWriter:
-    """Collects named arrays for one new file, as np.savez writes it: whole and growing ones.
+    """Writer of named arrays to one new file, as np.savez does, including growing arrays.
 
-    The file appears at the end of a ``with`` block, whole or not at all. A zip takes one array
-    after the other, so those that grow lie in files of their own until the end, which need as
-    much space again.
+    The file is written atomically at the end of a ``with`` block. A zip stores arrays one after
+    another, so growing arrays are kept in separate files until the end, which need the same space
+    again.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ class NpzWriter:
     Raises
     ------
     OSError
-        When the disk refuses.
+        If the disk refuses.
 
     Examples
     --------
@@ -123,7 +123,7 @@ class NpzWriter:
     def __init__(self, path: str | Path) -> None:
         self._path = Path(path)
         self._whole: dict[str, np.ndarray] = {}
-        self._growing: dict[str, tuple[BinaryIO, np.ndarray]] = {}  # file, and no rows as in it
+        self._growing: dict[str, tuple[BinaryIO, np.ndarray]] = {}  # file, empty array of its type
         self._files = ExitStack()
         self.watch: Callable[[int], object] = lambda _: None  # bytes of growing arrays just copied
 
@@ -145,26 +145,26 @@ class NpzWriter:
 
     @property
     def growing(self) -> int:
-        """Size of the growing arrays so far. Units: bytes."""
+        """Current size of the growing arrays. Units: bytes."""
         return sum(file.tell() for file, _ in self._growing.values())
 
     def put(self, name: str, array: ArrayLike) -> None:
-        """Take a whole array."""
+        """Store a complete array."""
         self._whole[name] = np.asanyarray(array)
 
     def append(self, name: str, rows: ArrayLike) -> None:
-        """Take more rows of a growing array.
+        """Append rows to a growing array.
 
         Parameters
         ----------
         name : str
         rows : (n, ...) array
-            All of one type and one shape but for their number.
+            All of one type, and of one shape except their number.
 
         Raises
         ------
         ValueError
-            When they don't fit those before them.
+            If they do not match the previous ones.
         """
         rows = np.ascontiguousarray(rows)
         if name not in self._growing:
@@ -184,7 +184,7 @@ class NpzWriter:
             shape = none.shape[1:]
             length = path.stat().st_size // (none.dtype.itemsize * math.prod(shape))
             header = np.lib.format.header_data_from_array_1_0(none) | {"shape": (length, *shape)}
-            # the date that ZipInfo starts with, so that the same arrays give the same bytes
+            # the initial date of ZipInfo, so that the same arrays give the same bytes
             with archive.open(zipfile.ZipInfo(f"{name}.npy"), "w", force_zip64=True) as member:
                 np.lib.format.write_array_header_2_0(member, header)
                 with open(path, "rb") as rows:
@@ -198,7 +198,7 @@ class NpzWriter:
 
 
 def check_space(folder: Path, needed: int, what: str) -> None:
-    """Refuse at once what a disk will not hold hours later.
+    """Refuse early if a disk has too little space.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ def check_space(folder: Path, needed: int, what: str) -> None:
     needed : int
         Units: bytes.
     what : str
-        Why, and what to do about it: ends a sentence.
+        Purpose and remedy; end of a sentence.
 
     Raises
     ------
@@ -221,7 +221,7 @@ def check_space(folder: Path, needed: int, what: str) -> None:
 
 @contextmanager
 def telling_space(folder: Path) -> Iterator[None]:
-    """Where a project writes: of a full disk it is said which, and how much is left.
+    """Report which disk is full, and how much space is left, while a project writes.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""Paths and URLs: which files are there, and their bytes, in a store as on a disk.
+"""Paths and URLs: existence of files, and their bytes, in a store or on a disk.
 
 A URL is a UPath of universal_pathlib, which has pathlib's interface; neither it nor fsspec is
-imported before there is a URL. Settings of a store (endpoint, credentials) are those of its own
-tools and of fsspec, in the environment, so that workers have them too.
+imported unless there is a URL. Settings of a store (endpoint, credentials) come from the
+environment, as for its own tools and fsspec, so that workers have them, too.
 """
 
 import glob
@@ -22,15 +22,15 @@ import numpy as np
 from mlscorr.io.settings import SETTINGS
 
 ALL_FOLDERS = "**"
-ETAG = "ETag"  # begins what a store tells contents apart by
+ETAG = "ETag"  # prefix of a store's identifier of contents
 URL = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+://")  # a drive of Windows has a single letter
-BUCKETS = ("s3", "s3a", "gs", "gcs")  # schemes of stores that have them
-WEB = ("http", "https")  # schemes of servers that list nothing and take nothing
+BUCKETS = ("s3", "s3a", "gs", "gcs")  # schemes of stores that have buckets
+WEB = ("http", "https")  # schemes of servers without listing or upload
 EXTRA = "pip install 'mlscorr[remote]'"
 
 
 def is_url(name: object) -> bool:
-    """Whether a name is a URL, and not a path.
+    """True if a name is a URL, not a path.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def is_url(name: object) -> bool:
 
 
 def is_remote(path: object) -> bool:
-    """Whether a path is that of a URL, as as_path gives it.
+    """True if a path, as from as_path, is that of a URL.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def is_remote(path: object) -> bool:
 
 
 def as_path(name: str | Path) -> Path:
-    """The path of a name; that of a URL has pathlib's interface, and is none of its classes.
+    """Return the path of a name; that of a URL has pathlib's interface, but not its classes.
 
     Parameters
     ----------
@@ -65,9 +65,9 @@ def as_path(name: str | Path) -> Path:
     Raises
     ------
     ValueError
-        For a scheme that nothing knows.
+        If the scheme is unknown.
     ImportError
-        Where the package is missing that reads it.
+        If the package for the scheme is missing.
     """
     if is_remote(name):
         return cast(Path, name)
@@ -100,12 +100,12 @@ def as_path(name: str | Path) -> Path:
 
 
 def beside(path: Path, name: str) -> Path:
-    """Path of a file that another one names: a URL, or a path from its folder.
+    """Path of a file that another file names: a URL, or a path relative to its folder.
 
     Parameters
     ----------
     path : Path
-        Of the file that names it.
+        File that names it.
     name : str
     """
     if is_url(name):
@@ -117,9 +117,9 @@ def beside(path: Path, name: str) -> Path:
 
 
 def resolved(path: Path) -> Path:
-    """A path that is the same for the same file: links followed on a disk, ``..`` in a URL.
+    """Canonical path of a file: with links resolved on a disk, and ``..`` in a URL.
 
-    No store is asked: a redirection is none of its names.
+    No store is accessed, so redirections are not resolved.
 
     Parameters
     ----------
@@ -129,12 +129,12 @@ def resolved(path: Path) -> Path:
         return path.resolve()
     scheme, _, rest = str(path).partition("://")
     if not {".", ".."} & set(rest.split("/")):
-        return path  # a name may hold // in a store
+        return path  # a name may contain // in a store
     return as_path(f"{scheme}://{posixpath.normpath(rest)}")
 
 
 def is_there(path: Path) -> bool:
-    """Whether a file is there.
+    """True if a file exists.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def is_there(path: Path) -> bool:
     Raises
     ------
     OSError
-        Where a store doesn't tell: its bucket is missing, it refuses, or doesn't answer.
+        If a store does not respond, refuses access, or has no such bucket.
     """
     if not is_remote(path):
         return path.is_file()
@@ -156,7 +156,7 @@ def is_there(path: Path) -> bool:
 
 
 def is_folder(path: Path) -> bool:
-    """Whether a folder is there; in a store, whether anything is below a name.
+    """True if a folder exists; in a store, if there is anything below a name.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def is_folder(path: Path) -> bool:
     Raises
     ------
     OSError
-        As is_there.
+        See ``is_there``.
     """
     if not is_remote(path):
         return path.is_dir()
@@ -174,7 +174,7 @@ def is_folder(path: Path) -> bool:
 
 
 def file_state(path: str | Path) -> tuple[int, int | str]:
-    """Size of a file (bytes), and time of its last change (ns); of one in a store, its ETag.
+    """Size of a file (bytes), and time of its last change (ns) or, in a store, its ETag.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ def file_state(path: str | Path) -> tuple[int, int | str]:
     Raises
     ------
     OSError
-        Where it can't be read.
+        If it can't be read.
     """
     if not is_remote(path):
         state = os.stat(path)
@@ -197,14 +197,14 @@ def file_state(path: str | Path) -> tuple[int, int | str]:
 
 
 def _info(path):
-    """What a store says of a file now."""
+    """Current information of a store on a file."""
     path.fs.invalidate_cache(path.path)
     return path.fs.info(path.path)
 
 
 @contextmanager
 def asking(path: Any) -> Iterator[None]:
-    """Where a store is asked for a path: what its libraries raise becomes a sentence.
+    """Context for access to a store: errors of its libraries become a message.
 
     Parameters
     ----------
@@ -218,7 +218,7 @@ def asking(path: Any) -> Iterator[None]:
         yield
     except Exception as error:
         text = " ".join(str(error).split()) or type(error).__name__
-        is_cut = isinstance(error.__cause__, OSError)  # which fsspec takes for a missing file
+        is_cut = isinstance(error.__cause__, OSError)  # fsspec reports these as a missing file
         if isinstance(error, FileExistsError):
             raise
         if isinstance(error, FileNotFoundError) and not is_cut:
@@ -236,7 +236,7 @@ def asking(path: Any) -> Iterator[None]:
 
 
 def check_bucket(path: Any) -> None:
-    """Refuse a path whose bucket isn't there.
+    """Refuse a path whose bucket does not exist.
 
     Parameters
     ----------
@@ -265,20 +265,21 @@ def open_file(
     errors: str = "strict",
     is_scattered: bool = False,
 ) -> Any:
-    """A file open for reading, of text where its encoding is given; of a store by ranges.
+    """Open a file for reading, as text if an encoding is given; from a store by ranges.
 
     Parameters
     ----------
     path : path
     encoding, newline, errors
-        As of open.
+        See open.
     is_scattered : bool
-        Whether bytes here and there are read, not all in a row: a store gives less at a time.
+        True if scattered bytes are read instead of all in sequence; blocks from a store are then
+        smaller.
 
     Raises
     ------
     OSError
-        Where it can't be read; in a ``with`` also where a library hid that behind its own error.
+        If it cannot be read; in a ``with`` block also if a library replaced that error by its own.
     """
     if not is_remote(path):
         if encoding is None:
@@ -292,7 +293,7 @@ def open_file(
 
 
 class _Ranges(io.RawIOBase):
-    """A file of a store, fetched by blocks, of which the last few are kept."""
+    """File in a store, fetched in blocks, the last few of which are kept."""
 
     def __init__(self, path, block_size):
         super().__init__()
@@ -331,7 +332,7 @@ class _Ranges(io.RawIOBase):
 
 
 class _Reader(io.BufferedReader):
-    """Raises what the store did, and not what a decoder made of it."""
+    """Reader that raises the store's error instead of a decoder's."""
 
     def __exit__(self, kind, error, trace):
         interruption = self.raw.interruption
@@ -341,7 +342,7 @@ class _Reader(io.BufferedReader):
 
 
 def read_bytes(path: str | Path) -> bytes:
-    """All of a file.
+    """Read all of a file.
 
     Parameters
     ----------
@@ -355,15 +356,15 @@ def read_bytes(path: str | Path) -> bytes:
 
 
 def read_doubles(path: str | Path, start: int = 0, count: int = -1) -> np.ndarray:
-    """Doubles (n,) of a binary file, little-endian.
+    """Read doubles (n,) of a binary file, little-endian.
 
     Parameters
     ----------
     path : path
     start : int
-        Number of the first.
+        Index of the first.
     count : int
-        How many; all that are left if negative.
+        Number of doubles; all remaining ones if negative.
     """
     size = -1
     if count >= 0:
@@ -375,23 +376,24 @@ def read_doubles(path: str | Path, start: int = 0, count: int = -1) -> np.ndarra
 
 
 def files_like(folder: Path, pattern: str) -> list[Path]:
-    """Files by a pattern, in order of their names.
+    """Find files by a pattern, sorted by name.
 
     Parameters
     ----------
     folder : Path
     pattern : str
-        From the folder, or a URL. On a disk ``**`` enters each folder once, whatever links to it.
+        Relative to the folder, or a URL. On a disk ``**`` enters each folder once, regardless of
+        links.
 
     Raises
     ------
     ValueError
-        For a pattern of a web server.
+        If it is a pattern on a web server.
     OSError
-        As is_there.
+        See ``is_there``.
     """
     if not is_url(pattern) and not is_remote(folder):
-        stem, end = posixpath.splitext(pattern)  # endings in capitals are as good
+        stem, end = posixpath.splitext(pattern)  # upper-case suffixes are equivalent
         names = {pattern, stem + end.lower(), stem + end.upper()}
         paths = {folder / match for name in names for match in _names_like(folder, name)}
         return sorted(path for path in paths if not path.is_dir())
@@ -410,9 +412,9 @@ def files_like(folder: Path, pattern: str) -> list[Path]:
 
 
 def _names_like(folder: Path, pattern: str) -> set[str]:
-    """Names of files and folders by a pattern, from a folder."""
-    # Python's own ** follows a link each time that it meets it: two folders that link to each
-    # other are entered in every order, some 2^40 times before the system refuses
+    """Names of files and folders in a folder by a pattern."""
+    # Python's own ** follows every occurrence of a link: two folders that link to each other are
+    # entered in every order, about 2^40 times before the system refuses
     parts = re.split(r"[\\/]" if os.sep == "\\" else "/", pattern)
     if ALL_FOLDERS not in parts:
         return set(glob.glob(pattern, root_dir=folder))
@@ -433,10 +435,10 @@ def _names_like(folder: Path, pattern: str) -> set[str]:
 def folders_below(
     folder: Path, depth: float = math.inf, is_wanted: Callable[[Path], bool] = lambda _: True
 ) -> Iterator[Path]:
-    """A folder and those within it that are not hidden; links are followed, each folder comes once.
+    """Yield a folder and its visible subfolders, each once, following links.
 
-    Folders themselves come before links to them. A link to a folder that holds the link, or the
-    first folder, is not followed.
+    Folders come before links to them. A link to a folder that contains the link, or to the first
+    folder, is not followed.
 
     Parameters
     ----------
@@ -444,7 +446,7 @@ def folders_below(
     depth : float
         Number of levels below the folder.
     is_wanted : function of a Path
-        Whether one of the folders within it is entered.
+        True if a subfolder is entered.
 
     Yields
     ------
@@ -473,7 +475,7 @@ def folders_below(
 
 
 def _folders_in(folder):
-    """Folders in a folder, links to folders among them; none in one that may not be read."""
+    """Folders in a folder, including links to folders; empty if it is not readable."""
     try:
         names = sorted(os.listdir(folder), reverse=True)
     except OSError:
@@ -482,5 +484,5 @@ def _folders_in(folder):
 
 
 def _holds(folder, inner):
-    """Return True if a real path is that of a folder, or lies below it."""
+    """True if a real path is that of a folder, or is below it."""
     return inner == folder or inner.startswith(os.path.join(folder, ""))

@@ -1,4 +1,4 @@
-"""Results of tasks as files, each named by the hash of what it was made of."""
+"""Results of tasks as files, each named by the hash of its inputs."""
 
 import hashlib
 import io
@@ -20,9 +20,9 @@ from mlscorr.io.store.storage import is_remote, is_there, read_bytes
 
 SUFFIX = ".result"
 LOCK = "lock"
-KINDS = (str, int, float, Path, np.generic)  # of values that are told by what they print
-ROOMS = ("mlscorr", "numpy", "scipy", "pathlib", "upath")  # whose classes results hold
-MAKERS = {  # functions that make values; no other is called while a result is loaded
+KINDS = (str, int, float, Path, np.generic)  # types of values identified by their text
+ROOMS = ("mlscorr", "numpy", "scipy", "pathlib", "upath")  # modules of classes in results
+MAKERS = {  # functions that construct values; no others are called while a result is loaded
     ("mlscorr.estimate.posterior", "drifting_prior"),
     ("mlscorr.estimate.posterior", "position_prior"),
     ("numpy._core.multiarray", "_reconstruct"),
@@ -84,7 +84,7 @@ def _feed(update: Callable[[bytes], object], value: Any) -> None:
 
 
 class _Unpickler(pickle.Unpickler):
-    """Loads values of ours alone: a folder of results runs no code of others."""
+    """Unpickler of known classes only, so that results cannot run foreign code."""
 
     def find_class(self, module: str, name: str) -> Any:
         value = super().find_class(module, name)
@@ -97,7 +97,7 @@ class _Unpickler(pickle.Unpickler):
 
 @dataclass(frozen=True)
 class TaskStore:
-    """A folder of results, each whole or not there.
+    """Folder of results, each written atomically.
 
     Parameters
     ----------
@@ -108,18 +108,20 @@ class TaskStore:
 
     @property
     def plan(self) -> Path:
-        """Where a run lists its tasks: the mark that a folder is of a run."""
+        """Path of the list of tasks, which marks the folder of a run."""
         return self.folder / "plan.json"
 
     def is_begun(self) -> bool:
-        """Whether a run began here, if only by its lock, after which it writes the plan."""
+        """True if a run has started here, possibly with only its lock, before it writes the
+        plan.
+        """
         names = {*publishing.names_in(self.folder)}
         return self.plan.name in names or {LOCK} <= names <= {LOCK, self.plan.name + PART}
 
     def is_locked(self) -> bool | None:
-        """Whether a run is at work; None where that can't be told.
+        """True if a run is active; None if this is unknown.
 
-        A lock in a store may be of a run that was killed, and Windows has none.
+        A lock in a store may belong to a killed run, and Windows has none.
         """
         lock = self.folder / LOCK
         if not is_there(lock):
@@ -134,23 +136,23 @@ class TaskStore:
         return False
 
     def clear(self) -> None:
-        """Remove all results; what else is in the folder stays."""
+        """Remove all results; other contents of the folder are kept."""
         publishing.remove_files(self.folder, f"*/{'[0-9a-f]' * len(digest())}{SUFFIX}")
 
     def path(self, kind: str, key: str) -> Path:
-        """Where a result stands, or would stand.
+        """Path of a result, existing or not.
 
         Parameters
         ----------
         kind : str
-            Of the task.
+            Kind of the task.
         key : str
-            Digest of what it was made of.
+            Digest of its inputs.
         """
         return self.folder / kind / f"{key}{SUFFIX}"
 
     def keys(self, kind: str) -> set[str]:
-        """Keys of the results that are there.
+        """Keys of the existing results.
 
         Parameters
         ----------
@@ -159,18 +161,18 @@ class TaskStore:
         return {name.removesuffix(SUFFIX) for name in publishing.names_in(self.folder / kind)}
 
     def put(self, kind: str, key: str, value: object) -> None:
-        """Keep a result; a checksum stands before it.
+        """Store a result, preceded by a checksum.
 
         Parameters
         ----------
         kind, key : str
         value : object
-            Dataclasses of ours, arrays, and what Python has built in.
+            Dataclasses of this package, arrays, and Python's built-in types.
 
         Raises
         ------
         OSError
-            Where the disk refuses.
+            If the disk refuses.
         """
         content = pickle.dumps(value, protocol=pickle.HIGHEST_PROTOCOL)
         path = self.path(kind, key)
@@ -183,7 +185,7 @@ class TaskStore:
             publishing.publish(part, path)
 
     def get(self, kind: str, key: str) -> Any:
-        """A result.
+        """Load a result.
 
         Parameters
         ----------
@@ -192,15 +194,15 @@ class TaskStore:
         Raises
         ------
         KeyError
-            Where there is none, or where it is damaged.
+            If it is missing or damaged.
         OSError
-            Where a store doesn't tell.
+            If a store does not respond.
         """
         try:
             content = read_bytes(self.path(kind, key))
         except OSError as error:
             if is_remote(self.folder) and not isinstance(error, FileNotFoundError):
-                raise  # it may well be there
+                raise  # it may well exist
             raise KeyError(key) from None
         size = hashlib.sha256().digest_size
         if hashlib.sha256(content[size:]).digest() != content[:size]:
@@ -212,14 +214,14 @@ class TaskStore:
 
     @contextmanager
     def part(self, suffix: str = "") -> Iterator[Path]:
-        """A place for what isn't whole yet, on the same disk; what is left there is removed.
+        """Yield a path for an incomplete result on the same disk; leftovers there are removed.
 
-        Beside a store it is among temporary files.
+        For a store it is among the temporary files.
 
         Parameters
         ----------
         suffix : str
-            Of its name.
+            Suffix of its name.
         """
         if is_remote(self.folder):
             with publishing.scratch_folder() as folder:
@@ -238,12 +240,12 @@ class TaskStore:
 
     @contextmanager
     def locked(self) -> Iterator[None]:
-        """Keep other runs out, and remove what killed ones left half made.
+        """Lock out other runs, and remove incomplete results of killed ones.
 
         Raises
         ------
         ValueError
-            Where another run is at work.
+            If another run is at work.
         """
         if is_remote(self.folder):
             with publishing.locked_in_store(self.folder / LOCK):

@@ -1,4 +1,4 @@
-"""Text files: their encoding, their ends, and what of them a message can show."""
+"""Text files: encoding, endings, and excerpts for messages."""
 
 import codecs
 import os
@@ -13,15 +13,15 @@ from mlscorr.io.store.storage import open_file
 
 ENCODING = "utf-8-sig"  # UTF-8, with or without a byte order mark
 ENCODINGS = {ENCODING: "UTF-8", "utf-16": "UTF-16", "gb18030": "GB 18030", "cp1252": "Windows-1252"}
-RARE_LETTERS = b"\xd8"  # lead byte from which on GB 2312 has its second level, by radical
+RARE_LETTERS = b"\xd8"  # lead byte of the second level of GB 2312, which is sorted by radical
 
 
 def encoding_of(path: str | Path) -> str | None:
-    """Return the encoding of a text file, one of ENCODINGS, by all of its bytes.
+    """Detect the encoding of a text file, one of ENCODINGS, from all of its bytes.
 
-    UTF-16 has a byte order mark, and valid UTF-8 is UTF-8. Read as GB 18030, most letters beyond
-    ASCII of a Chinese file are common ones, those of a file in Windows-1252 are rare ones or none.
-    charset-normalizer mistakes both in tables of numbers (tests/io/store/test_text_files.py).
+    UTF-16 has a byte order mark, and valid UTF-8 is UTF-8. Decoded as GB 18030, most non-ASCII
+    letters of a Chinese file are common ones; those of a Windows-1252 file are rare or invalid.
+    charset-normalizer fails for both in tables of numbers (tests/io/store/test_text_files.py).
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def encoding_of(path: str | Path) -> str | None:
     Returns
     -------
     str or None
-        None for a file that is no text in any of them.
+        None for a file that is not text in any of them.
     """
     with open_file(path) as file:
         has_mark = file.read(2) in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
@@ -44,7 +44,7 @@ def encoding_of(path: str | Path) -> str | None:
 
 
 def _letters_beyond_ascii(path, encoding):
-    """Numbers of the letters beyond ASCII of a file; None where it is no text in an encoding."""
+    """Code points of the non-ASCII letters of a file; None if it is not text in an encoding."""
     letters: Counter[str] = Counter()
     try:
         with open_file(path, encoding) as file:
@@ -57,14 +57,14 @@ def _letters_beyond_ascii(path, encoding):
 
 
 def _are_chinese(letters):
-    """Return True if most of some letters, given by their numbers, are common in Chinese."""
+    """True if most of the given letters are common in Chinese."""
     coded = {letter: letter.encode("gb2312", errors="ignore") for letter in letters}
     common = sum(letters[letter] for letter in letters if b"" < coded[letter] < RARE_LETTERS)
     return 2 * common > letters.total()
 
 
 def nearest(name: str, known: Collection[str]) -> str | None:
-    """The known name that is spelt most like a name; None where none is spelt much like it.
+    """Known name with the most similar spelling; None without a similar one.
 
     Parameters
     ----------
@@ -81,11 +81,11 @@ def nearest(name: str, known: Collection[str]) -> str | None:
     'sigma_vertical'
     >>> nearest("name", ["use", "easting"])
     """
-    return next(iter(get_close_matches(name, list(known), n=1)), None)  # difflib's own likeness
+    return next(iter(get_close_matches(name, list(known), n=1)), None)  # similarity by difflib
 
 
 def shown(text: str) -> str:
-    r"""What stands in a file, as a message can show it: one short line without control characters.
+    r"""Format the contents of a file for a message: one short line without control characters.
 
     Parameters
     ----------
@@ -101,13 +101,13 @@ def shown(text: str) -> str:
 
 
 def listed(texts: Sequence[str], limit: int) -> str:
-    """The first of some texts of a file, as a message can show them, and the number of the others.
+    """Format the first of some texts of a file for a message, and the number of the others.
 
     Parameters
     ----------
     texts : sequence of str
     limit : int
-        How many are shown.
+        Number of texts shown.
 
     Examples
     --------
@@ -121,7 +121,7 @@ def listed(texts: Sequence[str], limit: int) -> str:
 
 
 def warn_of_cut(path: str | Path) -> None:
-    """Warn of a text file whose last line has no end.
+    """Warn of a text file whose last line is unterminated.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
-"""TOML files read into pydantic models, with one sentence on each thing that is wrong in them.
+"""TOML files read into pydantic models, with one sentence for each fault.
 
-A value that only the user knows is an open place, marked by "?", until it is filled in.
+A value that only the user knows is an open value, marked by "?", until it is filled in.
 """
 
 import json
@@ -23,9 +23,9 @@ from mlscorr.io.store.text_files import ENCODING, nearest, shown, warn_of_cut
 from mlscorr.survey import SurveyFileError
 from mlscorr.wording import counted
 
-MARK = "?"  # stands for a value that is still open; no key can have it
+MARK = "?"  # placeholder of an open value; no key can have it
 Model = TypeVar("Model", bound=BaseModel)
-# The same known keys as those that the next sentence names
+# The same known keys as in the next sentence
 _REPEATED = re.compile(r"; known are ([^.]+)\.(?= \S+ is an unknown key; known are \1\.)")
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Meters = Annotated[float, Field(ge=-100, le=100, allow_inf_nan=False)]
@@ -39,20 +39,20 @@ Share = Annotated[float, Field(ge=-1, le=1, allow_inf_nan=False)]
 
 
 class TomlSection(BaseModel):
-    """A part of a TOML file: no unknown keys, no numbers as text."""
+    """Part of a TOML file: no unknown keys, no numbers as text."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
 
 def read_toml(path: str | Path, model: type[Model], kind: str) -> Model:
-    """The document of a TOML file as a pydantic model; no other file is opened.
+    """Read a TOML file into a pydantic model; no other file is opened.
 
     Parameters
     ----------
     path : path
     model : class of pydantic
     kind : str
-        What the file is, in words.
+        Description of the file.
 
     Returns
     -------
@@ -61,10 +61,10 @@ def read_toml(path: str | Path, model: type[Model], kind: str) -> Model:
     Raises
     ------
     ValueError
-        Names the line of bad TOML, or every key that is unknown (with the nearest known one),
-        missing, or of a value that can't be used.
+        Names the line of invalid TOML, or every key that is unknown (with the most similar one),
+        missing, or invalid.
     FileNotFoundError
-        Where there is no such file.
+        If there is no such file.
     """
     path = as_path(path)
     if not is_there(path):
@@ -93,19 +93,19 @@ def read_toml(path: str | Path, model: type[Model], kind: str) -> Model:
 
 
 def validate(source: str, document: dict[str, Any], model: type[Model]) -> Model:
-    """A document as a pydantic model.
+    """Validate a document as a pydantic model.
 
     Parameters
     ----------
     source : str
-        Where it is from, in words.
+        Description of its origin.
     document : dict
     model : class of pydantic
 
     Raises
     ------
     ValueError
-        As read_toml.
+        See ``read_toml``.
     """
     try:
         return model.model_validate(document)
@@ -125,7 +125,7 @@ def _causes(items):
 
 
 def _sentence(item, model):
-    """One sentence on one of pydantic's findings, with the dotted key."""
+    """One sentence on a finding of pydantic, with the dotted key."""
     key = ".".join(filter(str.strip, map(str, item["loc"])))
     if item["type"] == "extra_forbidden":
         name = ".".join(part for part in item["loc"] if isinstance(part, str) and part.strip())
@@ -137,14 +137,14 @@ def _sentence(item, model):
         if near == name:
             section = name.split(".")[0]
             return f"{key} is a key of one of several: write [[{section}]], not [{section}]."
-        if near is None:  # nothing is like it: what stands beside it
+        if near is None:  # nothing similar: the keys of the same section
             path = name.rpartition(".")[0]
             known = [k.rpartition(".")[2] for k in keys if k.rpartition(".")[0] == path]
             return f"{shown(key)} is an unknown key; known are {', '.join(known)}."
         return f"{shown(key)} is an unknown key; the nearest known one is {near}."
     if item["type"] == "missing":
         return f"{key} is missing."
-    if item["type"] == "value_error":  # raised by a validator of ours, a sentence already
+    if item["type"] == "value_error":  # raised by a validator of this package, already a sentence
         message = str(item["ctx"]["error"]).rstrip(".")
         if key:
             return f"{key}: {message}."
@@ -159,7 +159,7 @@ def _sentence(item, model):
 
 
 def _keys(model, prefix=""):
-    """Every dotted key of a model, sections included."""
+    """All dotted keys of a model, including sections."""
     keys = []
     for name, field in model.model_fields.items():
         keys.append(prefix + name)
@@ -169,7 +169,7 @@ def _keys(model, prefix=""):
 
 
 def _sections(annotation):
-    """Models among the types of an annotation, those of lists and alternatives too."""
+    """Models among the types of an annotation, including lists and alternatives."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     return [section for part in get_args(annotation) for section in _sections(part)]
@@ -177,14 +177,14 @@ def _sections(annotation):
 
 @dataclass(frozen=True)
 class OpenPlace:
-    """A key of survey.toml whose value only the user knows.
+    """Key of survey.toml whose value only the user knows.
 
     Parameters
     ----------
     keys : tuple of str
         Sections and key, from the outermost.
     examples : tuple
-        Values that it may have, the likeliest first; empty where none can be named.
+        Possible values, the most likely first; empty if unknown.
     about : str
         Meaning of the value, in a few words.
     """
@@ -195,7 +195,7 @@ class OpenPlace:
 
     @property
     def key(self) -> str:
-        """The dotted key, as TOML has it.
+        """Dotted key, as in TOML.
 
         Examples
         --------
@@ -206,7 +206,7 @@ class OpenPlace:
 
     @property
     def option(self) -> str:
-        """The option of init that gives the value.
+        """Option of init that sets the value.
 
         Examples
         --------
@@ -226,7 +226,7 @@ class OpenPlace:
 
 
 def _quoted(key):
-    """A key as TOML has it: bare where it can be."""
+    """Key as in TOML: bare if possible."""
     is_bare = key.isascii() and key.replace("_", "").replace("-", "").isalnum()
     if is_bare:
         return key
@@ -237,13 +237,13 @@ PLACE_OF_CRS = OpenPlace(("crs",), (), 'projected CRS of cloud and control, as "
 
 
 class OpenQuestion(ValueError):
-    """A fault of the input that values in survey.toml can mend.
+    """Fault of the input that values in survey.toml can correct.
 
     Parameters
     ----------
     sentence : str
     places : sequence of OpenPlace
-        What survey.toml must say; empty where it can't mend the fault.
+        Values to add to survey.toml; empty if it cannot correct the fault.
     """
 
     def __init__(self, sentence: str, places: Sequence[OpenPlace] = ()):
@@ -252,7 +252,7 @@ class OpenQuestion(ValueError):
 
 
 def places_of(error: BaseException) -> tuple[OpenPlace, ...]:
-    """Places whose values can mend what an error names.
+    """Open values that can correct the cause of an error.
 
     Parameters
     ----------
@@ -264,7 +264,7 @@ def places_of(error: BaseException) -> tuple[OpenPlace, ...]:
 
 
 def _check_answered(path: Path, document: Mapping[str, Any]) -> None:
-    """Refuse a TOML document with open places."""
+    """Refuse a TOML document with open values."""
     keys = [OpenPlace(keys).key for keys in _open_keys(document, ())]
     if keys:
         number = counted(len(keys), "open place")
@@ -275,7 +275,7 @@ def _check_answered(path: Path, document: Mapping[str, Any]) -> None:
 
 
 def _open_keys(value, keys):
-    """Keys of the values that are still open, sections in lists numbered from 1."""
+    """Keys of open values, with sections in lists numbered from 1."""
     if value == MARK:
         return [keys]
     if isinstance(value, Mapping):

@@ -1,9 +1,9 @@
-"""survey.toml and project.toml, and all files that they name, as one Survey or Project.
+"""survey.toml and project.toml, and all files they name, as one Survey or Project.
 
-- survey_file, project_file: read whole, with all that is wrong in one error
-- survey_sections: what they may state
-- survey_paths, point_owners: which file belongs to what, and which point to whom
-- survey_copy, folder_roles, simulated_clouds, crs_checks: survey.toml written anew, found, checked
+- survey_file, project_file: reading of all parts, with all faults in one error
+- survey_sections: their sections and keys
+- survey_paths, point_owners: paths of the files, and assignment of points
+- survey_copy, folder_roles, simulated_clouds, crs_checks: survey.toml rewritten, found, checked
 """
 
 from mlscorr.io.surveys.crs_checks import check_area, crs_notes

@@ -1,4 +1,4 @@
-"""Whether a CRS suits a trajectory: its area, its scale and its datum."""
+"""Checks of a CRS against a trajectory: its area, its scale and its datum."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mlscorr.survey import Trajectory
 
 
 def check_area(crs: CRS, trajectory: Trajectory) -> None:
-    """Warn where a trajectory lies outside the area that a CRS was made for; refuse it off the map.
+    """Warn if a trajectory is outside the area of use of a CRS; refuse it off the map.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def check_area(crs: CRS, trajectory: Trajectory) -> None:
 
 
 def check_scale(crs: CRS, trajectory: Trajectory) -> None:
-    """Warn where the map of a CRS is far from true to scale at a trajectory.
+    """Warn if the map of a CRS is far from true to scale at a trajectory.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def check_scale(crs: CRS, trajectory: Trajectory) -> None:
     east, north = np.median(trajectory.position[:, :2], axis=0)
     longitude, latitude = map_of(crs)(east, north, inverse=True)
     scale = map_of(crs).get_factors(longitude, latitude).meridional_scale
-    if 0.005 < abs(scale - 1) < np.inf:  # 5 mm of a lever arm of 1 m; zones beside UTM's reach it
+    if 0.005 < abs(scale - 1) < np.inf:  # 5 mm of a lever arm of 1 m; the limit of zones near UTM's
         warnings.warn(
             f"A metre on the ground is {scale:.3f} m on the map of {crs_name(crs)} "
             "at the trajectory, and lever arm, ranges and target sizes are metres on the ground: "
@@ -74,7 +74,7 @@ def check_scale(crs: CRS, trajectory: Trajectory) -> None:
 
 
 def describe_projection(crs: str) -> tuple[str, str, str]:
-    """Sentences on what a geographic trajectory's way into a CRS assumes.
+    """Sentences on the assumptions in projecting a geographic trajectory to a CRS.
 
     Parameters
     ----------
@@ -100,14 +100,14 @@ def describe_projection(crs: str) -> tuple[str, str, str]:
 
 
 def crs_notes(crs: str | None, trajectory: Trajectory, is_sbet: bool) -> list[str]:
-    """Sentences on the CRS; warns where the trajectory lies outside its area.
+    """Sentences on the CRS; warns if the trajectory is outside its area of use.
 
     Parameters
     ----------
     crs : str or None
     trajectory : Trajectory
     is_sbet : bool
-        Whether its file is an SBET, with latitudes and longitudes.
+        True if its file is an SBET, with latitudes and longitudes.
     """
     if crs is None:
         return ["No CRS was given."]
@@ -122,11 +122,11 @@ def crs_notes(crs: str | None, trajectory: Trajectory, is_sbet: bool) -> list[st
 
 
 def _check_datum(crs, trajectory):
-    """Warn where latitudes of GNSS would lie elsewhere than those of the CRS's own datum."""
+    """Warn if GNSS latitudes differ from those of the CRS's own datum."""
     place = np.median(trajectory.position[:, :2], axis=0)
     to_map = Transformer.from_crs("EPSG:4326", crs.to_2d(), always_xy=True)
     east, north = to_map.transform(*map_of(crs)(*place, inverse=True)) - place
-    if 5 < np.hypot(east, north) < np.inf:  # m; plates and realisations make less
+    if 5 < np.hypot(east, north) < np.inf:  # m; plates and realizations cause less
         warnings.warn(
             f"The trajectory's latitudes and longitudes are taken as {crs.geodetic_crs.name}, the "
             f"datum of {crs.name}; as those of GNSS (WGS 84, ETRS89) they would lie {east:+.0f} m "

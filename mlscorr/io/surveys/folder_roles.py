@@ -1,4 +1,4 @@
-"""What the files of a folder are, by their content: clouds, trajectories, control, meshes."""
+"""Roles of the files in a folder, from their contents: clouds, trajectories, control, meshes."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -47,13 +47,13 @@ LEFT_OUT = {"truth.json": SIMULATED, **dict.fromkeys(RESULTS, "results of a run"
 
 @dataclass(frozen=True)
 class FileRole:
-    """What a file is for a survey, and why.
+    """Role of a file in a survey, and the reason.
 
     Parameters
     ----------
     path : Path
     role : str
-        What its content looks like; ``table`` for one of another content.
+        Role suggested by its contents; ``table`` for any other table.
     reason : str
     """
 
@@ -63,7 +63,7 @@ class FileRole:
 
 
 def sort_files(folder: Path) -> list[FileRole]:
-    """Roles of the files in a folder and in those within it that hold no results or other survey.
+    """Find the roles of files in a folder and in subfolders without results or another survey.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def sort_files(folder: Path) -> list[FileRole]:
 
 
 def _role(path) -> FileRole:
-    """What one file is by its suffix and its first bytes."""
+    """Role of one file from its suffix and its first bytes."""
     suffix = path.suffix.lower()
     if suffix in CLOUDS:
         return _cloud(path)
@@ -109,7 +109,7 @@ def _role(path) -> FileRole:
 
 
 def _cloud(path):
-    """A cloud, or none with what is wrong in it."""
+    """Role of a cloud, or none with the fault in it."""
     try:
         layout = read_layout(path)
     except ValueError as error:
@@ -118,19 +118,21 @@ def _cloud(path):
 
 
 def _records(path) -> Iterator[FileRole]:
-    """What a headerless file of float64 may be, whole or cut off: its times and angles tell."""
+    """Yield possible roles of a headerless file of float64, complete or truncated, from its
+    values.
+    """
     size = path.stat().st_size
     sbet = 8 * len(SBET_FIELDS)
     if not size % sbet and _is_timed(path, SBET_FIELDS, 2 * np.pi):
         yield FileRole(path, "trajectory", "whole SBET records with increasing times")
     if not size % (8 * len(SMRMSG_FIELDS)) and _is_timed(path, SMRMSG_FIELDS, np.inf):
         yield FileRole(path, "accuracy", "whole smrmsg records with increasing times")
-    if size > 2 * sbet and _is_timed(path, SBET_FIELDS, 2 * np.pi):  # its reader says the rest
+    if size > 2 * sbet and _is_timed(path, SBET_FIELDS, 2 * np.pi):  # its reader reports the rest
         yield FileRole(path, "trajectory", "SBET records with increasing times, cut off")
 
 
 def _is_timed(path, fields, limit):
-    """Whether a file starts with records whose times increase, and whose places are in a limit."""
+    """True if a file starts with records with increasing times and positions within a limit."""
     values = np.fromfile(path, "<f8", 100 * len(fields))
     table = values[: len(values) // len(fields) * len(fields)].reshape(-1, len(fields))
     if not len(table) or not np.isfinite(table).all():
@@ -140,11 +142,11 @@ def _is_timed(path, fields, limit):
 
 
 def _table(path) -> tuple[Role, str]:
-    """Role of a table by the names of its columns, or by numbers without names."""
+    """Role of a table from the names of its columns, or from numbers without names."""
     header = likely_header(path, TRAJECTORY_NAMES)
     driven = set(find_meanings(header, TRAJECTORY_NAMES))
     is_oriented = len(driven & {"roll", "pitch", "heading"}) > 1 or set(QUATERNION) <= driven
-    if is_oriented or ("gps_time" in driven and position_file(path)):  # its reader says what lacks
+    if is_oriented or ("gps_time" in driven and position_file(path)):  # its reader names the gap
         return "trajectory", f"columns {', '.join(sorted(driven))}"
     if find_layout(path, {}, lambda _: ["gps_time"], {}, tum_columns) is not None:
         return "trajectory", "rows of eight numbers, as time, place and quaternion"
@@ -157,7 +159,7 @@ def _table(path) -> tuple[Role, str]:
     try:  # in other encodings, or without names
         if find_layout(path, CONTROL_NAMES, lacking, {}, unnamed_columns) is not None:
             return "control", "rows of a name and three coordinates"
-    except ValueError as error:  # has the columns, and is not clear
+    except ValueError as error:  # has the columns, but is ambiguous
         return "control", str(error)
     if len(header) > 1 and (len(driven | surveyed) > 1 or path.suffix.lower() == ".csv"):
         return "table", f"its columns are {listed(header, SETTINGS.named_columns)}"
@@ -165,7 +167,7 @@ def _table(path) -> tuple[Role, str]:
 
 
 def _unnamed_epoch(cells):
-    """The column of times in a row of numbers alone, as many as an epoch has, with parts of s."""
+    """Column of times in a row of only numbers, as many as an epoch has, with fractions of s."""
     is_epoch = len(cells) >= len(COLUMNS) and all(map(NUMBER.fullmatch, cells))
     if is_epoch and not cells[0].isdecimal():
         return {"gps_time": 0}

@@ -1,6 +1,6 @@
-"""Whose a survey's points are: which session and which scanner recorded them.
+"""Assignment of a survey's points to sessions and scanners.
 
-survey.toml tells it by the files of each, or by the point_source_ids in files of several.
+survey.toml assigns them by files, or by the point_source_ids in files of several.
 """
 
 import warnings
@@ -26,25 +26,25 @@ def own_clouds(
     clouds: Sequence[CloudFile],
     owner: str = "",
 ) -> list[CloudFile]:
-    """Those of a survey's clouds that patterns name; all without patterns.
+    """Select the clouds of a survey that patterns name; all without patterns.
 
     Parameters
     ----------
     path : Path
         Of survey.toml.
     key : str
-        That holds the patterns.
+        Key with the patterns.
     patterns : sequence of str, optional
     clouds : sequence of CloudFile
     owner : str
-        Words on who has the patterns.
+        Owner of the patterns, in words.
 
     Raises
     ------
     ValueError
-        Where a pattern names none of them.
+        If a pattern matches none of them.
     FileNotFoundError
-        Where there is no such file.
+        If there is no such file.
     """
     if patterns is None:
         return [*clouds]
@@ -66,9 +66,10 @@ def check_belongings(
     parts: Sequence[Trajectory],
     clouds: Sequence[CloudFile],
 ) -> None:
-    """Compare times of points with the trajectories whose files or point_source_ids they are.
+    """Compare times of points with the trajectories to which survey.toml assigns them.
 
-    The time of a point tells its trajectory in any case; this finds files under the wrong one.
+    The time of a point determines its trajectory in any case; this check finds files assigned to
+    the wrong one.
 
     Parameters
     ----------
@@ -76,19 +77,18 @@ def check_belongings(
         Of survey.toml.
     sessions : sequence of SessionFile
     parts : sequence of Trajectory
-        Of these.
+        Their trajectories.
     clouds : sequence of CloudFile
 
     Raises
     ------
     ValueError
-        Where most points that were looked at in a file lie outside, and for files that are none
-        of the survey.
+        If most sampled points of a file are outside, or a file is not part of the survey.
 
     Warns
     -----
     UserWarning
-        Where some do.
+        If some are outside.
     """
     if not clouds:
         return
@@ -136,9 +136,9 @@ def check_belongings(
 def mounted_scanners(
     path: Path, settings: PlannedSurveyFile, clouds: tuple[CloudFile, ...]
 ) -> tuple[MountedScanner, ...]:
-    """The scanners of a survey: one or more.
+    """Make the scanners of a survey: one or more.
 
-    Where point_source_ids tell them apart, the points of each id are counted.
+    If point_source_ids separate them, the points of each ID are counted.
 
     Parameters
     ----------
@@ -146,13 +146,13 @@ def mounted_scanners(
         Of survey.toml.
     settings : PlannedSurveyFile
     clouds : tuple of CloudFile
-        None of a survey that is planned.
+        Empty for a planned survey.
 
     Raises
     ------
     ValueError
-        Where a file or an id is of no scanner, or of more than one, for files that are none of
-        these, and for ids that no point has.
+        If a file or an ID belongs to no scanner or to several, a file is not part of the survey, or
+        no point has an ID.
     FileNotFoundError
         For files that don't exist.
     """
@@ -209,7 +209,7 @@ def _measured(path, sections, clouds):
 
 
 def _parts(path, cloud, own):
-    """Pairs (name, CloudFile) of the scanners that measured a file, by the ids of each."""
+    """Pairs (name, CloudFile) of the scanners that measured a file, by the IDs of each."""
     if None in own.values():
         return [(name, cloud) for name in own]
     ids = [number for numbers in own.values() for number in set(numbers)]
@@ -239,7 +239,7 @@ def _parts(path, cloud, own):
 
 
 def _listed(ids):
-    """The first ids in words."""
+    """List the first IDs in words."""
     first = ", ".join(map(str, sorted(ids)[:10]))
     if len(ids) <= 10:
         return first

@@ -1,4 +1,4 @@
-"""project.toml: several drives, one control list, and what is believed of all of them."""
+"""project.toml: several drives, one control list, and settings common to all of them."""
 
 import re
 from collections import Counter
@@ -43,15 +43,15 @@ from mlscorr.io.trajectories import check_crs, check_systems
 from mlscorr.survey import ControlPoints, InputFile, SurveyFileError, Trajectory, choosing
 
 FOLDER_NAME = re.compile(r"[^\\/:*?\"<>|\x00-\x1f.][^\\/:*?\"<>|\x00-\x1f]*")  # on any system
-SHARED_TILES = "tiles"  # folder of the corrected files of more than one drive
-RESERVED = ("tasks", SHARED_TILES, "log.txt", "project.json", "project.html")  # beside the drives
+SHARED_TILES = "tiles"  # folder of corrected files shared by several drives
+RESERVED = ("tasks", SHARED_TILES, "log.txt", "project.json", "project.html")  # next to the drives
 FILE_NAME = "project.toml"
-BELIEFS = ("pos", "matching", "ties")  # sections that hold for all drives
-SHARED = ("mounting", "scanner", *BELIEFS)  # and those that hold where a drive has none of its own
+BELIEFS = ("pos", "matching", "ties")  # sections that apply to all drives
+SHARED = ("mounting", "scanner", *BELIEFS)  # and those that apply to drives without their own
 
 
 class TilesSection(TomlSection):
-    """All cloud files of the project, the system of their times, and which points are noise."""
+    """All cloud files of the project, their time system, and their noise classes."""
 
     files: Annotated[list[str], Field(min_length=1)] | None = None
     gps_time: Literal["auto", "week", "standard"] = "auto"
@@ -59,7 +59,7 @@ class TilesSection(TomlSection):
 
 
 class DriveSection(TomlSection):
-    """A drive: a survey.toml, or files and a trajectory."""
+    """Drive given by a survey.toml, or by files and a trajectory."""
 
     name: Annotated[str, Field(min_length=1)] | None = None
     survey: str | None = None
@@ -87,7 +87,7 @@ class DriveSection(TomlSection):
 
 
 class ProjectFile(survey_sections.CommonSections):
-    """What stands in project.toml, in its own units (deg)."""
+    """Contents of project.toml, in its own units (deg)."""
 
     cloud: TilesSection = TilesSection()
     drive: Annotated[list[DriveSection], Field(min_length=1)]
@@ -110,7 +110,9 @@ class ProjectFile(survey_sections.CommonSections):
 
     @property
     def drives(self) -> list[tuple[str, DriveSection]]:
-        """Each [[drive]] with its name, or that of its folder, or its number from 1."""
+        """Name and section of each [[drive]]; by default the name of its folder, or its number
+        from 1.
+        """
         return [
             (section.name or _folder(section) or f"drive-{number}", section)
             for number, section in enumerate(self.drive, start=1)
@@ -126,7 +128,7 @@ def _folder(section):
 
 
 class StatedDrive(NamedTuple):
-    """A drive as project.toml states it, or its survey.toml (path); else as DriveParts."""
+    """Drive as stated by project.toml or by its survey.toml (path); otherwise like DriveParts."""
 
     name: str
     path: Path
@@ -137,7 +139,7 @@ class StatedDrive(NamedTuple):
 
 
 class StatedProject(NamedTuple):
-    """A project as its project.toml states it."""
+    """Project as stated by its project.toml."""
 
     path: Path
     settings: ProjectFile
@@ -146,7 +148,7 @@ class StatedProject(NamedTuple):
 
 @dataclass(frozen=True)
 class DriveParts:
-    """A drive by all but its clouds.
+    """All parts of a drive except its clouds.
 
     Parameters
     ----------
@@ -154,7 +156,7 @@ class DriveParts:
     parts : SurveyParts
     notes : tuple of str
     ids : tuple of int, optional
-        The point_source_ids of its points, where files hold those of other drives, too.
+        The point_source_ids of its points, if files also contain those of other drives.
     """
 
     name: str
@@ -164,25 +166,25 @@ class DriveParts:
 
     @property
     def trajectory(self) -> Trajectory:
-        """As recorded."""
+        """Recorded trajectory."""
         return self.parts.recorded.trajectory
 
 
 @dataclass(frozen=True)
 class ProjectParts:
-    """A project as its files say it, but for the clouds.
+    """All parts of a project except the clouds.
 
     Parameters
     ----------
     name : str
     path : Path
-        Of project.toml.
+        Path of project.toml.
     crs : str or None
     drives : tuple of DriveParts
     control, check : ControlPoints
-        Of all drives.
+        Points of all drives.
     layout : str or None
-        How the list of these was understood.
+        Note on how their list was interpreted.
     inputs : tuple of InputFile
         project.toml and the control list.
     excluded : ControlPoints
@@ -204,14 +206,13 @@ class ProjectParts:
 
     @property
     def files(self) -> list[Path]:
-        """Every file that is read."""
+        """All files that are read."""
         named = [*self.inputs, *(file for drive in self.drives for file in drive.parts.inputs)]
         return list(dict.fromkeys(file.path for file in named))
 
 
 def is_project(path: str | Path) -> bool:
-    """Whether a path is that of a project.toml or another TOML file with drives, or of a folder
-    that holds a project.toml and no survey.toml.
+    """True for the path of a TOML file with drives, or of a folder with only project.toml.
 
     Parameters
     ----------
@@ -226,17 +227,17 @@ def is_project(path: str | Path) -> bool:
 
 
 def read_project(project: str | Path | StatedProject) -> ProjectParts:
-    """All of a project but its clouds.
+    """Read all of a project except its clouds.
 
     Parameters
     ----------
     project : path or StatedProject
-        project.toml, its folder, or what it states.
+        project.toml, its folder, or its contents.
 
     Raises
     ------
     ValueError
-        For anything wrong in project.toml, in the files it names, or between drives.
+        For any fault in project.toml, in the files it names, or between drives.
     FileNotFoundError
         For files that aren't there.
     """
@@ -259,7 +260,7 @@ def read_project(project: str | Path | StatedProject) -> ProjectParts:
         inputs.append(input_file("control", file))
         try:
             surveyed = read_surveyed(file, settings.control, _everywhere(drives), crs)
-        except ValueError as error:  # which names where a survey has its [control]
+        except ValueError as error:  # the message names the section [control] of a survey
             error.args = (str(error).replace("survey.toml", path.name),)
             raise
     name = settings.name or path.parent.name
@@ -273,7 +274,7 @@ def read_project(project: str | Path | StatedProject) -> ProjectParts:
 
 
 def stated_project(path: str | Path) -> StatedProject:
-    """What a project.toml and the survey.toml of its drives state; no data are read.
+    """Read project.toml and the survey.toml of its drives, without any data.
 
     Parameters
     ----------
@@ -282,7 +283,7 @@ def stated_project(path: str | Path) -> StatedProject:
     Raises
     ------
     ValueError
-        For anything wrong in these, or between them.
+        For any fault in these, or between them.
     FileNotFoundError
         For files that aren't there.
     """
@@ -329,7 +330,7 @@ def _stated(path, settings, name, section):
 
 
 def _ids(path, name, section, settings):
-    """The point_source_ids of a drive; None where all points of its files are its."""
+    """The point_source_ids of a drive; None if all points of its files belong to it."""
     ids = section.point_source_ids
     if ids is None:
         return None
@@ -343,7 +344,7 @@ def _ids(path, name, section, settings):
 
 
 def _check_tiles(path, settings, drives):
-    """Refuse a tile of no drive, and one of two whose points nothing tells apart."""
+    """Refuse a tile without a drive, and one of two drives whose points cannot be separated."""
     owners: dict[Path, list[StatedDrive]] = {}
     for owner, file in ((drive, file) for drive in drives for file in drive.files.clouds):
         owners.setdefault(resolved(file), []).append(owner)
@@ -382,7 +383,7 @@ def _check_tiles(path, settings, drives):
 
 
 def _check_crs_alike(path, settings, drives):
-    """Refuse drives in two CRS."""
+    """Refuse drives with two different CRS."""
     crs = settings.crs or drives[0].settings.crs
     if other := [drive for drive in drives if drive.settings.crs != crs]:
         raise ValueError(
@@ -393,7 +394,7 @@ def _check_crs_alike(path, settings, drives):
 
 
 def _with_beliefs(path, drives):
-    """Drives that all believe what some of them state; refuses what two state differently."""
+    """Apply settings stated by some drives to all; refuse conflicting ones."""
     beliefs = {}
     for what in BELIEFS:
         stated = [drive for drive in drives if what in drive.settings.model_fields_set]
@@ -411,7 +412,7 @@ def _with_beliefs(path, drives):
 
 
 def _everywhere(drives):
-    """A Trajectory that comes by wherever one of some drives does, an epoch each second."""
+    """Trajectory with an epoch each second that covers all positions of some drives."""
     ways = [drive.trajectory for drive in drives]
     rows = [np.unique(np.floor(way.gps_time), return_index=True)[1] for way in ways]
     position = np.concatenate([w.position[some] for w, some in zip(ways, rows, strict=True)])

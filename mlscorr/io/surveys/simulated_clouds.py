@@ -1,4 +1,4 @@
-"""Clouds that a simulator made of a survey: a survey folder, a folder of files, or a file."""
+"""Simulated clouds of a survey: a survey folder, a folder of files, or a file."""
 
 import warnings
 from dataclasses import replace
@@ -11,25 +11,25 @@ from mlscorr.io.surveys.survey_file import FILE_NAME, cloud_file, read_survey
 from mlscorr.survey import Survey
 
 SUFFIXES = (".las", ".laz")
-NEAREST = 1.0  # m between two trajectories of one survey: ten times a usual POS's error
+NEAREST = 1.0  # m between two trajectories of one survey: ten times a typical POS error
 
 
 def simulated_survey(path: Path | str, survey: Survey) -> Survey:
-    """The survey with the simulated clouds instead of its own.
+    """Return the survey with the simulated clouds instead of its own.
 
     Parameters
     ----------
     path : path
         survey.toml or its folder, a folder with LAS or LAZ files, or such a file.
     survey : Survey
-        Of which they are simulated.
+        Survey that was simulated.
 
     Raises
     ------
     ValueError
         For clouds of another time, trajectory or CRS.
     FileNotFoundError
-        Where there are none.
+        If there are none.
     """
     path = Path(path)
     clouds = _clouds_of(path, survey)

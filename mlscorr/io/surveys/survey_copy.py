@@ -1,4 +1,4 @@
-"""A survey.toml written anew in another folder, with some values changed."""
+"""Copies of survey.toml in another folder, with some values changed."""
 
 import glob
 import os
@@ -28,27 +28,27 @@ def write_survey_copy(
     control: Sequence[str] = (),
     notes: Sequence[str] = (),
 ) -> None:
-    """Copy a survey.toml; all that isn't changed stays as it is, comments and order too.
+    """Copy a survey.toml; everything unchanged is preserved, including comments and order.
 
     Parameters
     ----------
     source : path
-        survey.toml as it was.
+        Original survey.toml.
     target : path
         The file to write.
     folder : path
-        Where the file will stand in the end: paths are written relative to it.
+        Final folder of the file; paths are written relative to it.
     mountings : sequence of Mounting, optional
-        Of each scanner, to 0.01 mm and 1e-6 deg.
+        Mounting of each scanner, to 0.01 mm and 1e-6 deg.
     clouds : sequence of sequences of str, optional
-        New files of each scanner, in the folder. Without them, new mountings are not yet those of
-        the clouds, and the copy says so.
+        New files of each scanner, in the folder. Without them, new mountings do not yet apply to
+        the clouds, and the copy states this.
     trajectory : str, optional
         New trajectory.file of all sessions, in the folder.
     control : sequence of str, optional
-        Names of the control points by which that one was corrected.
+        Names of the control points used to correct the trajectory.
     notes : sequence of str, optional
-        A comment on the sigmas of each mounting, or an empty one.
+        Comment on the sigmas of each mounting, possibly empty.
     """
     source = as_path(source)
     document = tomlkit.parse(read_bytes(source).decode(ENCODING))
@@ -74,7 +74,7 @@ def write_survey_copy(
     sections = scanners or [document]
     notes = notes or [""] * len(mountings)
     for section, mounting, note in zip(sections, mountings, notes, strict=bool(mountings)):
-        if isinstance(section, InlineTable):  # where no comment can stand
+        if isinstance(section, InlineTable):  # no comment is possible there
             _set_mounting(section["mounting"], mounting, "")
         else:
             _set_mounting(section["mounting"], mounting, note)
@@ -82,7 +82,7 @@ def write_survey_copy(
 
 
 def _set_clouds(source, document, sessions, scanners, clouds):
-    """New files of each scanner; those of sessions keep their names, not their folders."""
+    """Set new files of each scanner; those of sessions keep their names, not their folders."""
     for section in sessions:
         if "files" in section:
             paths = [matching(source, "trajectory.files", pattern) for pattern in section["files"]]
@@ -94,10 +94,10 @@ def _set_clouds(source, document, sessions, scanners, clouds):
 
 
 def _set_trajectory(document, name, control):
-    """One trajectory in our own columns, with the control points by which it was corrected."""
+    """Set one trajectory in our own columns, with the control points used to correct it."""
     if _listed(document["trajectory"]):
         document["trajectory"] = tomlkit.table()
-    for key in set(document["trajectory"]) - {"file"}:  # its sigmas and columns are its own
+    for key in set(document["trajectory"]) - {"file"}:  # sigmas and columns are its own
         del document["trajectory"][key]
     document["trajectory"]["file"] = name
     if control:
@@ -105,23 +105,23 @@ def _set_trajectory(document, name, control):
 
 
 def _listed(section):
-    """Sections of a list of tables; none of a table."""
+    """Sections of a list of tables; empty for a table."""
     if isinstance(section, list):
         return section
     return []
 
 
 def _set_mounting(section, mounting, note):
-    """Lever arm and boresight, and how well they are known."""
+    """Set lever arm and boresight, and their accuracy."""
     values = mounting_values(mounting)
-    if mounting.covariance is None:  # a calibration's sigmas hold together, measured ones apart
+    if mounting.covariance is None:  # sigmas of a calibration are joint, measured ones separate
         is_calibrated = section.pop("correlation", None) is not None
         for key in [key for key in values if is_calibrated or values[key] != section[key]]:
             section.pop(f"{key}_sigma", None)
     section.update(values)
     if mounting.covariance is not None:
         sigma = _set_covariance(section, mounting.covariance)
-        is_line = isinstance(section, InlineTable)  # TOML has comments behind it alone
+        is_line = isinstance(section, InlineTable)  # TOML has comments only after it
         trivia = section.trivia if is_line else sigma.trivia
         if note:
             trivia.comment_ws = "  "
@@ -132,7 +132,7 @@ def _set_mounting(section, mounting, note):
 
 
 def _set_covariance(section, covariance):
-    """Sigmas to 0.01 mm and 1e-6 deg, and correlations to 1e-6; the TOML item of the first."""
+    """Set sigmas to 0.01 mm and 1e-6 deg, and correlations to 1e-6; return the first TOML item."""
     sigma = np.sqrt(np.diag(covariance))
     first = tomlkit.item(np.maximum(np.round(sigma[:3], 5), 1e-5).tolist())
     section["lever_arm_sigma"] = first
@@ -145,7 +145,7 @@ def _set_covariance(section, covariance):
 
 
 def mounting_values(mounting: Mounting) -> dict[str, list[float]]:
-    """``lever_arm`` and ``boresight`` as survey.toml has them, to 0.01 mm and 1e-6 deg.
+    """Format ``lever_arm`` and ``boresight`` as in survey.toml, to 0.01 mm and 1e-6 deg.
 
     Parameters
     ----------
@@ -156,14 +156,16 @@ def mounting_values(mounting: Mounting) -> dict[str, list[float]]:
     dict of lists of three float
         Units: m, deg.
     """
-    with warnings.catch_warnings(action="ignore"):  # of angles that are not unique: any will do
+    with warnings.catch_warnings(action="ignore"):  # of ambiguous angles: any will do
         boresight = mounting.boresight.as_euler("xyz", degrees=True)
     rounded = np.round(mounting.lever_arm, 5) + 0.0, np.round(boresight, 6) + 0.0
     return dict(zip(("lever_arm", "boresight"), map(np.ndarray.tolist, rounded), strict=True))
 
 
 def _way(old, new):
-    """The way from the new folder to the old one, links resolved; absolute if there is none."""
+    """Relative path from the new folder to the old one, links resolved; absolute if there is
+    none.
+    """
     if is_remote(old):
         return old
     try:
@@ -173,7 +175,7 @@ def _way(old, new):
 
 
 def _moved(there, name, folder=None):
-    """A path, or a pattern if it is one in its old folder, as it is seen from the new folder."""
+    """Path, or pattern if it is one in its old folder, relative to the new folder."""
     if is_url(name):
         return name
     if is_remote(there):

@@ -1,6 +1,6 @@
 """survey.toml and the files it names, as one Survey.
 
-Surveyed points are scaled where they are in ground distances, and lie near the drive.
+Surveyed points in ground distances are scaled, and checked to be near the drive.
 """
 
 import warnings
@@ -58,26 +58,24 @@ UNKNOWN_POS = (
 
 
 def read_survey(path: str | Path, planned: bool = False) -> Survey:
-    """Survey of a survey.toml, with all that the files hold but the points.
+    """Read the Survey of a survey.toml, with all data except the points.
 
     Parameters
     ----------
     path : path
-        survey.toml, or the folder that holds it.
+        survey.toml, or its folder.
     planned : bool
-        Whether it may have no cloud.
+        True if it may have no cloud.
 
     Returns
     -------
     Survey
-        Without a section [control], or with a file that holds no point, control and check are
-        empty.
+        Without a section [control], or with a file without points, control and check are empty.
 
     Raises
     ------
     ValueError
-        For anything wrong in survey.toml, in the files it names, or between them (times,
-        coordinates).
+        For any fault in survey.toml, in the files it names, or between them (times, coordinates).
     FileNotFoundError
         For files that aren't there.
 
@@ -100,17 +98,17 @@ def read_survey(path: str | Path, planned: bool = False) -> Survey:
 
 @dataclass(frozen=True)
 class SurveyParts:
-    """All of a survey but its clouds.
+    """All parts of a survey except its clouds.
 
     Parameters
     ----------
     path : Path
-        Of the file that says it.
+        Path of the file that defines it.
     settings : PlannedSurveyFile
     files : SurveyPaths
     recorded : Sessions
     surveyed : ControlList
-        Control and check points, and how the list of them was understood.
+        Control and check points, and the interpretation of their list.
     inputs : tuple of InputFile
     """
 
@@ -123,36 +121,36 @@ class SurveyParts:
 
     @property
     def system(self) -> str:
-        """What is said of the clouds' times."""
+        """Stated time system of the clouds."""
         if self.settings.cloud:
             return self.settings.cloud.gps_time
         return "auto"
 
     @property
     def noise_classes(self) -> tuple[int, ...]:
-        """Classes of the clouds' points that are noise."""
+        """Noise classes of the clouds' points."""
         cloud = self.settings.cloud
         if cloud is None:
             return NOISE_CLASSES
         return tuple(cloud.noise_classes)
 
     def cloud_file(self, cloud: Path) -> tuple[CloudFile, str]:
-        """The CloudFile of a path; as the function of this name."""
+        """Return the CloudFile of a path; see the function of this name."""
         given = self.recorded.trajectory, self.system, self.settings.crs
         return cloud_file(cloud, *given, noise_classes=self.noise_classes)
 
     def survey(self, read: Sequence[tuple[CloudFile, str]]) -> Survey:
-        """The survey of these parts and of clouds.
+        """Make the survey of these parts and of clouds.
 
         Parameters
         ----------
         read : sequence of (CloudFile, str)
-            With the sentences on their time systems.
+            Each with a sentence on its time system.
 
         Raises
         ------
         ValueError
-            Where clouds, trajectories and scanners don't go together.
+            If clouds, trajectories and scanners do not match.
         """
         path = self.path
         settings = self.settings
@@ -168,7 +166,7 @@ class SurveyParts:
         if len(scanners) == 1:
             scanner = scanners[0].scanner
             mounting = scanners[0].mounting
-            scanners = ()  # of several alone
+            scanners = ()  # only if there are several
         else:
             scanner = Scanner()
             mounting = None
@@ -208,16 +206,16 @@ class SurveyParts:
 
 
 def read_parts(path: Path, settings: PlannedSurveyFile, files: SurveyPaths) -> SurveyParts:
-    """All of a survey but its clouds.
+    """Read all parts of a survey except its clouds.
 
     Parameters
     ----------
     path : Path
-        Of the file that says it.
+        Path of the file that defines it.
     settings : PlannedSurveyFile
-        What raises is as of read_survey.
+        For errors see read_survey.
     files : SurveyPaths
-        That are named there.
+        Files named there.
     """
     inputs = tuple(input_file(*named) for named in [("survey", path), *files.named])
     recorded = read_sessions(files.sessions, settings.crs, stated_pos(settings))
@@ -226,7 +224,7 @@ def read_parts(path: Path, settings: PlannedSurveyFile, files: SurveyPaths) -> S
 
 
 def stated_pos(settings: PlannedSurveyFile) -> Pos | None:
-    """What [pos] says; None where it is left out.
+    """Contents of [pos]; None if it is missing.
 
     Parameters
     ----------
@@ -238,14 +236,14 @@ def stated_pos(settings: PlannedSurveyFile) -> Pos | None:
 
 
 def read_survey_file(path: str | Path, planned: bool = False) -> PlannedSurveyFile:
-    """What stands in a survey.toml; no other file is opened.
+    """Read the contents of a survey.toml; no other file is opened.
 
     Parameters
     ----------
     path : path
-        survey.toml, or the folder that holds it.
+        survey.toml, or its folder.
     planned : bool
-        Whether it may have no cloud.
+        True if it may have no cloud.
 
     Returns
     -------
@@ -254,7 +252,7 @@ def read_survey_file(path: str | Path, planned: bool = False) -> PlannedSurveyFi
     Raises
     ------
     ValueError
-        Names the line of bad TOML, or every key that is unknown (with the nearest known one),
+        Names the line of invalid TOML, or every key that is unknown (with the most similar one),
         missing, or of the wrong type.
     """
     sections = PlannedSurveyFile if planned else SurveyFile
@@ -265,7 +263,7 @@ def read_survey_file(path: str | Path, planned: bool = False) -> PlannedSurveyFi
 
 
 def input_files(path: str | Path, planned: bool = False) -> list[Path]:
-    """Paths of a survey.toml and of every file that it names, all of which exist.
+    """Paths of a survey.toml and of every file it names, all of which exist.
 
     Parameters
     ----------
@@ -279,7 +277,7 @@ def input_files(path: str | Path, planned: bool = False) -> list[Path]:
     Raises
     ------
     ValueError
-        As read_survey_file.
+        See read_survey_file.
     FileNotFoundError
         For files that aren't there.
     """
@@ -288,7 +286,7 @@ def input_files(path: str | Path, planned: bool = False) -> list[Path]:
 
 
 def survey_toml(path: str | Path) -> Path:
-    """Path of a survey.toml, or of that in a folder.
+    """Path of a survey.toml, or of the one in a folder.
 
     Parameters
     ----------
@@ -297,7 +295,7 @@ def survey_toml(path: str | Path) -> Path:
     Raises
     ------
     FileNotFoundError
-        Where there is none.
+        If there is none.
     """
     path = as_path(path)
     if is_folder(path):
@@ -318,7 +316,7 @@ def cloud_file(
     ids: tuple[int, ...] | None = None,
     noise_classes: tuple[int, ...] = NOISE_CLASSES,
 ) -> tuple[CloudFile, str]:
-    """CloudFile of a path, and the sentence on its time system.
+    """Make the CloudFile of a path, and the sentence on its time system.
 
     Parameters
     ----------
@@ -327,25 +325,25 @@ def cloud_file(
     setting : str
         cloud.gps_time of survey.toml.
     crs : str or None
-        That of survey.toml, which can be used.
+        CRS of survey.toml, which must be valid.
     ids : tuple of int, optional
-        Only the points with these point_source_ids are of the trajectory.
+        Only points with these point_source_ids belong to the trajectory.
     noise_classes : tuple of int
         cloud.noise_classes of survey.toml.
 
     Raises
     ------
     ValueError
-        For a file that can't be read, or whose times are not the trajectory's.
+        If a file cannot be read, or its times do not match the trajectory's.
 
     Warns
     -----
     UserWarning
-        Where the file states another CRS.
+        If the file states another CRS.
     """
     layout = read_layout(path)
     file = CloudFile(path, layout.points, layout.time_offset, "", ids, noise_classes=noise_classes)
-    if layout.scale.max() > 0.002:  # m, half of what a scanner's ranges are good for
+    if layout.scale.max() > 0.002:  # m, half of the accuracy of a scanner's ranges
         warnings.warn(
             f"The coordinates of {path.name} are in steps of {layout.scale.max():g} m: neither "
             "targets nor corrected points are better than that. Export the cloud in steps of "
@@ -354,7 +352,7 @@ def cloud_file(
         )
     records = spread_records(layout)[1]
     times = records["gps_time"][file.rows(records["point_source_id"])] + layout.time_offset
-    if not len(times):  # too few of the file are spread over it
+    if not len(times):  # too few for a spread over the file
         chunk = next(read_chunks(file), None)
         if chunk is not None:
             times = chunk.gps_time
@@ -378,7 +376,7 @@ def cloud_file(
 def read_surveyed(
     path: Path | None, section: ControlSection, trajectory: Trajectory, crs: str | None = None
 ) -> ControlList:
-    """Points of a list that lies near a trajectory; none of none, and of an empty file.
+    """Read the points of a list and check that they are near a trajectory; empty without a list.
 
     Parameters
     ----------
@@ -386,12 +384,12 @@ def read_surveyed(
     section : ControlSection
     trajectory : Trajectory
     crs : str, optional
-        Of the survey, for control in ground distances.
+        CRS of the survey, for control in ground distances.
 
     Raises
     ------
     ValueError
-        As of read_control and check_together.
+        See read_control and check_together.
     """
     if path is None or not holds_points(path):
         return NOTHING_SURVEYED
@@ -401,10 +399,10 @@ def read_surveyed(
 
 
 def _scaled(points, section, crs):
-    """Points whose eastings and northings are multiplied as [control] says, about its origin.
+    """Scale eastings and northings about an origin as stated in [control].
 
-    Without a scale_origin it is the middle of the control points (of all, where all are check
-    points), which then stays where it is.
+    Without a scale_origin it is the middle of the control points (or of all points, if all are
+    check points), which does not move.
     """
     if section.scale_factor is None:
         return points

@@ -1,4 +1,4 @@
-"""Where the files are that a survey.toml names."""
+"""Paths of the files named in a survey.toml."""
 
 import glob
 import os
@@ -25,7 +25,7 @@ class SurveyPaths:
     ----------
     clouds : list of Path
     sessions : list of SessionFile
-        The one trajectory, or several.
+        One trajectory, or several.
     control, reference : Path or None
     """
 
@@ -36,7 +36,7 @@ class SurveyPaths:
 
     @property
     def named(self) -> list[tuple[str, Path]]:
-        """Pairs (what it is, path) of all."""
+        """Pairs (description, path) of all files."""
         named = [("cloud", cloud) for cloud in self.clouds]
         for session in self.sessions:
             named += [("trajectory", session.path), ("trajectory accuracy", session.accuracy)]
@@ -45,7 +45,7 @@ class SurveyPaths:
 
 
 def files_of(path: Path, settings: PlannedSurveyFile, key: str = "cloud.files") -> SurveyPaths:
-    """Paths of the files that a survey.toml names.
+    """Find the files named in a survey.toml.
 
     Parameters
     ----------
@@ -53,14 +53,14 @@ def files_of(path: Path, settings: PlannedSurveyFile, key: str = "cloud.files") 
         Of survey.toml.
     settings : PlannedSurveyFile
     key : str
-        That names the clouds.
+        Key that names the clouds.
 
     Raises
     ------
     FileNotFoundError
         For those that don't exist.
     ValueError
-        For a file that is named twice, and for two clouds of one name.
+        If a file is named twice, or two clouds have the same name.
     """
     clouds = []
     if settings.cloud:
@@ -78,7 +78,7 @@ def files_of(path: Path, settings: PlannedSurveyFile, key: str = "cloud.files") 
 
 
 def session_file(path: Path, section: TrajectorySection) -> SessionFile:
-    """The files of a [trajectory] or one of [[trajectory]].
+    """Find the files of a [trajectory] or of one of [[trajectory]].
 
     Parameters
     ----------
@@ -114,25 +114,25 @@ def check_sessions(path: Path, sessions: Sequence[SessionFile]) -> None:
 
 
 def matching(path: Path, key: str, name: str) -> list[Path]:
-    """Paths of the files that a survey.toml names by a pattern, or of the one by its name.
+    """Paths of the files that a survey.toml names by a pattern, or of one by its name.
 
     Parameters
     ----------
     path : Path
         Of survey.toml.
     key : str
-        That names them.
+        Key that names them.
     name : str
 
     Raises
     ------
     FileNotFoundError
-        Where there is none.
+        If there is none.
 
     Warns
     -----
     UserWarning
-        Where folders that hold results are left out of a pattern of all folders.
+        If folders with results are omitted from a pattern for all folders.
     """
     there = beside(path, name)
     if not glob.has_magic(name) or is_there(there):
@@ -154,13 +154,13 @@ def matching(path: Path, key: str, name: str) -> list[Path]:
 
 
 def _holds_results(folder):
-    """Whether a run wrote a folder, or a project it."""
+    """True if a folder contains results of a run or of a project."""
     documents = [folder / name for name in RESULTS] + [folder.parent / "project.json"]
     return any(is_there(path) for path in documents)
 
 
 def given_file(path: Path, key: str, name: str | None) -> Path | None:
-    """Path of a file that a survey.toml may name; as existing, None without a name."""
+    """Path of an optional file in survey.toml; see existing. None without a name."""
     if name is None:
         return None
     return existing(path, key, name)
@@ -174,13 +174,13 @@ def existing(path: Path, key: str, name: str) -> Path:
     path : Path
         Of survey.toml.
     key : str
-        That names it.
+        Key that names it.
     name : str
 
     Raises
     ------
     FileNotFoundError
-        Where there is none.
+        If there is none.
     """
     there = beside(path, name)
     if not is_there(there):
@@ -189,7 +189,7 @@ def existing(path: Path, key: str, name: str) -> Path:
 
 
 def _lack(there):
-    """Why there is no file of a name, and which one may be meant."""
+    """Explain why there is no file with a name, and suggest another."""
     if is_folder(there):
         return "is a folder: name a file in it, or its clouds by a pattern, as FOLDER/*.laz"
     others = []
@@ -202,7 +202,7 @@ def _lack(there):
 
 
 def check_distinct(path: Path, clouds: list[Path], key: str = "cloud.files") -> None:
-    """Refuse a cloud that is named twice or by a copy, and two of one name: outputs keep names.
+    """Refuse a cloud named twice or by a copy, and two with one name, because outputs keep names.
 
     Parameters
     ----------
@@ -210,7 +210,7 @@ def check_distinct(path: Path, clouds: list[Path], key: str = "cloud.files") -> 
         Of survey.toml.
     clouds : list of Path
     key : str
-        That names them.
+        Key that names them.
 
     Raises
     ------
@@ -233,7 +233,7 @@ def check_distinct(path: Path, clouds: list[Path], key: str = "cloud.files") -> 
 
 
 def _copies_sentence(path: Path, key: str, copies: dict[Path, Path]) -> str:
-    """The sentence on clouds that hold the points of others, and on what to remove."""
+    """Sentence on clouds with the points of others, and on which to remove."""
     limit = SETTINGS.named_faults
     pairs = [f"{copy}, which is a copy of {first}" for copy, first in list(copies.items())[:limit]]
     surplus = len(copies) - len(pairs)

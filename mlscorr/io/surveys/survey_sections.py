@@ -1,4 +1,4 @@
-"""What stands in survey.toml, section by section, in its own units (deg)."""
+"""Sections of survey.toml, in its own units (deg)."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -28,12 +28,12 @@ NoiseClasses = Annotated[
 
 
 class CloudSection(TomlSection):
-    """Which cloud files, the system of their times, and which of their points are noise."""
+    """Cloud files, their time system, and their noise classes."""
 
     files: Annotated[list[str], Field(min_length=1)]
     gps_time: Literal["auto", "week", "standard"] = "auto"
-    noise_classes: NoiseClasses  # whose points take no part in a measurement
-    mounting: Literal["stated", "recorded"] = "stated"  # by which the points are georeferenced
+    noise_classes: NoiseClasses  # whose points are not used in measurements
+    mounting: Literal["stated", "recorded"] = "stated"  # used for georeferencing the points
 
 
 class MountingSection(TomlSection):
@@ -43,13 +43,13 @@ class MountingSection(TomlSection):
     boresight: Annotated[list[Degrees], Three]
 
     def mounting(self) -> Mounting:
-        """R_L^P = Rz(c) Ry(b) Rx(a) for the boresight [a, b, c]."""
+        """Return the mounting with R_L^P = Rz(c) Ry(b) Rx(a) for the boresight [a, b, c]."""
         boresight = Rotation.from_euler("xyz", self.boresight, degrees=True)
         return Mounting(np.array(self.lever_arm, dtype=float), boresight)
 
 
 class CalibratedMountingSection(MountingSection):
-    """The same, and how well a calibration knows it, or who measured either."""
+    """Mounting with its accuracy from a calibration, or from measurement."""
 
     lever_arm_sigma: Annotated[list[Positive], Three] | None = None  # m
     boresight_sigma: Annotated[list[Positive], Three] | None = None  # deg: right, forward, up
@@ -61,13 +61,13 @@ class CalibratedMountingSection(MountingSection):
             if self.lever_arm_sigma is None or self.boresight_sigma is None:
                 raise ValueError("correlation needs both, lever_arm_sigma and boresight_sigma")
             matrix = np.array(self.correlation)
-            rounding = 0.5e-6 * len(matrix)  # of an eigenvalue, where six decimals are written
+            rounding = 0.5e-6 * len(matrix)  # of an eigenvalue with six decimals
             if not np.array_equal(matrix, matrix.T) or np.linalg.eigvalsh(matrix)[0] < -rounding:
                 raise ValueError("correlation is no correlation matrix: lopsided, or impossible")
         return self
 
     def mounting(self) -> Mounting:
-        """The Mounting with its covariance, and the sigmas of what was measured."""
+        """Return the Mounting with its covariance, and the sigmas of measured values."""
         mounting = super().mounting()
         unknown = [np.nan] * 3
         sigma = np.append(self.lever_arm_sigma or unknown, self.boresight_sigma or unknown)
@@ -83,7 +83,7 @@ class CalibratedMountingSection(MountingSection):
 
 
 def left_out(section: TomlSection, names: Iterable[str]) -> tuple[str, ...]:
-    """Those keys of a section that the file leaves out, so that their defaults stand in.
+    """Keys of a section that the file omits, so that their defaults apply.
 
     Parameters
     ----------
@@ -94,21 +94,21 @@ def left_out(section: TomlSection, names: Iterable[str]) -> tuple[str, ...]:
 
 
 class ScannerSection(TomlSection):
-    """What is believed of the scanner."""
+    """Assumed properties of the scanner."""
 
     range_noise: Positive = Scanner.range_noise  # m
     angle_noise: Positive = float(np.degrees(Scanner.angle_noise))  # deg
     lines_per_second: Positive = Scanner.lines_per_second
 
     def scanner(self) -> Scanner:
-        """The same in radians."""
+        """Return the Scanner, in radians."""
         noises = self.range_noise, np.radians(self.angle_noise)
         assumed = left_out(self, ("range_noise", "angle_noise"))
         return Scanner(*noises, self.lines_per_second, assumed)
 
 
 class MountedScannerSection(ScannerSection):
-    """One of several scanners: its points, what is believed of it, and its mounting."""
+    """One of several scanners: its points, assumed properties, and mounting."""
 
     name: Annotated[str, Field(min_length=1)] | None = None
     files: Annotated[list[str], Field(min_length=1)] | None = None
@@ -131,7 +131,7 @@ def _kind_of_section(document):
     return _TABLE
 
 
-# Names of the alternatives, which keys in sentences leave out because they are blank
+# Names of the alternatives, omitted from keys in sentences because they are blank
 _TABLE = ""
 _LIST = " "
 Scanners = Annotated[
@@ -147,14 +147,14 @@ Trajectories = Annotated[
 
 
 class PosSection(TomlSection):
-    """What is believed of the POS where the trajectory has no sigmas."""
+    """Assumed accuracy of the POS, used if the trajectory has no sigmas."""
 
     position_sigma: Positive = Pos.position_sigma  # m
     attitude_sigma: Annotated[list[Positive], Three] = np.degrees(Pos().attitude_sigma).tolist()
     correlation_time: Positive = Pos.correlation_time  # s
 
     def pos(self) -> Pos:
-        """The same in radians."""
+        """Return the Pos, in radians."""
         return Pos(
             self.position_sigma,
             np.radians(self.attitude_sigma),
@@ -164,19 +164,19 @@ class PosSection(TomlSection):
 
 
 class MatchingSection(TomlSection):
-    """How far from its surveyed point a target is looked for."""
+    """Search radius of targets around their surveyed points."""
 
     search_radius: Annotated[float, Field(gt=0, le=100)] = SEARCH_RADIUS  # m
 
 
 class TiesSection(TomlSection):
-    """Whether a correction uses what two passes both saw."""
+    """Use of tie features in a correction."""
 
     use: Literal["auto", "off"] = "auto"
 
 
 class SceneSection(TomlSection):
-    """A reference surface."""
+    """Reference surface."""
 
     reference: str | None = None
 
@@ -191,13 +191,13 @@ class ProjectSection(TomlSection):
     operator: str | None = None
 
     def names(self) -> ProjectNames:
-        """The same as a noun, without the blanks around a name."""
+        """Return the ProjectNames, with blanks around names removed."""
         stripped = {key: (value or "").strip() for key, value in self.model_dump().items()}
         return ProjectNames(**stripped)
 
 
 class CommonSections(TomlSection):
-    """What stands in the survey.toml of a drive, and in the project.toml of several."""
+    """Sections common to the survey.toml of a drive and the project.toml of several drives."""
 
     name: str | None = None
     crs: str | None = None
@@ -210,7 +210,7 @@ class CommonSections(TomlSection):
 
 
 class PlannedSurveyFile(CommonSections):
-    """What stands in the survey.toml of a survey that isn't driven yet: it may have no cloud."""
+    """Contents of the survey.toml of a planned survey, which may have no cloud."""
 
     cloud: CloudSection | None = None
     trajectory: Trajectories
@@ -234,14 +234,16 @@ class PlannedSurveyFile(CommonSections):
 
     @property
     def trajectories(self) -> list[TrajectorySection]:
-        """That of [trajectory], or each [[trajectory]]."""
+        """Section [trajectory], or each [[trajectory]]."""
         if isinstance(self.trajectory, list):
             return [*self.trajectory]
         return [self.trajectory]
 
     @property
     def scanners(self) -> list[tuple[str, MountedScannerSection]]:
-        """Each [[scanner]] with its name, or its number from 1; none with one [scanner]."""
+        """Name and section of each [[scanner]], numbered from 1 by default; empty with one
+        [scanner].
+        """
         if isinstance(self.scanner, list):
             sections = self.scanner
         else:
@@ -250,6 +252,6 @@ class PlannedSurveyFile(CommonSections):
 
 
 class SurveyFile(PlannedSurveyFile):
-    """What stands in survey.toml, in its own units (deg)."""
+    """Contents of survey.toml, in its own units (deg)."""
 
     cloud: CloudSection

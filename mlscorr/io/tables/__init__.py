@@ -1,11 +1,11 @@
-"""Tables of others, read as numbers in m, deg and s, and results written as CSV.
+"""Foreign tables, read as numbers in m, deg and s, and results written as CSV.
 
-A table goes through this room from its words to its numbers:
+The modules follow a table from words to numbers:
 
-- columns.toml, column_names: words of others for columns, units, roles and kinds, by language
-- layout_search: which row is the header, which column is what, and which is missing
-- table_rows: the rows below, of text or of a workbook, and what is wrong in them
-- control, control_lists, nearness: surveyed points, and whether they are plausible
+- columns.toml, column_names: foreign names of columns, units, roles and kinds, by language
+- layout_search: header row, meaning of columns, and missing columns
+- table_rows: the rows below, from text or a workbook, and faults in them
+- control, control_lists, nearness: surveyed points, and checks of their plausibility
 - result_tables: results as CSV
 """
 

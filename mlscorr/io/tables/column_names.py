@@ -1,7 +1,7 @@
-"""Names and units of columns, and words in their cells, as others write them.
+"""Foreign names and units of columns, and words in their cells.
 
-All known words stand in columns.toml beside this module, by language, for a surveyor to read and
-extend. Here they are compared with those of a table, and joined by what survey.toml states of one.
+All known words are in columns.toml in this folder, by language, for a surveyor to read and extend.
+This module compares them with those of a table, and adds those that survey.toml states for it.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _BRACKETS = re.compile(r"[\[(<]\s*([^\])>]*?)\s*[\])>]\s*$")
 
 
 def plain(name: str) -> str:
-    """A name without case, width, brackets at its end, blanks and punctuation.
+    """Normalize a name: no case, width, final brackets, blanks or punctuation.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def plain(name: str) -> str:
 
 
 def _plain_words(*tables):
-    """Our words with those of others, plain; a word that several tables have gets all of theirs."""
+    """Our words with foreign ones, normalized; a word in several tables gets the words of all."""
     joined: dict[str, tuple[str, ...]] = {}
     for table in tables:
         for our, others in table.items():
@@ -57,7 +57,7 @@ _REFUSED_UNITS = {name.casefold() for name in _KNOWN["refused"]["units"]}
 
 
 def section_of(names: Collection[str]) -> str:
-    """The section of survey.toml that is about a table with these names of columns.
+    """Section of survey.toml on a table with these names of columns.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def section_of(names: Collection[str]) -> str:
 
 
 def unit_of(name: str) -> str | None:
-    """The unit in brackets at the end of a name, known or foreign; None without one.
+    """Unit in brackets at the end of a name, known or foreign; None without one.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def unit_of(name: str) -> str | None:
 
 
 def is_foreign(unit: str) -> bool:
-    """Return True if a unit is one that is not read.
+    """True if a unit is not supported.
 
     Parameters
     ----------
@@ -105,21 +105,21 @@ def find_meanings(
 ) -> dict[str, list[int]]:
     """Positions of the columns that each of our names may mean.
 
-    A column under our own name goes before others, and one that the user chose before all.
+    A column with our own name has priority over others, and one chosen by the user over all.
 
     Parameters
     ----------
     cells : sequence of str
         A header.
     names : mapping
-        Our name to the plain names of others.
+        Our name to normalized foreign names.
     chosen : mapping, optional
         Our name to the one in the header.
 
     Returns
     -------
     dict
-        Without those that no column may mean.
+        Without names that no column may mean.
 
     Examples
     --------
@@ -162,7 +162,7 @@ class OfficeWord(NamedTuple):
 
     @classmethod
     def of(cls, text: str) -> OfficeWord:
-        """The meaning that survey.toml gives a word: a role, a kind, or a kind and its size.
+        """Parse the meaning that survey.toml gives a word: a role, a kind, or a kind and its size.
 
         Parameters
         ----------
@@ -195,7 +195,7 @@ class OfficeWord(NamedTuple):
 
 
 def same_word(cell: str) -> str:
-    """A word of an office without case, width and surplus blanks.
+    """Normalize an office's word: no case, width or surplus blanks.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ def same_word(cell: str) -> str:
 
 
 def meant(column: str, cell: str, words: Mapping[str, OfficeWord] | None = None) -> str:
-    """Our word for the one in a cell of roles or kinds; the cell in small letters without one.
+    """Our word for the one in a cell of roles or kinds; otherwise the cell in lower case.
 
     Parameters
     ----------
@@ -213,7 +213,7 @@ def meant(column: str, cell: str, words: Mapping[str, OfficeWord] | None = None)
         One of WORDS.
     cell : str
     words : mapping, optional
-        An office's own words, as same_word gives them, to their meanings.
+        An office's own words, normalized by same_word, to their meanings.
 
     Examples
     --------
@@ -242,12 +242,12 @@ class PlaceColumns(TomlSection):
 
     @property
     def chosen(self) -> dict[str, str | int]:
-        """Those that are given."""
+        """Columns that are given."""
         return {name: column for name, column in self if column is not None}
 
 
 class _ControlColumns(PlaceColumns):
-    """Which column of a control list is what."""
+    """Columns of a control list."""
 
     name: Column = None
     sigma: Column = None
@@ -259,18 +259,18 @@ class _ControlColumns(PlaceColumns):
 
 
 class ControlSection(TomlSection):
-    """The file of the surveyed points, and what all of them are where it does not say so."""
+    """File of the surveyed points, and values for all of them that it does not state."""
 
     file: str
     kind: str | None = None
     size: Positive | None = None  # m
     sigma: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = None  # m: E/N, H
     check: list[str] = Field(default_factory=list)  # names of check points, or patterns
-    exclude: list[str] = Field(default_factory=list)  # names of points that take no part
-    include: list[str] = Field(default_factory=list)  # names of points that are used in any case
+    exclude: list[str] = Field(default_factory=list)  # names of points to exclude
+    include: list[str] = Field(default_factory=list)  # names of points used in any case
     words: dict[str, str] = Field(default_factory=dict)  # of an office: to "circle 0.6", "check"
     columns: _ControlColumns = _ControlColumns()
-    # By what eastings and northings are multiplied; "ground": by the map's own factor there
+    # Factor of eastings and northings; "ground": the map's own factor there
     scale_factor: Annotated[float, Field(ge=0.99, le=1.01)] | Literal["ground"] | None = None
     scale_origin: Annotated[list[Coordinate], Field(min_length=2, max_length=2)] | None = None  # m
 
@@ -287,5 +287,5 @@ class ControlSection(TomlSection):
 
     @property
     def meanings(self) -> dict[str, OfficeWord]:
-        """Words of the office, without case and surplus blanks, with their meanings."""
+        """Words of the office, normalized, with their meanings."""
         return {same_word(word): OfficeWord.of(text) for word, text in self.words.items()}

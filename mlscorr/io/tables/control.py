@@ -1,6 +1,6 @@
-"""Surveyed targets from control.csv, and from lists as others write them.
+"""Surveyed targets from control.csv, and from foreign lists.
 
-Of a list, all faults in its rows are told at once, and what is doubtful warns.
+All faults in the rows of a list are reported together, and doubtful values cause warnings.
 """
 
 import re
@@ -53,14 +53,14 @@ _NOTHING_GIVEN = ControlSection(file="")
 
 
 class ControlList(NamedTuple):
-    """The points of a file, and what was understood of it.
+    """Points of a file, and the interpretation of its layout.
 
     Parameters
     ----------
     control, check : ControlPoints
         Either may be empty.
     layout : str or None
-        A sentence; None for a file in our own columns alone, of which nothing had to be understood.
+        A sentence; None for a file with only our own columns.
     """
 
     control: ControlPoints
@@ -71,16 +71,16 @@ class ControlList(NamedTuple):
 def read_control(
     path: str | Path, section: ControlSection = _NOTHING_GIVEN, trajectory: Trajectory | None = None
 ) -> ControlList:
-    """Points of control.csv, or of a list as total stations and offices write it.
+    """Read the points of control.csv, or of a list from total stations and offices.
 
     Parameters
     ----------
     path : path
         Text with any separator, or .xlsx.
     section : ControlSection, optional
-        What survey.toml says of all points, and of columns.
+        Values for all points, and columns, stated in survey.toml.
     trajectory : Trajectory, optional
-        Tells which of X and Y is easting.
+        Determines which of X and Y is easting.
 
     Returns
     -------
@@ -89,15 +89,14 @@ def read_control(
     Raises
     ------
     ValueError
-        For missing columns, names that are missing or doubled, cells that are no numbers, an
-        unknown kind or role, sizes and sigmas that can't be metres, and what can be understood in
-        two ways.
+        For missing columns, missing or repeated names, cells that are not numbers, an unknown kind
+        or role, sizes and sigmas that cannot be in meters, and ambiguous layouts.
 
     Warns
     -----
     UserWarning
-        Of sigmas with which points hardly count, of points at one place, and of a column that isn't
-        used and may be that of the roles.
+        For sigmas so large that points hardly count, points at the same position, and an unused
+        column that may contain roles.
     """
     chosen = section.columns.chosen
     layout = read_layout(
@@ -111,7 +110,7 @@ def read_control(
         raise ValueError(f"{path} has a header but no points.")
     meanings = section.meanings
     rows, faults = _values(layout, lines, meanings)
-    rows = [given | row for row in rows]  # of a word's own size before that of all points
+    rows = [given | row for row in rows]  # a word's own size has priority over that of all points
     _refuse(path, [*faults, *_doubled_names(path, rows)])
     all_cells = [cells for _, cells in lines]
     if not layout.is_own:
@@ -126,7 +125,7 @@ def read_control(
     ]
     others = [row | {"kind": next(iter(WORDS["kind"])), "role": _ROLES[0]} for row in rows]
     places = []
-    if not any(fault for row in others for fault in _row_faults(row)):  # words alone are wrong
+    if not any(fault for row in others for fault in _row_faults(row)):  # only words are wrong
         places = word_places(unknown_words(layout, all_cells, meanings))
     _refuse(path, faults, places)
     for doubt in _row_doubts(path, rows):
@@ -141,7 +140,7 @@ def read_control(
 
 
 def holds_points(path: str | Path) -> bool:
-    """Whether a file holds more than a header; an empty one stands for no control at all.
+    """True if a file has more than a header; an empty one means no control.
 
     Parameters
     ----------
@@ -160,7 +159,7 @@ def holds_points(path: str | Path) -> bool:
 
 
 def _values(layout, lines, meanings):
-    """Rows of values by column, and pairs (line, what is wrong) of each cell that holds none."""
+    """Rows of values by column, and pairs (line, fault) of invalid cells."""
     rows = []
     faults = []
     for line, cells in lines:
@@ -183,7 +182,7 @@ def _values(layout, lines, meanings):
 
 
 def _value(layout, name, cell, meanings):
-    """Value of a cell: text, or the number of a column that holds numbers."""
+    """Value of a cell: text, or the number of a numeric column."""
     if name in WORDS:
         return meant(name, cell, meanings)
     if name == "name":
@@ -207,7 +206,7 @@ def _value(layout, name, cell, meanings):
 
 
 def _points(rows):
-    """ControlPoints of rows; no row gives an empty one."""
+    """ControlPoints of rows; empty without rows."""
 
     def numbers(*names):
         table = [[row.get(name, np.nan) for name in names] for row in rows]
@@ -236,7 +235,7 @@ class ListError(OpenQuestion):
     sentence : str
     number : int
     places : sequence of OpenPlace
-        What survey.toml must say, where that mends all of them.
+        Values to add to survey.toml if that corrects all of them.
     """
 
     def __init__(self, sentence: str, number: int, places: Sequence[OpenPlace] = ()):
@@ -247,7 +246,7 @@ class ListError(OpenQuestion):
 def _refuse(
     path: str | Path, faults: Iterable[tuple[object, str]], places: Sequence[OpenPlace] = ()
 ) -> None:
-    """Raise all that is wrong with the rows of a file at once, what is wrong alike as one."""
+    """Raise all faults in the rows of a file together, with similar ones combined."""
     groups: dict[str, list[object]] = {}
     for who, what in faults:
         groups.setdefault(what, []).append(who)
@@ -270,7 +269,7 @@ def _refuse(
 
 
 def _doubled_names(path, rows):
-    """The pair (file, what is wrong) of names that stand more than once."""
+    """Pair (file, fault) of repeated names."""
     count = Counter(row.get("name", "") for row in rows)
     doubled = [name for name, number in count.items() if number > 1 and name]
     if doubled:
@@ -279,12 +278,12 @@ def _doubled_names(path, rows):
 
 
 def _row_faults(row):
-    """What is wrong with each value of a point's row that can't be meant."""
+    """Faults of each implausible value in a point's row."""
     smallest, largest = SETTINGS.target_size
     for key, words in WORDS.items():
         if row[key] not in words:
             hint = _AMBIGUOUS.get(row[key], "")
-            if key == "kind" and (near := nearest(row[key], words)):  # words of roles are alike
+            if key == "kind" and (near := nearest(row[key], words)):  # roles are similar
                 hint = f" Is {near} meant?{hint}"
             yield f"has the unknown {key} '{shown(row[key])}'; known are {_known(words)}.{hint}"
     if not smallest <= row["size"] <= largest:
@@ -307,14 +306,14 @@ def _row_faults(row):
 
 
 def _known(words):
-    """Our words, each with those of others."""
+    """Our words, each with foreign ones."""
     translated = [f"{our} ({', '.join(others)})" for our, others in words.items() if others]
     untranslated = [our for our, others in words.items() if not others]
     return ", ".join([*translated, *untranslated])
 
 
 def _likely_unit(size):
-    """What may be meant by a size that can't be metres."""
+    """Likely unit of a size that cannot be in meters."""
     if size <= 0:
         return "a diameter or edge is positive."
     smallest, largest = SETTINGS.target_size
@@ -327,7 +326,7 @@ def _likely_unit(size):
 
 
 def _row_doubts(path, rows):
-    """A sentence on sigmas with which points hardly count, and one on points at one place."""
+    """Sentences on sigmas so large that points hardly count, and on points at the same position."""
     coarse = [(row, key) for row in rows for key in SIGMAS if row[key] > SETTINGS.coarse_sigma]
     if coarse:
         row, key = coarse[0]
@@ -338,7 +337,7 @@ def _row_doubts(path, rows):
             f"{shown(row['name'])} of {path} has the {key} {row[key]:g} m and will hardly count "
             f"(millimetres?){others}."
         )
-    smallest = SETTINGS.target_size[0]  # m: nearer to one another two targets can't be
+    smallest = SETTINGS.target_size[0]  # m: two targets cannot be closer together
     near = cKDTree([[row[axis] for axis in AXES] for row in rows]).query_pairs(smallest)
     pairs = [[rows[i] for i in pair] for pair in sorted(near)]
     twice = [f"{a['name']} and {b['name']}" for a, b in pairs if a["kind"] == b["kind"]]

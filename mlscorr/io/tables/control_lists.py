@@ -1,4 +1,4 @@
-"""Control lists of others: what they lack, which axis is which, and what was understood."""
+"""Foreign control lists: missing columns, order of axes, and interpretation."""
 
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -43,11 +43,11 @@ _UNNAMED_AXES = ("x", "y")  # either may point east
 
 
 class AxesError(OpenQuestion):
-    """The trajectory does not tell which of X and Y is easting."""
+    """Error: the trajectory does not show which of X and Y is easting."""
 
 
 def lacking(names: Collection[str]) -> list[str]:
-    """What names of columns leave missing of a point's name and place.
+    """Parts of a point's name and position that the columns do not give.
 
     Parameters
     ----------
@@ -65,12 +65,12 @@ def unnamed_columns(cells: Sequence[str]) -> dict[str, int]:
     Parameters
     ----------
     cells : sequence of str
-        Of its first row.
+        Cells of its first row.
 
     Returns
     -------
     dict
-        Empty where they are something else.
+        Empty for other rows.
     """
     if len(cells) < 4 or not cells[0] or not all(map(NUMBER.fullmatch, cells[1:4])):
         return {}
@@ -80,27 +80,27 @@ def unnamed_columns(cells: Sequence[str]) -> dict[str, int]:
 def complete(
     layout: TableLayout, section: ControlSection, group: Sequence[str]
 ) -> tuple[TableLayout, dict[str, Any]]:
-    """The columns of a list that are used, and what survey.toml gives of all points instead.
+    """Used columns of a list, and values for all points from survey.toml.
 
-    Without a column of roles all points are control points.
+    Without a column of roles, all points are control points.
 
     Parameters
     ----------
     layout : TableLayout
     section : ControlSection
     group : sequence of str
-        Names of columns that are used together or not.
+        Names of columns that are only used together.
 
     Returns
     -------
     layout : TableLayout
     given : dict
-        Name of a column to the value of all points.
+        Name of a column to the value for all points.
 
     Raises
     ------
     ValueError
-        For what neither gives.
+        If neither gives a value.
     """
     columns = dict(layout.columns)
     needless = set()
@@ -134,7 +134,7 @@ def complete(
 
 
 def _are_sized(layout, rows, meanings):
-    """Whether the words in the column of kinds give each point its size."""
+    """True if the words in the column of kinds give each point's size."""
     if "kind" not in layout.columns:
         return False
     words = (meanings.get(same_word(cell)) for cell in _cells(rows, layout.columns["kind"]))
@@ -142,7 +142,7 @@ def _are_sized(layout, rows, meanings):
 
 
 def _unstated(layout, rows, missing, meanings):
-    """The error on what neither a list nor survey.toml says of its points."""
+    """Error on values that neither a list nor survey.toml gives."""
     header = layout.header
     used = set()
     if header:
@@ -165,7 +165,7 @@ def _unstated(layout, rows, missing, meanings):
             "and give each word its meaning under [control] words."
         )
         places = word_places([("kind", cell) for cell in words.values()])
-    elif "kind" in layout.columns:  # whose words are not known either
+    elif "kind" in layout.columns:  # its words are also unknown
         places = word_places(unknown_words(layout, rows, meanings))
     examples = [OfficeWord.of(place.examples[0]) for place in places]
     sizes = [word.size for word in examples if word.column == "kind"]
@@ -180,7 +180,7 @@ def _unstated(layout, rows, missing, meanings):
 
 
 def _likely_kinds(layout, rows):
-    """Position of the one column that isn't used and holds few words, in all rows; else None."""
+    """Position of the single unused column with few different words in all rows, otherwise None."""
     candidates = []
     for i in layout.unused:
         words = {same_word(cell) for cell in _cells(rows, i)}
@@ -196,15 +196,15 @@ def _likely_kinds(layout, rows):
 def unknown_words(
     layout: TableLayout, rows: Sequence[Sequence[str]], meanings: Mapping[str, OfficeWord]
 ) -> list[tuple[str, str]]:
-    """Pairs (column, word) of a list's roles and kinds that are not known, each once, in order.
+    """Pairs (column, word) of a list's unknown roles and kinds, each once, in order.
 
     Parameters
     ----------
     layout : TableLayout
     rows : sequence of sequences of str
-        All cells.
+        Rows with all cells.
     meanings : mapping
-        As of ControlSection.
+        See ControlSection.
     """
     unknown: dict[tuple[str, str], str] = {}
     for name, words in WORDS.items():
@@ -218,7 +218,7 @@ def unknown_words(
 
 
 def word_places(words: Iterable[tuple[str, str]]) -> list[OpenPlace]:
-    """Places of survey.toml that give words of an office their meanings.
+    """Keys of survey.toml that give words of an office their meanings.
 
     Parameters
     ----------
@@ -232,7 +232,7 @@ def word_places(words: Iterable[tuple[str, str]]) -> list[OpenPlace]:
 
 
 def _likely_meanings(name, word):
-    """Meanings that a word may have, the likeliest first."""
+    """Possible meanings of a word, the most likely first."""
     kinds = list(WORDS[name])
     if name != "kind":
         return tuple(kinds)
@@ -252,22 +252,22 @@ def check_unused(
     given: Mapping[str, Any],
     meanings: Mapping[str, OfficeWord],
 ) -> None:
-    """Refuse a column that isn't used but holds roles or kinds, and others than are given.
+    """Refuse an unused column with roles or kinds that differ from the given ones.
 
     Parameters
     ----------
     layout : TableLayout
     rows : sequence of sequences of str
-        All cells.
+        Rows with all cells.
     given : mapping
-        Name of a column to the value of all points.
+        Name of a column to the value for all points.
     meanings : mapping
-        As of ControlSection.
+        See ControlSection.
 
     Raises
     ------
     OpenQuestion
-        Names column and name.
+        Names the column.
     """
     for name, i in _columns_of_words(layout, rows, meanings):
         cells = {cell.casefold() for cell in _cells(rows, i)}
@@ -283,13 +283,13 @@ def check_unused(
 
 
 def role_doubts(layout: TableLayout, rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    """A sentence on each column that isn't used and holds few words, where none is the roles.
+    """Yield a sentence on each unused column with few different words, if none is the roles.
 
     Parameters
     ----------
     layout : TableLayout
     rows : sequence of sequences of str
-        All cells.
+        Rows with all cells.
     """
     if "role" in layout.columns:
         return
@@ -308,7 +308,7 @@ def role_doubts(layout: TableLayout, rows: Sequence[Sequence[str]]) -> Iterator[
 
 
 def _columns_of_words(layout, rows, meanings):
-    """Pairs (role or kind, position of a column that isn't used and holds nothing but these)."""
+    """Pairs (role or kind, position) of unused columns that contain only such words."""
     for name in (name for name in WORDS if name not in layout.columns):
         for i in layout.unused:
             words = {meant(name, cell, meanings) for cell in _cells(rows, i)}
@@ -317,14 +317,14 @@ def _columns_of_words(layout, rows, meanings):
 
 
 def _cells(rows, i):
-    """The different cells of a column, in rows that reach it."""
+    """Different cells of a column, in rows that have it."""
     return {row[i] for row in rows if i < len(row)}
 
 
 def with_check_points(
     path: str | Path, rows: Sequence[dict[str, Any]], patterns: Sequence[str]
 ) -> list[dict[str, Any]]:
-    """Rows in which those points are check points that survey.toml names.
+    """Return rows with the points that survey.toml names as check points.
 
     Parameters
     ----------
@@ -336,7 +336,7 @@ def with_check_points(
     Raises
     ------
     ValueError
-        For a pattern that fits no point.
+        If a pattern matches no point.
     """
     rows = list(rows)
     for pattern in patterns:
@@ -351,7 +351,7 @@ def with_check_points(
 def placed(
     layout: TableLayout, rows: list[dict[str, Any]], trajectory: Trajectory | None
 ) -> tuple[TableLayout, list[dict[str, Any]]]:
-    """A list whose columns X and Y are easting and northing by the trajectory, and its sigmas two.
+    """Return a list with X and Y as easting and northing, from the trajectory, and two sigmas.
 
     Parameters
     ----------
@@ -367,7 +367,7 @@ def placed(
     Raises
     ------
     ValueError
-        Where the trajectory does not tell.
+        If the trajectory does not determine them.
     """
     columns = dict(layout.columns)
     sources = {}
@@ -381,7 +381,7 @@ def placed(
 
 
 def _axes_east_and_north(layout, rows, trajectory):
-    """X and Y in the order in which they are easting and northing."""
+    """X and Y in the order easting, northing."""
     position = np.array([[row[axis] for axis in _UNNAMED_AXES] for row in rows])
     is_near = is_swapped_near = False
     if trajectory is not None:
@@ -412,16 +412,16 @@ def _axes_east_and_north(layout, rows, trajectory):
 def sentence_on(
     layout: TableLayout, has_axes: bool, given: Mapping[str, Any], patterns: Sequence[str]
 ) -> str:
-    """What was understood of a list, and what survey.toml says of all points.
+    """Sentence on the interpretation of a list, and on values for all points from survey.toml.
 
     Parameters
     ----------
     layout : TableLayout
     has_axes : bool
-        Whether the trajectory told easting from northing.
+        True if the trajectory determined easting and northing.
     given : mapping
     patterns : sequence of str
-        Of check points.
+        Patterns of check points.
     """
     parts = [str(layout)]
     if has_axes:

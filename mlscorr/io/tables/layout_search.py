@@ -1,9 +1,9 @@
-"""The layout of a table: of our own columns, or of those of others, found by their names.
+"""Layout of a table: our own columns, or foreign ones found by their names.
 
-Nothing is guessed in silence: what was understood is a sentence of its own, what can be understood
-in two ways is refused, and of a column that is missing it is said what to write in survey.toml. The
-separator is the one that parts a row into all names that are needed; csv.Sniffer takes decimal
-commas for separators, and finds none below lines of comments.
+Nothing is guessed silently: the interpretation is reported in a sentence, an ambiguous layout is
+refused, and for a missing column the message states what to write in survey.toml. The separator is
+the one that splits a row into all required names; csv.Sniffer mistakes decimal commas for
+separators, and finds none below comment lines.
 """
 
 import re
@@ -44,7 +44,7 @@ from mlscorr.io.tables.table_rows import (
 )
 from mlscorr.survey import SurveyFileError
 
-_TEXT_COLUMNS = ("name", "kind", "role")  # columns that hold no numbers
+_TEXT_COLUMNS = ("name", "kind", "role")  # columns without numbers
 _BRACKETED = re.compile(r"[(\[].*[)\]]")
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(['’\s]\d{3})+([.,]\d*)?")
 
@@ -59,15 +59,15 @@ def read_layout(
     unnamed: Callable[[Sequence[str]], Mapping[str, int]] = lambda _: {},
     hints: Mapping[tuple[str, str], tuple[str, Sequence[OpenPlace]]] | None = None,
 ) -> TableLayout:
-    """The layout of a table in our own columns, or of one as others write them.
+    """Read the layout of a table with our own columns, or with foreign ones.
 
     Parameters
     ----------
     path : path
     required : sequence of str
-        A table in UTF-8 with all of these in a first line with commas is our own.
+        A UTF-8 table with all of these in a comma-separated first line is our own.
     groups : sequence of sequences of str
-        Columns of our own that only make sense together.
+        Our own columns that are only used together.
     names, lacking, chosen, unnamed
         See find_layout.
     hints : mapping, optional
@@ -80,7 +80,7 @@ def read_layout(
     Raises
     ------
     ValueError
-        For a table whose columns are missing or can be understood in two ways, and for no text.
+        If columns are missing or ambiguous, or the file is not text.
     """
     path = as_path(path)
     refusal = None
@@ -101,13 +101,13 @@ def read_layout(
     meanings = find_meanings(header, names, chosen)
     missing = lacking(meanings)
     _check_chosen(path, missing, chosen or {})
-    if refusal and not meanings:  # names that are known are those of a table
+    if refusal and not meanings:  # known names belong to a table
         raise refusal
     raise _missing_columns(path, header, missing, meanings, names, hints)
 
 
 def read_header(path: str | Path) -> tuple[list[str], int]:
-    """Column names of a CSV file in lower case, and the number of lines down to the header.
+    """Column names of a CSV file in lower case, and the number of lines up to the header.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def read_header(path: str | Path) -> tuple[list[str], int]:
     Raises
     ------
     ValueError
-        When the file holds nothing but blank lines or is not text.
+        If the file has only blank lines or is not text.
     """
     path = as_path(path)
     longest = SETTINGS.longest_line
@@ -141,7 +141,7 @@ def read_header(path: str | Path) -> tuple[list[str], int]:
 
 
 def _own_columns(path, header, required, groups):
-    """Position of every required column, and of the optional groups that are there."""
+    """Position of every required column, and of the optional groups that exist."""
     names = list(required)
     for group in groups:
         present = [name for name in group if name in header]
@@ -165,30 +165,30 @@ def find_layout(
     chosen: Mapping[str, str | int] | None = None,
     unnamed: Callable[[Sequence[str]], Mapping[str, int]] = lambda _: {},
 ) -> TableLayout | None:
-    """The layout of a table of others.
+    """Find the layout of a foreign table.
 
     Parameters
     ----------
     path : path
     names : mapping
-        Our names of columns to those of others.
+        Our names of columns to foreign ones.
     lacking : function
-        Names that these names leave missing.
+        Returns the names still missing.
     chosen : mapping, optional
         Our name to the name of a column, or to its number from 1.
     unnamed : function, optional
-        The columns that the cells of a first row without a header mean, if any.
+        Returns the columns of the cells of a first row without a header, if any.
 
     Returns
     -------
     TableLayout or None
-        None where no line names all that is needed.
+        None if no line has all required names.
 
     Raises
     ------
     ValueError
-        For columns that stand for the same, units that are not metric, thousands marks, and two
-        sheets that hold a table.
+        For columns with the same meaning, non-metric units, thousands separators, and two sheets
+        with a table.
     """
     path = as_path(path)
     chosen = dict(chosen or {})
@@ -218,7 +218,7 @@ def find_layout(
 
 
 def _numbered(positions):
-    """A function that gives these columns where the cells of a row there are numbers."""
+    """Function that returns these columns if the cells of a row there are numbers."""
 
     def columns(cells):
         numbers = [i for name, i in positions.items() if name not in _TEXT_COLUMNS]
@@ -231,7 +231,9 @@ def _numbered(positions):
 
 
 def _parted_tables(path) -> Iterator[tuple[TableLayout, list[tuple[int, list[str]]]]]:
-    """Layouts without columns, the surest first, each with the first rows parted in its way."""
+    """Yield layouts without columns, the most likely first, each with the first rows split by
+    it.
+    """
     if path.suffix.lower() == SUFFIX:
         for sheet, rows in read_sheets(path):
             yield TableLayout(path, (), 0, {}, sheet=sheet), rows[: SETTINGS.sampled_lines]
@@ -248,7 +250,7 @@ def _parted_tables(path) -> Iterator[tuple[TableLayout, list[tuple[int, list[str
 
 
 def _first_lines(path, encoding):
-    """Pairs of a number from 1 and a line that is not blank, up to one too long for a table."""
+    """Yield pairs of a number from 1 and a non-blank line, up to one too long for a table."""
     lines = []
     with open_file(path, encoding) as file:
         for number in range(1, SETTINGS.sampled_lines + 1):
@@ -261,7 +263,7 @@ def _first_lines(path, encoding):
 
 
 def _named_layout(start, rows, names, lacking, chosen):
-    """The layout by the first row that names all that is needed; None without one."""
+    """Layout by the first row with all required names; None without one."""
     for place, (number, raw) in enumerate(rows):
         cells = _uncommented(raw)
         meanings = find_meanings(cells, names, chosen)
@@ -275,7 +277,7 @@ def _named_layout(start, rows, names, lacking, chosen):
         if below and _holds_units(below[0][1], columns):
             layout = replace(layout, lines=below[0][0])
             texts = [cell.strip("()[] ").casefold() or None for cell in below.pop(0)[1]]
-            units = texts if len(texts) == len(cells) else []  # else of groups of columns, in words
+            units = texts if len(texts) == len(cells) else []  # otherwise group names, in words
         layout, parted = _parted(layout, [row for _, row in below])
         _check_doubled(layout, meanings, parted, section_of(names))
         return _with_units_and_decimals(layout, units, parted)
@@ -283,7 +285,7 @@ def _named_layout(start, rows, names, lacking, chosen):
 
 
 def _uncommented(cells):
-    """Cells of a header that may stand behind a comment mark."""
+    """Cells of a header, without a comment mark."""
     if cells and cells[0].startswith(COMMENT_MARKS):
         first = cells[0].lstrip("".join(COMMENT_MARKS)).strip()
         if first:
@@ -293,14 +295,14 @@ def _uncommented(cells):
 
 
 def _holds_units(cells, columns):
-    """Whether the row below a header has units in place of values: known ones, or in brackets."""
+    """True if the row below a header has units instead of values: known ones, or in brackets."""
     texts = [cells[i].strip("()[] ").casefold() for i in columns.values() if i < len(cells)]
     are_units = all(not text or text in UNITS or is_foreign(text) for text in texts)
     return any(texts) and (are_units or bool(_BRACKETED.fullmatch(" ".join(cells).strip())))
 
 
 def _parted(layout, rows):
-    """The layout and its rows where these are parted otherwise than the names, as in POSPac's."""
+    """Layout and rows if these are separated differently from the names, as in POSPac's files."""
     if not rows or len(rows[0]) > 1:
         return layout, rows
     for separator in SEPARATORS:
@@ -311,7 +313,7 @@ def _parted(layout, rows):
 
 
 def _check_doubled(layout, meanings, rows, section):
-    """Refuse columns that may be the same, but for those of one name and the same values."""
+    """Refuse columns that may mean the same, unless they have one name and the same values."""
     for name, positions in meanings.items():
         doubled = [shown(layout.header[i]) for i in positions]
         cells = [{row[i] for i in positions if i < len(row)} for row in rows]
@@ -333,7 +335,7 @@ def _check_doubled(layout, meanings, rows, section):
 
 
 def _unnamed_layout(start, rows, is_numbered, unnamed):
-    """The layout of a table without a header: its first row, or the first with what was chosen."""
+    """Layout of a table without a header: its first row, or the first with the chosen columns."""
     rows = [row for row in rows if not (row[1] and row[1][0].startswith(COMMENT_MARKS))]
     for place, (number, cells) in enumerate(rows):
         columns = unnamed(cells)
@@ -346,7 +348,7 @@ def _unnamed_layout(start, rows, is_numbered, unnamed):
 
 
 def _with_units_and_decimals(layout, units, rows):
-    """The layout with its decimal sign and the factors of its units."""
+    """Add the decimal sign and the factors of units to the layout."""
     path = layout.path
     factors = {}
     for name, i in layout.columns.items():
@@ -373,7 +375,7 @@ def _with_units_and_decimals(layout, units, rows):
 
 
 def likely_header(path: str | Path, names: Mapping[str, Collection[str]]) -> list[str]:
-    """The row among the first ones that holds the most names of columns; the longest without any.
+    """Row among the first ones with the most known names; the longest if there are none.
 
     Parameters
     ----------
@@ -391,7 +393,7 @@ def likely_header(path: str | Path, names: Mapping[str, Collection[str]]) -> lis
 
 
 def _check_chosen(path: Path, missing: Collection[str], chosen: Mapping[str, str | int]) -> None:
-    """Refuse columns that survey.toml names and the table does not have."""
+    """Refuse columns that survey.toml names but the table does not have."""
     for name in sorted(set(missing) & set(chosen)):
         raise SurveyFileError(
             f"{path} has no column '{chosen[name]}', which survey.toml names the {name}."
@@ -406,7 +408,7 @@ def _missing_columns(
     names: Mapping[str, Collection[str]],
     hints: Mapping[tuple[str, str], tuple[str, Sequence[OpenPlace]]] | None = None,
 ) -> OpenQuestion:
-    """The error on a table without columns that are needed."""
+    """Error on a table without required columns."""
     used = {header[i] for positions in meanings.values() for i in positions}
     hinted = [
         hint
@@ -429,7 +431,7 @@ def missing_sentence(
     names: Mapping[str, Collection[str]],
     seeming: Mapping[str, str] | None = None,
 ) -> str:
-    """A sentence on columns that are missing, and on the one that may be meant, if one is like it.
+    """Sentence on missing columns, and on a similar one that may be meant.
 
     Parameters
     ----------
@@ -438,11 +440,11 @@ def missing_sentence(
     missing : sequence of str
         Our names.
     used : collection of str
-        Names in the header that mean something else.
+        Names in the header with another meaning.
     names : mapping
         See find_meanings.
     seeming : mapping, optional
-        Our name to the column whose cells are like it.
+        Our name to the column with matching cells.
     """
     others = [cell for cell in header if cell and cell not in used]
     near = _near_columns(others, missing, names) | dict(seeming or {})
@@ -478,7 +480,7 @@ def missing_sentence(
 
 
 def _near_columns(others, missing, names):
-    """Our names with the column of others whose name is spelt like each."""
+    """Our names with the foreign column of the most similar spelling."""
     known = {name: our for our, words in names.items() for name in (plain(our), *words)}
     near = {known.get(nearest(plain(cell), known) or ""): cell for cell in others}
     near |= {name: cell for name in missing if (cell := nearest(name, others))}
@@ -488,7 +490,7 @@ def _near_columns(others, missing, names):
 
 
 def _likely_places(header, missing, used, names):
-    """Places that name columns, where one of the header is spelt like each that is missing."""
+    """Keys that name columns, if one in the header is spelled like each missing one."""
     others = [cell for cell in header if cell and cell not in used]
     near = _near_columns(others, missing, names)
     if not set(missing) <= set(near) or len({near[name] for name in missing}) < len(missing):

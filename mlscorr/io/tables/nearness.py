@@ -1,4 +1,4 @@
-"""Whether control and trajectory lie together."""
+"""Check that control and trajectory are close to each other."""
 
 import warnings
 from itertools import permutations
@@ -13,24 +13,24 @@ FOOT = 0.3048  # m; the US survey foot is longer by 2 ppm
 
 
 def check_together(path: Path, points: ControlPoints, trajectory: Trajectory) -> None:
-    """Refuse control that lies kilometres from the trajectory, as it stands or swapped.
+    """Refuse control kilometers away from the trajectory, with coordinates as given or swapped.
 
     Parameters
     ----------
     path : Path
-        Of the control, for messages.
+        Path of the control, for messages.
     points : ControlPoints
     trajectory : Trajectory
 
     Raises
     ------
     ValueError
-        Names the columns that are exchanged, or the distance.
+        Names the swapped columns, or the distance.
 
     Warns
     -----
     UserWarning
-        Of heights that seem to be in feet.
+        If heights seem to be in feet.
     """
     distance = distance_of(points.position[:, :2], trajectory)
     if distance > SETTINGS.near:
@@ -51,7 +51,7 @@ def check_together(path: Path, points: ControlPoints, trajectory: Trajectory) ->
 
 
 def _check_order(path, position, trajectory, distance):
-    """Refuse columns that lie near the trajectory when they are exchanged."""
+    """Refuse columns that are near the trajectory if they are swapped."""
     usual = (1, 0, 2)
     for order in (usual, *permutations(range(3))):
         swapped = distance_of(position[:, order[:2]], trajectory)
@@ -71,7 +71,7 @@ def _check_order(path, position, trajectory, distance):
 
 
 def _heights_in_feet(path, position, trajectory):
-    """Whose heights are like the others when taken as feet, and not as they stand; else empty."""
+    """Source of heights that match the others as feet but not as given, otherwise empty."""
     distance, epoch = nearest_epochs(position[:, :2], trajectory)
     near = distance < SETTINGS.near
     up = position[near, 2]
@@ -84,8 +84,8 @@ def _heights_in_feet(path, position, trajectory):
 
 
 def _likely_change(position, trajectory):
-    """A sentence on what brings points (n, 2) near the trajectory; empty where nothing does."""
-    # Numbers of zones stand in front of six digits
+    """Sentence on a change that moves points (n, 2) near the trajectory; empty without one."""
+    # Zone numbers precede six digits
     zone = round(float(np.median(position[:, 0] - trajectory.position[0, 0])) / 1e6)
     owners = ("these points", "the trajectory")
     number = f"the number {abs(zone)} of a map zone taken off the eastings of {owners[zone < 0]}"
@@ -102,20 +102,20 @@ def _likely_change(position, trajectory):
 
 
 def far_cloud(name: str, box: np.ndarray, trajectory: Trajectory) -> tuple[str, bool]:
-    """A sentence on a cloud far from the trajectory, and whether it says what brings it there.
+    """Sentence on a cloud far from the trajectory, and flag if it explains the cause.
 
     Parameters
     ----------
     name : str
-        Of the cloud.
+        Name of the cloud.
     box : (2, 2) array
-        Lowest and highest easting and northing by its header. Units: m.
+        Lowest and highest easting and northing from its header. Units: m.
     trajectory : Trajectory
 
     Returns
     -------
     sentence : str
-        Empty where the cloud is near.
+        Empty if the cloud is near.
     is_explained : bool
     """
     apart = _box_distance(box, trajectory)
@@ -132,14 +132,14 @@ def far_cloud(name: str, box: np.ndarray, trajectory: Trajectory) -> tuple[str, 
 
 
 def _box_distance(box, trajectory):
-    """Least horizontal distance of a box from the trajectory's epochs. Units: m."""
+    """Smallest horizontal distance of a box from the trajectory's epochs. Units: m."""
     place = trajectory.position[:, :2]
     beside = np.maximum(np.maximum(box[0] - place, place - box[1]), 0.0)
     return float(np.hypot(*beside.T).min())
 
 
 def distance_of(position: np.ndarray, trajectory: Trajectory) -> float:
-    """Least horizontal distance of points from the trajectory's epochs. Units: m.
+    """Smallest horizontal distance of points from the trajectory's epochs. Units: m.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def distance_of(position: np.ndarray, trajectory: Trajectory) -> float:
 
 
 def nearest_epochs(position: np.ndarray, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
-    """Horizontal distance (n,) of points from the nearest epochs in m, and these (n,).
+    """Horizontal distance (n,) of points from the nearest epochs in m, and these epochs (n,).
 
     Parameters
     ----------

@@ -43,7 +43,7 @@ def write_extracted_csv(path: str | Path, targets: Sequence[dict]) -> None:
     ----------
     path : path
     targets : sequence of dict
-        Sigmas in the table are those of each axis. Units: m.
+        The table has a sigma for each axis. Units: m.
     """
     names = [*AXES, *(f"sigma_{axis}" for axis in AXES), "normal_e", "normal_n", "normal_h"]
     first = ("name", "pass", "gps_time", "kind", "size", "size_sigma")
@@ -66,7 +66,7 @@ def write_ties_csv(path: str | Path, ties: Ties) -> None:
     ----------
     path : path
     ties : Ties
-        Places as recorded. Units: m.
+        With recorded positions. Units: m.
     """
     places = [f"{axis}_{view}" for view in (1, 2) for axis in AXES]
     first = ("pass_1", "pass_2", "gps_time_1", "gps_time_2", "kind", *places)
@@ -81,20 +81,20 @@ def write_ties_csv(path: str | Path, ties: Ties) -> None:
 
 
 def write_csv(path: str | Path, rows: Iterable[Sequence]) -> None:
-    """Write rows of cells, none of which a spreadsheet runs.
+    """Write rows of cells so that a spreadsheet runs no formula.
 
     Parameters
     ----------
     path : path
     rows : iterable of sequences
-        The first holds the names of the columns.
+        The first has the names of the columns.
     """
     with open(path, "w", newline="", encoding="utf-8") as file:
         csv.writer(file).writerows([_inert(cell) for cell in row] for row in rows)
 
 
 def _inert(cell):
-    """A cell that no spreadsheet runs as a formula; numbers stay as they are.
+    """Cell that no spreadsheet runs as a formula; numbers do not change.
 
     >>> _inert("=1+1"), _inert("-0.0123"), _inert("T01")
     ("'=1+1", '-0.0123', 'T01')

@@ -1,7 +1,7 @@
-"""A table of text or of a workbook: how it is laid out, its rows, and their numbers.
+"""Tables in text or a workbook: layout, rows, and their numbers.
 
-A layout says where the rows start, how they are parted, and what their columns mean; with it a
-table of others is read as one of our own.
+A layout describes where the rows start, how they are separated, and what their columns mean. With
+it, a foreign table is read like one of our own.
 """
 
 import csv
@@ -21,29 +21,29 @@ SUFFIX = ".xlsx"
 SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}  # the surest first
 NUMBER = re.compile(r"[+-]?\d+([.,]\d*)?(e[+-]?\d+)?", re.IGNORECASE)
 COMMENT_MARKS = ("#", "%", "!", "//")
-_DATE = re.compile(r"\d+[-/:.]\d+[-/:.]\d+")  # of a day or a time of day
+_DATE = re.compile(r"\d+[-/:.]\d+[-/:.]\d+")  # of a date or a time of day
 
 
 @dataclass(frozen=True)
 class TableLayout:
-    """Where the rows of a table start, how they are parted, and what their columns are.
+    """Layout of a table: start and separator of its rows, and its columns.
 
     Parameters
     ----------
     path : Path
     header : tuple of str
-        As it stands there; empty where columns have no names.
+        As in the file; empty if columns have no names.
     lines : int
-        Number of lines down to the first row.
+        Number of lines before the first row.
     columns : dict
         Our name of a column to its position.
     separator, decimal, encoding : str
     factors : dict
-        Our name to what its unit is in m, deg or s, where a unit is given.
+        Our name to the value of its unit in m, deg or s, if a unit is given.
     sheet : str, optional
-        Of a workbook.
+        Sheet of a workbook.
     is_own : bool
-        Whether header and separator are our own, so that there was nothing to understand.
+        True if header and separator are our own, so that no interpretation was needed.
     """
 
     path: Path
@@ -58,7 +58,7 @@ class TableLayout:
     is_own: bool = False
 
     def __str__(self) -> str:
-        """What was understood, without a full stop."""
+        """Interpretation of the table, without a full stop."""
         parts = []
         identical = []
         for name in sorted(self.columns, key=self.columns.__getitem__):
@@ -79,20 +79,20 @@ class TableLayout:
 
     @property
     def unused(self) -> list[int]:
-        """Positions of the columns that have a name and aren't used."""
+        """Positions of the named columns that are not used."""
         used = self.columns.values()
         return [i for i, name in enumerate(self.header) if name and i not in used]
 
     @property
     def not_used(self) -> str:
-        """Words on the columns that aren't used; nothing without such."""
+        """Phrase on the columns that are not used; empty without any."""
         names = ", ".join(shown(self.header[i]) for i in self.unused)
         if names:
             return f"; not used: {names}"
         return ""
 
     def name_of(self, column: str) -> str:
-        """What a column is called in the table, or its number from 1.
+        """Name of a column in the table, or its number from 1.
 
         Parameters
         ----------
@@ -105,7 +105,7 @@ class TableLayout:
         return f"column {place + 1}"
 
     def number(self, cell: str) -> float:
-        """The number in a cell.
+        """Return the number in a cell.
 
         Parameters
         ----------
@@ -114,7 +114,7 @@ class TableLayout:
         Raises
         ------
         ValueError
-            For anything else: points in numbers with decimal commas too, and 1_000.
+            For anything else, including points in numbers with decimal commas, and 1_000.
         """
         if "_" in cell or (self.decimal == "," and "." in cell):
             raise ValueError(cell)
@@ -122,7 +122,7 @@ class TableLayout:
 
 
 def split(line: str, separator: str) -> list[str]:
-    """Cells of a line, stripped; blanks in a row part as one does.
+    """Split a line into stripped cells; consecutive blanks count as one.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def split(line: str, separator: str) -> list[str]:
 
 
 def is_comment(cells: Sequence[str]) -> bool:
-    """Whether a row holds nothing, or starts as a comment does.
+    """True if a row is empty, or starts like a comment.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def is_comment(cells: Sequence[str]) -> bool:
 
 
 def not_text(path: Path) -> str:
-    """The sentence on a file that is no text.
+    """Sentence on a file that is not text.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ def not_text(path: Path) -> str:
 
 
 def read_sheets(path: str | Path) -> list[tuple[str, list[tuple[int, list[str]]]]]:
-    """Name and rows of each sheet, a row with its number from 1; rows without a value are left out.
+    """Read name and non-empty rows of each sheet, each row with its number from 1.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def read_sheets(path: str | Path) -> list[tuple[str, list[tuple[int, list[str]]]
     Raises
     ------
     ValueError
-        For a file that is no workbook.
+        If the file is not a workbook.
     """
     import zipfile
     from xml.etree.ElementTree import ParseError
@@ -225,24 +225,24 @@ def _text(value):
 
 
 def read_rows(layout: TableLayout, exact: bool = False) -> Iterator[tuple[str, list[str]]]:
-    """Rows of a table behind its header, blank ones and comments left out.
+    """Yield rows of a table after its header, without blank ones and comments.
 
     Parameters
     ----------
     layout : TableLayout
     exact : bool
-        Whether each row has to have as many columns as the header; fewer may be fine otherwise.
+        True if each row must have as many columns as the header; otherwise fewer are allowed.
 
     Yields
     ------
     line : str
-        Which line it is of what file, for messages.
+        Line number and file, for messages.
     cells : list of str
 
     Raises
     ------
     ValueError
-        For a row that is too short or too long, and a file that is not text.
+        If a row is too short or too long, or the file is not text.
     """
     is_parted_by_blanks = layout.separator == " " and not layout.sheet
     is_strict = exact or not layout.is_own
@@ -258,7 +258,7 @@ def read_rows(layout: TableLayout, exact: bool = False) -> Iterator[tuple[str, l
             if is_rule or is_comment(cells):
                 continue
             if is_parted_by_blanks and not width:
-                width = len(cells)  # of the first row, below no header
+                width = len(cells)  # of the first row, without a header
             while width and len(cells) > width and not cells[-1]:
                 del cells[-1]
         line = f"Line {number} of {layout.path}"
@@ -276,7 +276,7 @@ def read_rows(layout: TableLayout, exact: bool = False) -> Iterator[tuple[str, l
 
 
 def _all_rows(layout):
-    """Number of the last line of each row behind the header, and its cells."""
+    """Yield the last line number of each row after the header, and its cells."""
     if layout.sheet is not None:
         rows = dict(read_sheets(layout.path))[layout.sheet]
         yield from ((number, cells) for number, cells in rows if number > layout.lines)
@@ -306,13 +306,13 @@ def _all_rows(layout):
 def read_numbers(
     layout: TableLayout, converters: Mapping[int, Callable[[str], float]] | None = None
 ) -> np.ndarray:
-    """The columns of a table of numbers, in m, deg and s where a unit is given.
+    """Read the columns of a table of numbers, in m, deg and s if units are given.
 
     Parameters
     ----------
     layout : TableLayout
     converters : dict, optional
-        Position of a column to the function that reads its cells, float for others.
+        Position of a column to the function that reads its cells; float by default.
 
     Returns
     -------
@@ -321,7 +321,7 @@ def read_numbers(
     Raises
     ------
     ValueError
-        Names the first line that is no row of numbers; also for a file without rows.
+        Names the first line that is not a row of numbers; also if there are no rows.
     """
     path = layout.path
     if layout.header and layout.separator == ",":
@@ -341,7 +341,7 @@ def read_numbers(
 
 
 def _loaded(layout, converters, is_plain):
-    """The table of numbers, of its plain lines or, which is faster, as the file is."""
+    """Table of numbers, from its plain lines or, which is faster, from the file directly."""
     if is_plain:
         source = _plain_lines(layout)
         form = {"delimiter": "\t"}
@@ -361,13 +361,13 @@ def _loaded(layout, converters, is_plain):
 
 
 def _plain_lines(layout):
-    """Rows of numbers of any layout, parted by tabs and with decimal points."""
+    """Rows of numbers in any layout, with tabs and decimal points."""
     for _, cells in read_rows(layout):
         yield "\t".join(cells).replace(layout.decimal, ".")
 
 
 def _check_width(path, lines, width):
-    """Refuse rows with more cells than the header, as decimal commas make them."""
+    """Refuse rows with more cells than the header, which decimal commas cause."""
     with open_file(path) as file:
         for number, line in enumerate(file, start=1):
             if line.count(b",") >= width and number > lines and not line.startswith(b"#"):
@@ -382,7 +382,7 @@ def _too_wide(line, cells, width):
 
 
 def _first_bad(layout, converters):
-    """A sentence on the first row that is none of numbers; empty where there is no such row."""
+    """Sentence on the first row that is not numeric; empty without such a row."""
     for line, cells in read_rows(layout):
         if cells[0].startswith("#"):
             continue
@@ -409,12 +409,12 @@ def check_finite(path: str | Path, table: np.ndarray, row: str) -> None:
         For messages.
     table : (n, k) array
     row : str
-        What a row of it is called.
+        Name of a row.
 
     Raises
     ------
     ValueError
-        Counts them and names the first.
+        With their number and the first one.
     """
     bad = ~np.isfinite(table).all(axis=1)
     if bad.any():
@@ -425,7 +425,7 @@ def check_finite(path: str | Path, table: np.ndarray, row: str) -> None:
 
 
 def check_increasing(path: str | Path, gps_time: np.ndarray, row: str) -> None:
-    """Refuse times that don't increase.
+    """Refuse times that do not increase.
 
     Parameters
     ----------
@@ -433,12 +433,12 @@ def check_increasing(path: str | Path, gps_time: np.ndarray, row: str) -> None:
         For messages.
     gps_time : (n,) array
     row : str
-        What holds a time.
+        Name of a row.
 
     Raises
     ------
     ValueError
-        Counts the steps back and names the first.
+        With the number of backward steps and the first one.
     """
     back = np.diff(gps_time) <= 0
     if back.any():

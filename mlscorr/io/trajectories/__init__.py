@@ -1,9 +1,9 @@
-"""Trajectories: from SBET, TRJ, POF, POQ, CSV and tables of others, and back to CSV, SBET and TUM.
+"""Trajectories from SBET, TRJ, POF, POQ, CSV and foreign tables, and to CSV, SBET and TUM.
 
-- trajectory, trajectory_sessions: one file, and several that are joined in time
+- trajectory, trajectory_sessions: one file, and several joined in time
 - sbet, pof, trj, trajectory_tables, poses, trajectory_exports: the formats, read and written
 - features: points and lines for a GIS, GeoPackage and GeoJSON
-- conventions, course, projection: attitudes and positions brought into the map
+- conventions, course, projection: attitudes and positions converted to the map
 - time_systems: the constant between the times of cloud and trajectory
 """
 

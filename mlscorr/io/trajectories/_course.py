@@ -1,4 +1,4 @@
-"""Whether a trajectory moves as a vehicle does, and heads where it goes."""
+"""Checks that a trajectory moves like a vehicle, with headings along its course."""
 
 import warnings
 from pathlib import Path
@@ -12,16 +12,15 @@ from mlscorr.io.trajectories.time_systems import DAY
 from mlscorr.survey import WEEK, Trajectory
 
 GON = 0.9  # deg
-SECTOR = np.radians(30.0)  # rad, in which courses are one direction
+SECTOR = np.radians(30.0)  # rad, width of courses in one direction
 
 
 def checked_motion(path: Path, trajectory: Trajectory) -> Trajectory:
-    """The trajectory, where a vehicle can move so: no lone epoch far off, no leap of a distance.
+    """Return the trajectory if a vehicle can move like this: no single outlier, no jump.
 
-    Epochs that come within a microsecond are one, as no file of ours tells them apart.
-
-    A POS that finds its satellites again falls back at once by metres, so a single step may be
-    faster than any vehicle, two in turn may not.
+    Epochs within a microsecond are merged, because our files do not separate them. At GNSS
+    re-acquisition, a POS jumps by meters, so a single step may be faster than any vehicle, but not
+    two consecutive ones.
 
     Parameters
     ----------
@@ -32,12 +31,12 @@ def checked_motion(path: Path, trajectory: Trajectory) -> Trajectory:
     Raises
     ------
     ValueError
-        Counts the steps that no vehicle makes, and names the fastest.
+        With the number of impossible steps, and the fastest.
 
     Warns
     -----
     UserWarning
-        Where epochs are taken as one, and as check_heading.
+        If epochs are merged; see also check_heading.
     """
     trajectory = _distinct_epochs(path, trajectory)
     length = np.linalg.norm(np.diff(trajectory.position, axis=0), axis=1)
@@ -62,7 +61,7 @@ def checked_motion(path: Path, trajectory: Trajectory) -> Trajectory:
 
 
 def _distinct_epochs(path, trajectory):
-    """The trajectory with the first of each few epochs that are one; a speed between them is noise.
+    """Trajectory with the first of each few coincident epochs, whose speeds are noise.
 
     Times are compared as ``write_trajectory_csv`` writes them.
     """
@@ -78,7 +77,7 @@ def _distinct_epochs(path, trajectory):
 
 
 def check_units(path: Path, gps_time: np.ndarray, position: np.ndarray, angles: np.ndarray) -> None:
-    """Refuse radians and gon in columns of degrees, by the course over ground.
+    """Refuse radians and gon in columns of degrees, judged by the course over ground.
 
     Parameters
     ----------
@@ -92,7 +91,7 @@ def check_units(path: Path, gps_time: np.ndarray, position: np.ndarray, angles: 
     Raises
     ------
     ValueError
-        For headings that fit the course as radians or gon, and not as degrees.
+        If headings match the course as radians or gon, but not as degrees.
     """
     heading, course = heading_and_course(gps_time, position, angles[:, 2])
     if len(course) < SETTINGS.course_epochs:
@@ -108,10 +107,10 @@ def check_units(path: Path, gps_time: np.ndarray, position: np.ndarray, angles: 
             'angles = "rad" under [trajectory] in survey.toml.',
             [OpenPlace(("trajectory", "angles"), ("rad", "deg"), "unit of the angles")],
         )
-    beside = _folded(np.radians(heading) - course)  # of a turned POS it scatters as of any
+    beside = _folded(np.radians(heading) - course)  # for a rotated POS it scatters like any other
     scatter = np.degrees(np.median(np.abs(_folded(beside - _middle(beside)))))
     gon = np.degrees(median_difference(np.radians(GON * heading), course))
-    # a turned POS scatters as a car does
+    # a rotated POS scatters like a car
     if degrees > SETTINGS.course_offset and gon < scatter / 2:
         raise OpenQuestion(
             f"The angles of {path} seem to be gon where degrees belong: the heading fits the "
@@ -123,11 +122,11 @@ def check_units(path: Path, gps_time: np.ndarray, position: np.ndarray, angles: 
 
 
 def check_heading(path: Path, trajectory: Trajectory) -> None:
-    """Warn of a heading that is beside the course over ground all along.
+    """Warn of a heading that deviates from the course over ground throughout.
 
-    Vehicles reverse, so a heading may be half a turn from the course for a part of the way. Boats
-    and aircraft head into a current or wind: to one side of the course there, to the other side on
-    the way back, which the mean of opposite courses takes out.
+    Vehicles reverse, so a heading may differ by half a turn from the course for part of the path.
+    Boats and aircraft head into a current or wind, to opposite sides of the course on the way out
+    and back, which cancels in the mean of opposite courses.
 
     Parameters
     ----------
@@ -138,7 +137,7 @@ def check_heading(path: Path, trajectory: Trajectory) -> None:
     Warns
     -----
     UserWarning
-        States the median difference.
+        With the median difference.
     """
     angles = angles_from_attitude(trajectory.attitude)
     heading, course = heading_and_course(trajectory.gps_time, trajectory.position, angles[2])
@@ -170,7 +169,7 @@ def check_heading(path: Path, trajectory: Trajectory) -> None:
 
 
 def _cause(heading, course, is_paired):
-    """Why a heading (rad) may be beside the course (rad)."""
+    """Likely cause of a difference between heading and course (rad)."""
     gon = np.degrees(median_difference(GON * np.mod(heading, 2 * np.pi), course))
     if gon < SETTINGS.course_offset:
         return (
@@ -187,21 +186,21 @@ def _cause(heading, course, is_paired):
 
 
 def _folded(angle):
-    """Angles (rad) within a quarter turn, those of a vehicle that reverses too."""
+    """Angles (rad) folded to a quarter turn, which includes reversing vehicles."""
     return np.mod(angle + np.pi / 2, np.pi) - np.pi / 2
 
 
 def _middle(folded):
-    """Median (rad) of folded angles, wherever they lie."""
+    """Median (rad) of folded angles, for any location."""
     mean = np.angle(np.mean(np.exp(2j * folded))) / 2
     return mean + np.median(_folded(folded - mean))
 
 
 def _offset(beside, course):
-    """Heading beside the course (rad), and whether opposite courses were driven to take it from.
+    """Deviation of heading from course (rad), and flag if it comes from opposite courses.
 
-    A wind or current from any side moves the vehicle aside by as much to either side of the heading
-    on opposite courses.
+    A wind or current moves the vehicle by the same amount to opposite sides of the heading on
+    opposite courses.
     """
     means = []
     for direction in np.arange(0.0, np.pi, SECTOR):
@@ -220,7 +219,7 @@ def _offset(beside, course):
 def heading_and_course(
     gps_time: np.ndarray, position: np.ndarray, heading: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Heading as it stands in the file, and course, at epochs where the vehicle moves.
+    """Heading as in the file, and course, at epochs with a moving vehicle.
 
     Parameters
     ----------
@@ -235,7 +234,7 @@ def heading_and_course(
         Course in rad, clockwise from north.
     """
     steps = np.diff(gps_time)
-    if len(steps) == 0 or (steps <= 0).any():  # Trajectory says what is wrong
+    if len(steps) == 0 or (steps <= 0).any():  # Trajectory reports the fault
         return np.empty(0), np.empty(0)
     stride = max(1, round(SETTINGS.baseline / np.median(steps)))
     start = np.arange(0, len(gps_time) - stride)

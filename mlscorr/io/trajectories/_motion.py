@@ -1,9 +1,9 @@
-"""Velocities, accelerations and angular rates of a trajectory, for files that have them.
+"""Velocities, accelerations and angular rates of a trajectory, for file formats with them.
 
 Frames are those of an SBET with a wander angle of zero: velocities north, west, up; accelerations
 and rates about the body axes forward, right, down. Checked on a real airborne SBET: its velocities
 are the derivative of its positions in this frame (up to 5 mm/s), its accelerations average zero, so
-that they are without gravity, and its rates have the signs of d(roll, pitch, heading)/dt.
+they exclude gravity, and its rates have the signs of d(roll, pitch, heading)/dt.
 """
 
 import numpy as np
@@ -19,11 +19,11 @@ AXES = ("x", "y", "z")
 def motion_columns(
     trajectory: Trajectory, place: dict[str, np.ndarray], attitude: Rotation, crs: CRS
 ) -> dict[str, np.ndarray]:
-    """Columns ``velocity_x`` to ``rate_z`` of an SBET, each (n,). Units: m/s, m/s^2, rad/s.
+    """Make columns ``velocity_x`` to ``rate_z`` of an SBET, each (n,). Units: m/s, m/s^2, rad/s.
 
     Velocities and accelerations are derivatives of a cubic spline through the positions, rates
-    those of the rotation from epoch to epoch. No derivative crosses a gap; an epoch alone between
-    two gaps has zeros. Rates are about the ground: the earth's own rotation is not added.
+    those of the rotation between epochs. No derivative crosses a gap; a single epoch between two
+    gaps has zeros. Rates are relative to the ground: the earth's rotation is not added.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def motion_columns(
     attitude : Rotation
         n rotations from body axes (right, forward, up) to east, north, up.
     crs : CRS
-        Whose ellipsoid the place is on.
+        CRS with the ellipsoid of the position.
     """
     velocity = np.zeros((len(trajectory), 3))  # east, north, up
     acceleration = np.zeros((len(trajectory), 3))
@@ -59,7 +59,7 @@ def motion_columns(
 
 
 def _radii(place, crs):
-    """Meters of a radian of longitude and latitude, and of a meter of height, (n, 3)."""
+    """Meters per radian of longitude and latitude, and per meter of height, (n, 3)."""
     ellipsoid = crs.ellipsoid
     ratio = (ellipsoid.semi_minor_metre / ellipsoid.semi_major_metre) ** 2  # 1 - e^2
     _, latitude, height = place.T
@@ -76,5 +76,5 @@ def _rates(time, attitude):
     between = (attitude[:-1].inv() * attitude[1:]).as_rotvec() / steps[:, None]
     padded = np.vstack([between[:1], between, between[-1:]])
     weights = np.concatenate([steps[:1], steps, steps[-1:]])[:, None]
-    # a parabola through three epochs: the nearer step counts more
+    # a parabola through three epochs: the shorter step has more weight
     return (padded[:-1] * weights[1:] + padded[1:] * weights[:-1]) / (weights[:-1] + weights[1:])

@@ -1,8 +1,8 @@
-"""TerraScan's binary trajectories (.trj): TerraScan User Guide, Trajectory file formats.
+"""TerraScan binary trajectories (.trj); see TerraScan User Guide, Trajectory file formats.
 
 A header of HdrSize bytes, then PosCnt records of PosSize bytes, little-endian: time, X, Y, Z,
-heading, roll and pitch (deg), then qualities, which are not read. TerraScan has brought positions
-and headings into the map on import.
+heading, roll and pitch (deg), then qualities, which are not read. TerraScan converts positions and
+headings to the map on import.
 """
 
 import struct
@@ -13,12 +13,12 @@ import numpy as np
 from mlscorr.io.store import read_bytes
 
 MARK = b"TSCANTRJ"
-VERSION = 20010715  # the only one that is documented
+VERSION = 20010715  # the only documented version
 FIELDS = ("gps_time", "easting", "northing", "height", "heading", "roll", "pitch")
 
 
 def read_trj(path: str | Path) -> dict[str, np.ndarray]:
-    """Columns of a TerraScan trajectory.
+    """Read the columns of a TerraScan trajectory.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def read_trj(path: str | Path) -> dict[str, np.ndarray]:
     Raises
     ------
     ValueError
-        For another version, and a file of another size than its header announces.
+        If the version is unknown, or the file size does not match its header.
     """
     data = read_bytes(path)
     start = struct.calcsize("<8s4i")

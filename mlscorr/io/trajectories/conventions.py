@@ -1,4 +1,4 @@
-"""Attitudes in the conventions of others, as survey.toml states them, brought into our own."""
+"""Conversion of attitudes from other conventions, stated in survey.toml, to our own."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,8 +17,8 @@ from mlscorr.io.trajectories.projection import convergence_at, project
 from mlscorr.survey import AXES
 
 QUATERNION = ("qx", "qy", "qz", "qw")
-UNIT_TOLERANCE = 1e-3  # of a quaternion's length, where three decimals are written
-OUR_AXES = {  # right, forward and up in the body axes of others, as columns
+UNIT_TOLERANCE = 1e-3  # of a quaternion's length, with three decimals
+OUR_AXES = {  # right, forward and up in foreign body axes, as columns
     "right-forward-up": np.eye(3),
     "forward-left-up": np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
     "forward-right-down": np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]),
@@ -26,7 +26,7 @@ OUR_AXES = {  # right, forward and up in the body axes of others, as columns
 
 
 class TrajectoryColumns(PlaceColumns):
-    """Which column of a trajectory is what."""
+    """Columns of a trajectory."""
 
     gps_time: Column = None
     latitude: Column = None
@@ -47,7 +47,7 @@ class TrajectoryColumns(PlaceColumns):
 
 
 class TrajectorySection(TomlSection):
-    """The trajectory's file, the accuracy of an SBET, columns and conventions of others."""
+    """File of the trajectory, accuracy of an SBET, foreign columns and conventions."""
 
     file: str
     accuracy: str | None = None
@@ -67,7 +67,7 @@ class TrajectorySection(TomlSection):
 
 
 class SessionSection(TrajectorySection):
-    """One of several trajectories, and the points that it belongs to."""
+    """One of several trajectories, and its points."""
 
     files: Annotated[list[str], Field(min_length=1)] | None = None
     point_source_ids: Annotated[list[PointSource], Field(min_length=1)] | None = None
@@ -75,7 +75,7 @@ class SessionSection(TrajectorySection):
 
 @dataclass(frozen=True)
 class Conventions:
-    """How a file counts its angles, said in words.
+    """Conventions of the angles in a file, in words.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ class Conventions:
 
     @classmethod
     def of(cls, section: TrajectorySection, heading: str) -> "Conventions":
-        """Those that survey.toml names, else ours with this heading.
+        """Make the conventions named in survey.toml, otherwise ours with this heading.
 
         Parameters
         ----------
@@ -103,14 +103,14 @@ class Conventions:
         )
 
     def __str__(self) -> str:
-        """Half a sentence."""
+        """Half a sentence on the conventions."""
         return f"heading {self.heading}, pitch {self.pitch}, roll {self.roll}"
 
 
 def in_our_conventions(
     path: Path, table: dict[str, np.ndarray], conventions: Conventions, crs: str | None
 ) -> dict[str, np.ndarray]:
-    """A table with easting and northing, and angles as we count them.
+    """Convert a table to easting, northing and our angles.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def in_our_conventions(
         Name of a column to an (n,) array. Units: s, m, deg.
     conventions : Conventions
     crs : str or None
-        Needed for latitude and longitude, and for headings from true north.
+        Required for latitude and longitude, and for headings from true north.
 
     Returns
     -------
@@ -129,7 +129,7 @@ def in_our_conventions(
     Raises
     ------
     ValueError
-        Without the crs that is needed.
+        If a required crs is missing.
     """
     table = dict(table)
     is_true = conventions.heading == "clockwise from true north"
@@ -150,7 +150,7 @@ def in_our_conventions(
 
 
 def _check_crs(path, what, crs):
-    """Refuse what needs the CRS of the map where survey.toml has none."""
+    """Refuse data that need the CRS of the map if survey.toml has none."""
     if crs is None:
         raise OpenQuestion(
             f"{path} has {what}: set crs in survey.toml to the projected CRS of cloud and control.",
@@ -159,7 +159,9 @@ def _check_crs(path, what, crs):
 
 
 def _projected(path, table, crs):
-    """A table with easting and northing for latitude and longitude; meridian convergence (rad)."""
+    """Table with easting and northing for latitude and longitude, and meridian convergence
+    (rad).
+    """
     _check_crs(path, "latitude and longitude", crs)
     record = {name: np.radians(table[name]) for name in ("latitude", "longitude", "height")}
     position, convergence = project(crs, record | {"height": table["height"]})
@@ -170,20 +172,21 @@ def _projected(path, table, crs):
 def attitude_of_quaternions(
     path: Path, table: dict[str, np.ndarray], axes: str | None, crs: str | None = None
 ) -> tuple[dict[str, np.ndarray], str]:
-    """A table with angles in place of quaternions, and the name of its body axes.
+    """Table with angles instead of quaternions, and the name of its body axes.
 
-    Without a name the axes are those whose forward goes along the course and whose up points up.
+    Without a name, the axes are those with forward along the course and up pointing up.
 
     Parameters
     ----------
     path : Path
         For messages.
     table : dict
-        With qx, qy, qz, qw from body axes into east, north, up; true ones beside a latitude.
+        With qx, qy, qz, qw from body axes into east, north, up; true east and north if there is a
+        latitude.
     axes : str or None
         One of OUR_AXES.
     crs : str, optional
-        Needed for latitude and longitude.
+        Required for latitude and longitude.
 
     Returns
     -------
@@ -193,7 +196,7 @@ def attitude_of_quaternions(
     Raises
     ------
     ValueError
-        Where the course does not tell, and for quaternions that are none.
+        If the course does not determine the axes, or quaternions are invalid.
     """
     quaternion = np.column_stack([table[name] for name in QUATERNION])
     if not np.isclose(np.linalg.norm(quaternion, axis=1), 1.0, atol=UNIT_TOLERANCE).all():

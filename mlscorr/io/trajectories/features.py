@@ -1,8 +1,8 @@
 """Points and lines for a GIS: GeoPackage in the survey's CRS, GeoJSON in WGS 84 (RFC 7946).
 
-A GeoPackage is an SQLite file with three tables of its own (OGC 12-128r19), which Python's standard
-library writes in a page of code. GDAL's bindings would write it too, but bring a second PROJ and
-100 MB beside pyproj's for these two layers.
+A GeoPackage is an SQLite file with three tables of its own (OGC 12-128r19), which a page of code
+with Python's standard library can write. GDAL's bindings could do it, too, but would add a second
+PROJ and 100 MB for these two layers.
 """
 
 import json
@@ -27,10 +27,10 @@ GEOJSON = ".geojson"
 FEATURE_SUFFIXES = (GEOPACKAGE, GEOJSON)
 APPLICATION = 0x47504B47  # "GPKG", which marks the SQLite file
 VERSION = 10300  # GeoPackage 1.3.0
-OWN_SRS = 100_000  # number of a CRS without a code of its own, as GDAL counts them
+OWN_SRS = 100_000  # number of a CRS without a code, as in GDAL
 WKB = {"POINT": 1001, "LINESTRING": 1002}  # types with Z, ISO 13249-3
 TYPES = {bool: "BOOLEAN", int: "INTEGER", float: "DOUBLE", str: "TEXT"}
-VERTEX = 1.0  # m of the way between vertices of a line, as in weak.geojson
+VERTEX = 1.0  # m along the path between vertices of a line, as in weak.geojson
 DIGITS = 8  # of degrees: 1 mm
 TARGET_VECTORS = ("surveyed", "observed", "sigma", "before", "after")
 TABLES = """
@@ -52,7 +52,7 @@ CREATE TABLE gpkg_geometry_columns (
 
 @dataclass(frozen=True)
 class FeatureLayer:
-    """Features of one kind, with the same attributes each.
+    """Features of one kind, with the same attributes.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class FeatureLayer:
     types : dict
         Type of each attribute, bool, int, float or str, by its name.
     rows : sequence of dict
-        Attributes of each feature; None where one is not known.
+        Attributes of each feature; None if unknown.
     """
 
     name: str
@@ -75,11 +75,11 @@ class FeatureLayer:
 
 
 def write_features(path: str | Path, layers: Sequence[FeatureLayer], crs: str) -> None:
-    """Write layers as the suffix says; the file appears whole or not at all.
+    """Write layers in the format of the suffix; the file is written atomically.
 
-    A GeoPackage has one table a layer, with E, N, H in the survey's CRS. A GeoJSON has the first
-    layer alone, in longitude and latitude by WGS 84, into which pyproj transforms; heights stand in
-    its attributes, as those of RFC 7946 are above the ellipsoid.
+    A GeoPackage has one table per layer, with E, N, H in the survey's CRS. A GeoJSON has only the
+    first layer, in longitude and latitude in WGS 84, transformed by pyproj; heights are attributes,
+    because those of RFC 7946 are ellipsoidal.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def write_features(path: str | Path, layers: Sequence[FeatureLayer], crs: str) -
 
 
 def to_lonlat(crs: CRS, position: np.ndarray) -> np.ndarray:
-    """Longitude and latitude (k, 2) by WGS 84 of places (k, 2 or 3) on the map. Units: deg.
+    """Convert map positions (k, 2 or 3) to longitude and latitude (k, 2) in WGS 84. Units: deg.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def to_lonlat(crs: CRS, position: np.ndarray) -> np.ndarray:
 
 
 def _collection(layer, crs):
-    """A layer as a FeatureCollection of RFC 7946."""
+    """Layer as a FeatureCollection of RFC 7946."""
     features = []
     for place, row in zip(layer.geometry, layer.rows, strict=True):
         coordinates = to_lonlat(crs, place).tolist()
@@ -162,7 +162,7 @@ def _fill(package, layers, crs):
 
 
 def _state_crs(package, crs):
-    """Write the survey's CRS and those that every GeoPackage has; the number of the former."""
+    """Write the survey's CRS and those of every GeoPackage; return the number of the former."""
     authority, _, code = (crs_code(crs) or "").partition(":")
     if authority == "EPSG" and code.isdigit():
         number = int(code)
@@ -182,7 +182,7 @@ def _state_crs(package, crs):
 
 
 def _blob(kind, place, number):
-    """A geometry as GeoPackage has it: a head without an envelope, and ISO WKB with Z."""
+    """Geometry in GeoPackage format: a header without an envelope, and ISO WKB with Z."""
     head = b"GP" + struct.pack("<BBi", 0, 1, number) + struct.pack("<BI", 1, WKB[kind])
     if kind == "LINESTRING":
         head += struct.pack("<I", len(place))
@@ -190,7 +190,7 @@ def _blob(kind, place, number):
 
 
 def target_layer(rows: Sequence[dict[str, Any]], kinds: dict[str, str]) -> FeatureLayer:
-    """Surveyed points as a layer: where they were surveyed, a point for each pass.
+    """Make a layer of surveyed points at their surveyed positions, a point for each pass.
 
     Parameters
     ----------
@@ -222,14 +222,14 @@ def target_layer(rows: Sequence[dict[str, Any]], kinds: dict[str, str]) -> Featu
 def trajectory_layers(
     trajectory: Trajectory, recorded: Trajectory | None = None
 ) -> list[FeatureLayer]:
-    """A line for each part between gaps with a vertex a meter, and a point each second.
+    """Make a line for each gap-free segment with a vertex per meter, and a point each second.
 
     Parameters
     ----------
     trajectory : Trajectory
-        The corrected one.
+        Corrected trajectory.
     recorded : Trajectory, optional
-        With the same epochs; the correction is not known without.
+        With the same epochs; needed for the correction.
     """
     sigma = np.full((len(trajectory), 3), np.nan)
     if trajectory.position_sigma is not None:
@@ -273,7 +273,7 @@ LINE: dict[str, type] = {
 
 
 def _line(number, trajectory, sigma, change, rows):
-    """Places of a line, and its attributes; sigma and correction are 3D, in m."""
+    """Positions of a line, and its attributes; sigma and correction are 3D, in m."""
     place = trajectory.position[rows]
     way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(place, axis=0), axis=1)))
     kept = np.flatnonzero(np.diff(np.floor(way / VERTEX), prepend=-1) > 0)
@@ -286,7 +286,7 @@ def _line(number, trajectory, sigma, change, rows):
 
 
 def _finite(value):
-    """A number, None for what is none."""
+    """Finite number, otherwise None."""
     if value is None or not math.isfinite(value):
         return None
     return float(value)

@@ -1,8 +1,8 @@
-"""RIEGL's position and orientation files (.pof), and their companions of accuracies (.poq).
+"""RIEGL's position and orientation files (.pof), and their accuracy companions (.poq).
 
-The layout is the one that the public crate ``pos`` (P. Gadomski) reads, little-endian: a signature,
-a header, and from its data offset on records of float64. No byte of the signature is public, so
-that what a header says is compared with the records.
+The layout is that of the public crate ``pos`` (P. Gadomski), little-endian: a signature, a header,
+and records of float64 from its data offset. The signature is not public, so the header is compared
+with the records.
 """
 
 import warnings
@@ -28,7 +28,7 @@ HEADER = np.dtype(
         ("box", "<f8", (3, 2)),  # smallest and largest longitude, latitude (deg), altitude (m)
         ("interval", "<f8", 3),  # mean, largest, standard deviation; s
         *((name, "u1") for name in ("unit", "system")),
-        ("names", "V192"),  # zone of time, location, device, project, company; not read
+        ("names", "V192"),  # time zone, location, device, project, company; not read
     ]
 )
 FIELDS = ("gps_time", "longitude", "latitude", "height", "roll", "pitch", "heading")  # s, deg, m
@@ -42,7 +42,7 @@ WAY_OUT = "Export it as SBET, or as text."
 
 
 def read_pof(path: str | Path) -> tuple[dict[str, np.ndarray], float, str]:
-    """Columns of a POF in the units of an SBET, its times as seconds of the GPS week.
+    """Read the columns of a POF in the units of an SBET, with times as seconds of the GPS week.
 
     Parameters
     ----------
@@ -53,20 +53,20 @@ def read_pof(path: str | Path) -> tuple[dict[str, np.ndarray], float, str]:
     record : dict
         Name of each of FIELDS to an (n,) array, the heading from true north. Units: s, rad, m.
     constant : float
-        What was added to its times. Units: s.
+        Constant that was added to its times. Units: s.
     layout : str
-        What was understood, without a full stop.
+        Interpretation, without a full stop.
 
     Raises
     ------
     ValueError
-        For a file that was cut off, one whose header and records do not agree, and times that are
-        no seconds of day or week.
+        If the file is truncated, header and records disagree, or times are not seconds of day or
+        week.
 
     Warns
     -----
     UserWarning
-        Where the header does not know whether its times are GPS or UTC.
+        If the header does not state whether times are GPS or UTC.
     """
     path = as_path(path)
     data = read_bytes(path)
@@ -104,7 +104,7 @@ def read_pof(path: str | Path) -> tuple[dict[str, np.ndarray], float, str]:
 
 
 def read_poq(path: str | Path) -> dict[str, np.ndarray]:
-    """Columns of a POQ: sigmas at times in the system of its POF.
+    """Read the columns of a POQ: sigmas at times in the system of its POF.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def read_poq(path: str | Path) -> dict[str, np.ndarray]:
     Raises
     ------
     ValueError
-        For a file that was cut off.
+        If the file is truncated.
     """
     data = read_bytes(path)
     start = QUALITY_HEADER.itemsize
@@ -139,7 +139,7 @@ def read_poq(path: str | Path) -> dict[str, np.ndarray]:
 
 
 def _header(path, data):
-    """Header and date of a POF. Raises ValueError where it can be none."""
+    """Read header and date of a POF. Raises ValueError if it is not one."""
     whole = HEADER.itemsize
     header = np.frombuffer(data[:whole].ljust(whole, b"\0"), HEADER)[0]
     try:
@@ -159,7 +159,7 @@ def _header(path, data):
 
 
 def _constant(path, header, day):
-    """What makes a POF's times seconds of the GPS week (s), and a sentence on it."""
+    """Constant that converts a POF's times to seconds of the GPS week (s), and a sentence on it."""
     unit = UNITS[header["unit"]]
     system = SYSTEMS[header["system"]]
     version = f"{path.name} was read as RIEGL's POF {header['major']}.{header['minor']} of {day}"

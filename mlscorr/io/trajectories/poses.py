@@ -1,8 +1,8 @@
-"""What a simulated POS takes from real ones: the path that it follows, and series of its errors.
+"""Data from a real POS for a simulated one: the path, and series of its errors.
 
-A path is moved to where the simulation wants it, so only its shape, its attitude and its timing
-matter. An attitude is taken only from files whose convention is known (our own CSV, SBET);
-for all others it is left to the course over ground.
+The simulation moves a path to its own location, so only shape, attitude and timing matter. An
+attitude is read only from files with a known convention (our own CSV, SBET); for all others it
+follows the course over ground.
 """
 
 from dataclasses import dataclass
@@ -22,15 +22,15 @@ from mlscorr.io.trajectories.trajectory import SBET_SUFFIXES, read_trajectory
 
 _SERIES_COLUMNS = ("time", *"NED", *(f"velocity {axis}" for axis in "NED"), "roll", "pitch", "yaw")
 _POS_COLUMNS = ("time", "latitude", "longitude", "height")  # then sigmas, of a .pos
-_LAYOUTS = (  # time, east, north, up of CSV files with an attitude of unknown convention
+_LAYOUTS = (  # time, east, north, up of CSV files with an unknown attitude convention
     ("gpstime", "easting", "northing", "altitude"),  # pyboreas
-    ("gps_time", "x", "y", "z"),  # NovAtel as SensorsCalibration exports it
+    ("gps_time", "x", "y", "z"),  # NovAtel as exported by SensorsCalibration
 )
 
 
 @dataclass(frozen=True)
 class Poses:
-    """Positions over time, with attitudes where the file has them in a known convention.
+    """Positions over time, with attitudes if the file has them in a known convention.
 
     Parameters
     ----------
@@ -51,9 +51,9 @@ class Poses:
 
 
 def read_poses(path: str | Path) -> Poses:
-    """Poses of a trajectory CSV, an SBET, a GNSS .pos, or a CSV of pyboreas or NovAtel.
+    """Read poses from a trajectory CSV, an SBET, a GNSS .pos, or a CSV of pyboreas or NovAtel.
 
-    Geographic files are brought into the UTM zone of their own first position.
+    Geographic files are converted to the UTM zone of their first position.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def read_poses(path: str | Path) -> Poses:
     Raises
     ------
     ValueError
-        For an unknown layout, times that don't increase, or values that are not numbers.
+        If the layout is unknown, times do not increase, or values are not numbers.
     """
     path = Path(path)
     suffix = path.suffix.lower()
@@ -102,7 +102,9 @@ def _checked(path, table):
 
 
 def _read_pos(path):
-    """Times and map positions (n, 4) of rows `time latitude longitude height ...`, deg and m."""
+    """Read times and map positions (n, 4) of rows `time latitude longitude height ...`, deg and
+    m.
+    """
     try:
         table = np.loadtxt(path, usecols=range(4), ndmin=2, encoding=ENCODING, comments=("%", "#"))
         if not len(table) or np.abs(table[:, 1]).max() > 90 or np.abs(table[:, 2]).max() > 360:
@@ -119,7 +121,7 @@ def _read_pos(path):
 
 
 def _sbet_zone(path):
-    """UTM zone of an SBET's first position; any for a broken file, which the reader will name."""
+    """UTM zone of an SBET's first position; any for a broken file, which the reader reports."""
     record = np.fromfile(path, dtype="<f8", count=len(SBET_FIELDS))
     if len(record) < len(SBET_FIELDS) or not np.isfinite(record[1:3]).all():
         return "EPSG:32631"
@@ -127,7 +129,7 @@ def _sbet_zone(path):
 
 
 def utm_zone(latitude: float, longitude: float) -> str:
-    """EPSG code of the WGS 84 UTM zone of a place.
+    """EPSG code of the WGS 84 UTM zone of a position.
 
     Parameters
     ----------
@@ -181,7 +183,7 @@ class PosErrorSeries:
 
 
 def read_pos_error_series(path: str | Path) -> PosErrorSeries:
-    """Errors of an .err file: time (s), N, E, D (m), three velocities, roll, pitch, yaw (deg).
+    """Read errors of an .err file: time (s), N, E, D (m), three velocities, roll, pitch, yaw (deg).
 
     Parameters
     ----------
@@ -194,7 +196,7 @@ def read_pos_error_series(path: str | Path) -> PosErrorSeries:
     Raises
     ------
     ValueError
-        For a file that is not such a table of numbers, or whose times don't increase.
+        If the file is not such a table of numbers, or its times do not increase.
     """
     try:
         table = np.loadtxt(path, ndmin=2, comments="#")

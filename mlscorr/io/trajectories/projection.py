@@ -1,4 +1,4 @@
-"""The survey's projected CRS, and geographic positions brought into it."""
+"""Projected CRS of the survey, and conversion of geographic positions to it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pyproj.exceptions import CRSError, ProjError
 
 
 def check_crs(crs: str) -> CRS:
-    """The CRS that is meant, projected, in metres and with axes east and north.
+    """Return the given CRS, which must be projected, in meters and with axes east and north.
 
     Parameters
     ----------
@@ -50,15 +50,14 @@ def check_crs(crs: str) -> CRS:
 
 @dataclass(frozen=True)
 class MapFactors:
-    """How a map differs from the ground at a place.
+    """Difference between map and ground at a position.
 
     Parameters
     ----------
     projection : float
-        By what a distance on the ellipsoid is multiplied on the map.
+        Scale of the map relative to the ellipsoid.
     height : float
-        By what one on the ground is multiplied on the ellipsoid, R / (R + h); one where the CRS has
-        no heights.
+        Scale of the ellipsoid relative to the ground, R / (R + h); one if the CRS has no heights.
     convergence : float
         Direction of grid north, clockwise from true north. Units: rad.
     """
@@ -69,16 +68,16 @@ class MapFactors:
 
     @property
     def combined(self) -> float:
-        """By what a distance on the ground is multiplied on the map."""
+        """Scale of the map relative to the ground."""
         return self.projection * self.height
 
     def document(self) -> dict[str, float]:
-        """``projection``, ``height``, ``combined`` and ``convergence`` (deg)."""
+        """Return ``projection``, ``height``, ``combined`` and ``convergence`` (deg)."""
         angle = {"convergence": float(np.degrees(self.convergence))}
         return asdict(self) | {"combined": self.combined} | angle
 
     def __str__(self) -> str:
-        """The factors in words."""
+        """Factors in words."""
         words = f"scale factor of the projection {self.projection:.6f}"
         if self.height != 1:
             words += f", height factor {self.height:.6f}"
@@ -86,12 +85,12 @@ class MapFactors:
 
 
 def map_factors(crs: str, place: np.ndarray) -> MapFactors:
-    """Factors between the ground and the map at a place.
+    """Compute the factors between ground and map at a position.
 
     R is the mean radius of the ellipsoid there, sqrt(M N) = a sqrt(1 - e^2) / (1 - e^2 sin^2 phi)
-    (Gauss). The height is taken as it is: over the geoid in place of the ellipsoid it changes the
-    factor by 1.6e-5 at most. The scale is the root of the areal scale, which is that of any
-    direction where the projection is conformal.
+    (Gauss). The height is used as given; a height above the geoid instead of the ellipsoid changes
+    the factor by at most 1.6e-5. The scale is the root of the areal scale, which is valid for any
+    direction if the projection is conformal.
 
     Parameters
     ----------
@@ -128,7 +127,7 @@ def _parse_crs(crs):
 
 
 def crs_name(crs: CRS) -> str:
-    """A CRS in words: its code, where it has one, and its name.
+    """Name of a CRS in words, with its code if it has one.
 
     Parameters
     ----------
@@ -141,7 +140,7 @@ def crs_name(crs: CRS) -> str:
 
 
 def crs_code(crs: CRS) -> str | None:
-    """The code of a CRS as survey.toml takes it, None where it has none.
+    """Code of a CRS as in survey.toml, None without one.
 
     Parameters
     ----------
@@ -155,7 +154,7 @@ def crs_code(crs: CRS) -> str | None:
 
 
 def _by_greenwich(crs):
-    """The CRS that is meant, which counts longitudes from Greenwich as trajectories do."""
+    """The given CRS with longitudes from Greenwich, as in trajectories."""
     crs = check_crs(crs)
     if crs.prime_meridian.longitude != 0:
         raise ValueError(
@@ -166,7 +165,7 @@ def _by_greenwich(crs):
 
 
 def project(crs: str, record: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Map coordinates and meridian convergence of geographic positions.
+    """Project geographic positions to map coordinates and meridian convergence.
 
     Parameters
     ----------
@@ -185,7 +184,7 @@ def project(crs: str, record: dict[str, np.ndarray]) -> tuple[np.ndarray, np.nda
     Raises
     ------
     ValueError
-        Where a grid or the CRS does not reach.
+        If a position is outside a grid or the CRS.
     """
     crs = _by_greenwich(crs)
     longitude = np.degrees(record["longitude"])
@@ -212,7 +211,7 @@ def project(crs: str, record: dict[str, np.ndarray]) -> tuple[np.ndarray, np.nda
 
 
 def convergence_at(crs: str, easting: np.ndarray, northing: np.ndarray) -> np.ndarray:
-    """Meridian convergence (n,) at places on the map. Units: rad.
+    """Meridian convergence (n,) at map positions. Units: rad.
 
     Parameters
     ----------
@@ -228,7 +227,7 @@ def convergence_at(crs: str, easting: np.ndarray, northing: np.ndarray) -> np.nd
 
 
 def to_geographic(crs: str, position: np.ndarray) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Latitude, longitude and ellipsoidal height of places on the map, and their convergence.
+    """Convert map positions to latitude, longitude, ellipsoidal height, and convergence.
 
     Parameters
     ----------
@@ -247,7 +246,7 @@ def to_geographic(crs: str, position: np.ndarray) -> tuple[dict[str, np.ndarray]
     Raises
     ------
     ValueError
-        Where a grid is missing, or the CRS does not reach.
+        If a grid is missing, or a position is outside the CRS.
     """
     projected = _by_greenwich(crs)
     try:
@@ -263,14 +262,14 @@ def to_geographic(crs: str, position: np.ndarray) -> tuple[dict[str, np.ndarray]
 
 
 def _exact(source, target):
-    """The transformation between two CRS, by the grids that it needs or not at all."""
+    """Transformation between two CRS with the required grids, or none."""
     return Transformer.from_crs(
         source, target, always_xy=True, only_best=True, allow_ballpark=False
     )
 
 
 def map_of(crs: CRS) -> Proj:
-    """The horizontal part of a projected CRS.
+    """Horizontal part of a projected CRS.
 
     Parameters
     ----------

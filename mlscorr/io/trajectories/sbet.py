@@ -1,18 +1,19 @@
-"""Applanix SBET trajectories and their accuracy companion, smrmsg, into the map; RIEGL's POF too.
+"""Applanix SBET trajectories with accuracy file (smrmsg), and RIEGL's POF, in map coordinates.
 
 Both are bare little-endian records of float64 without a header. Applanix' body axes are forward,
 right, down, and its attitude is C = Rz(heading) Ry(pitch) Rx(roll) into north, east, down, with
-roll right side down and pitch nose up. Turned into right, forward, up and east, north, up that is
-Rz(-heading) Rx(pitch) Ry(roll): roll and pitch carry over with their signs, and only the heading
-has to be brought to grid north:
+roll right side down and pitch nose up. In axes right, forward, up and east, north, up this is
+Rz(-heading) Rx(pitch) Ry(roll): roll and pitch keep their signs, and only the heading must be
+converted to grid north:
 
     true heading = platform heading - wander angle
     grid heading = true heading - meridian convergence
 
-Checked on a real airborne SBET (EPSG:32611) and its own LAS, beams of 5 km: they lie in one plane
-of the body to 0.0041 deg, and with roll or pitch turned to more than three times that. Flatness
-over trial headings is least 0.13 deg (sigma 0.22 deg) from the heading read here; without the
-wander angle the heading is 1.02 deg off (4 sigma), without the convergence 1.24 deg (6 sigma).
+Checked on a real airborne SBET (EPSG:32611) and its own LAS, beams of 5 km: they are in one plane
+of the body to 0.0041 deg, and with the sign of roll or pitch reversed to more than three times
+that. Flatness over trial headings is best 0.13 deg (sigma 0.22 deg) from the heading read here;
+without the wander angle the heading is 1.02 deg off (4 sigma), without the convergence 1.24 deg (6
+sigma).
 """
 
 from pathlib import Path
@@ -31,10 +32,10 @@ from mlscorr.survey import WEEK, Trajectory
 SBET_FIELDS = (
     "gps_time",
     *("latitude", "longitude", "height"),  # rad, rad, m above the ellipsoid
-    *("velocity_x", "velocity_y", "velocity_z"),  # m/s, in the wander frame; written alone
+    *("velocity_x", "velocity_y", "velocity_z"),  # m/s, in the wander frame; written only
     *("roll", "pitch", "heading", "wander"),  # rad
-    *("acceleration_x", "acceleration_y", "acceleration_z"),  # m/s^2; written alone
-    *("rate_x", "rate_y", "rate_z"),  # rad/s; written alone
+    *("acceleration_x", "acceleration_y", "acceleration_z"),  # m/s^2; written only
+    *("rate_x", "rate_y", "rate_z"),  # rad/s; written only
 )
 SMRMSG_FIELDS = (
     "gps_time",
@@ -42,7 +43,7 @@ SMRMSG_FIELDS = (
     *("velocity_north", "velocity_east", "velocity_down"),  # m/s; not used
     *("roll", "pitch", "heading"),  # arc-minutes, one sigma
 )
-LIMITS = {  # the largest magnitude that a value in radians can have
+LIMITS = {  # largest possible magnitude of a value in radians
     "latitude": np.pi / 2,
     "longitude": 2 * np.pi,
     "roll": np.pi,
@@ -53,16 +54,16 @@ LIMITS = {  # the largest magnitude that a value in radians can have
 
 
 def read_sbet(path: str | Path, crs: str | None, accuracy: str | Path | None = None) -> Trajectory:
-    """Trajectory in a projected CRS from an SBET file.
+    """Read a trajectory in a projected CRS from an SBET file.
 
-    Positions are projected from the CRS's own geodetic datum. The ellipsoidal height is kept,
-    unless the CRS has a vertical part.
+    Positions are projected from the CRS's own geodetic datum. The ellipsoidal height does not
+    change, unless the CRS has a vertical part.
 
     Parameters
     ----------
     path : path
     crs : str
-        Anything pyproj understands, projected in metres; compound for physical heights.
+        Any projected CRS in meters that pyproj understands; compound for physical heights.
     accuracy : path, optional
         The smrmsg file; its 1 Hz sigmas are interpolated.
 
@@ -73,8 +74,8 @@ def read_sbet(path: str | Path, crs: str | None, accuracy: str | Path | None = N
     Raises
     ------
     ValueError
-        For a missing or unsuitable CRS, a file that is not a whole number of records, values that
-        are no radians, or a geoid grid that is not installed.
+        For a missing or unsuitable CRS, an incomplete record, values that are not radians, or a
+        missing geoid grid.
     """
     _check_known(path, crs, "an SBET")
     record = _read_records(path, SBET_FIELDS, "SBET")
@@ -85,7 +86,7 @@ def read_sbet(path: str | Path, crs: str | None, accuracy: str | Path | None = N
 def read_riegl(
     path: str | Path, crs: str | None, accuracy: str | Path | None = None
 ) -> tuple[Trajectory, str]:
-    """Trajectory in a projected CRS from a POF of RIEGL, whose angles count as an SBET's.
+    """Read a trajectory in a projected CRS from a RIEGL POF, with the angles of an SBET.
 
     Parameters
     ----------
@@ -103,7 +104,7 @@ def read_riegl(
     Raises
     ------
     ValueError
-        As read_sbet and read_pof.
+        See read_sbet and read_pof.
     """
     record, constant, layout = read_pof(path)
     _check_known(path, crs, "a POF")
@@ -115,7 +116,7 @@ def read_riegl(
 
 
 def _check_known(path, crs, kind):
-    """Refuse geographic positions for which no CRS is given."""
+    """Refuse geographic positions without a CRS."""
     if crs is None:
         raise OpenQuestion(
             f"{path} is {kind} with latitude and longitude: set crs in survey.toml "
@@ -125,7 +126,7 @@ def _check_known(path, crs, kind):
 
 
 def _in_map(path, crs, record, accuracy, constant):
-    """Trajectory of geographic columns; the constant (s) is what was added to a POF's times."""
+    """Trajectory of geographic columns; the constant (s) was added to a POF's times."""
     try:
         position, convergence = project(crs, record)
         heading = record["heading"] - record["wander"] - convergence
@@ -140,7 +141,7 @@ def _in_map(path, crs, record, accuracy, constant):
 
 
 def is_sbet(path: str | Path) -> bool:
-    """Whether a file under any name can only be an SBET: whole records, angles, times that grow.
+    """True if a file with any name can only be an SBET: whole records, angles, increasing times.
 
     Parameters
     ----------
@@ -156,7 +157,7 @@ def is_sbet(path: str | Path) -> bool:
     with np.errstate(invalid="ignore"):
         angles = np.abs(table[:, [SBET_FIELDS.index(name) for name in LIMITS]])
         is_within = (angles <= list(LIMITS.values())).all()
-        time = table[:, 0]  # letters and digits taken for numbers are far below 1 s, or infinite
+        time = table[:, 0]  # text interpreted as numbers is far below 1 s, or infinite
         is_timed = 1.0 < time[0] < time[-1] or count_on(time)[1] is not None
     return bool(
         is_within and np.isfinite(table).all() and is_timed and time[-1] < SETTINGS.microseconds
@@ -164,7 +165,7 @@ def is_sbet(path: str | Path) -> bool:
 
 
 def _read_records(path, fields, what):
-    """Records of a headerless file as a dict of (n,) float64 arrays."""
+    """Read records of a headerless file as a dict of (n,) float64 arrays."""
     size = file_state(path)[0]
     width = 8 * len(fields)
     if size == 0:
@@ -180,7 +181,7 @@ def _read_records(path, fields, what):
 
 
 def _check_radians(path, record):
-    """Refuse an SBET whose angles can't be radians."""
+    """Refuse an SBET whose angles cannot be radians."""
     for name, limit in LIMITS.items():
         worst = np.abs(record[name]).max()
         if worst > limit * (1 + 1e-9):
@@ -192,7 +193,7 @@ def _check_radians(path, record):
 
 
 def _cause(accuracy, gps_time):
-    """Why an accuracy file may have other times than its trajectory."""
+    """Likely cause of different times in an accuracy file and its trajectory."""
     apart = float(np.mean(gps_time[[0, -1]]) - np.mean(accuracy[[0, -1]]))
     if weeks := round(apart / WEEK):
         return f"they are {weeks:+d} weeks apart, so one of the two has the wrong GPS week"
@@ -202,8 +203,8 @@ def _cause(accuracy, gps_time):
 
 
 def _counted_on(accuracy, gps_time):
-    """Times of an accuracy file that count on as those of its trajectory do. Units: s."""
-    for period in (WEEK, DAY):  # seconds of the day only where a POF has them
+    """Times of an accuracy file, continued across weeks like those of its trajectory. Units: s."""
+    for period in (WEEK, DAY):  # seconds of day only if a POF has them
         times, periods = count_on(accuracy, period)
         if periods is not None:
             apart = np.mean(times[[0, -1]]) - np.mean(gps_time[[0, -1]])

@@ -1,8 +1,8 @@
-"""Which constant turns a cloud's gps_time into the trajectory's.
+"""Time systems: the constant that converts a cloud's gps_time to the trajectory's.
 
 Three systems are in use: GPS seconds of week; GPS seconds since 1980-01-06; and these minus 1e9
-("adjusted standard GPS time"), LAS's own. A LAS header says week or standard, and real files lie:
-plain GPS seconds are found under either flag.
+("adjusted standard GPS time"), LAS's own. A LAS header states week or standard, but real files can
+be wrong: plain GPS seconds occur with either flag.
 """
 
 import warnings
@@ -19,10 +19,10 @@ from mlscorr.io.settings import SETTINGS
 from mlscorr.survey import WEEK, CloudFile, Trajectory, counted_on
 from mlscorr.wording import percent
 
-EPOCH = date(1980, 1, 6)  # when both were the same
+EPOCH = date(1980, 1, 6)  # origin of both
 DAY = 86400.0  # s
 ADJUSTMENT = 1e9  # s
-NO_TIMES = (0.0, -1.0)  # what programs write where a point has no time
+NO_TIMES = (0.0, -1.0)  # written by programs for a point without a time
 PLACEHOLDERS = (*NO_TIMES, *(time - ADJUSTMENT for time in NO_TIMES))  # s, converted likewise
 SYSTEMS = ("week", "standard", "gps")
 NAMES = {
@@ -34,9 +34,9 @@ NAMES = {
 
 @dataclass(frozen=True)
 class TimeMatch:
-    """trajectory time = cloud time + constant (s), the two systems, and the share inside.
+    """Match trajectory time = cloud time + constant (s), with both systems and the share inside.
 
-    A week more is added to cloud times below new_week (s), where seconds of week start again.
+    Another week is added to cloud times below new_week (s), where seconds of week restart.
     """
 
     constant: float
@@ -60,7 +60,7 @@ class TimeMatch:
         return text
 
     def placed(self, times: np.ndarray) -> np.ndarray:
-        """Times (n,) of the cloud in the trajectory's system. Units: s.
+        """Return times (n,) of the cloud in the trajectory's system. Units: s.
 
         Parameters
         ----------
@@ -78,21 +78,21 @@ def match_times(
     setting: str = "auto",
     time_offset: float = 0.0,
 ) -> TimeMatch:
-    """Constant between a cloud's times and the trajectory's.
+    """Find the constant between a cloud's times and the trajectory's.
 
     Parameters
     ----------
     name : str
-        The cloud file, for messages.
+        Name of the cloud file, for messages.
     times : (n,) array
         Times sampled from the cloud, in its own system. Units: s.
     is_standard : bool
-        What the LAS header says: adjusted standard GPS time, or else seconds of week.
+        True if the LAS header states adjusted standard GPS time, False for seconds of week.
     trajectory : Trajectory
     setting : str
-        ``auto`` prefers the header but takes what fits; ``week`` and ``standard`` are obeyed.
+        ``auto`` prefers the header but uses what fits; ``week`` and ``standard`` are binding.
     time_offset : float
-        That was added to the times as stored. Units: s.
+        Offset that was added to the stored times. Units: s.
 
     Returns
     -------
@@ -101,12 +101,12 @@ def match_times(
     Raises
     ------
     ValueError
-        When most of the times lie outside the trajectory under every constant.
+        If most of the times are outside the trajectory with every constant.
 
     Warns
     -----
     UserWarning
-        When what fits contradicts the header, and of points without a time, which decide nothing.
+        If the match contradicts the header, or points have no time, which are ignored.
 
     Examples
     --------
@@ -160,7 +160,7 @@ def match_times(
 
 
 def _match(times, is_standard, trajectory, setting):
-    """The TimeMatch of times under the system that is preferred, or else under others; or None."""
+    """TimeMatch of times in the preferred system, otherwise in others; or None."""
     candidates = _candidates(times, trajectory.gps_time[[0, -1]])
     if setting != "auto":
         return _best(candidates, times, trajectory, (setting,))
@@ -170,7 +170,7 @@ def _match(times, is_standard, trajectory, setting):
 
 
 def _check_precision(name, times):
-    """Warn of times all of which single precision can hold; refuse them where it is too coarse."""
+    """Warn of times that fit single precision; refuse them if it is too coarse."""
     rounded = times.astype(np.float32)
     step = float(np.spacing(np.abs(rounded).max()))
     if step <= SETTINGS.single_time_step or (rounded != times).any():
@@ -182,7 +182,7 @@ def _check_precision(name, times):
     )
     if usual_systems(times) != ("week",):
         raise ValueError(sentence)
-    warnings.warn(sentence, stacklevel=3)  # drift hardly changes within an eighth of a second
+    warnings.warn(sentence, stacklevel=3)  # drift hardly changes within 1/8 second
 
 
 def _candidates(times, span):
@@ -190,7 +190,7 @@ def _candidates(times, span):
     middle = np.median(times)
     goal = np.mean(span)
     candidates = [(0.0, system, system) for system in SYSTEMS]
-    candidates += [(WEEK * k, "week", "week") for k in (-1, 1)]  # one of the two rolled over
+    candidates += [(WEEK * k, "week", "week") for k in (-1, 1)]  # one of the two has rolled over
     to_gps = {"standard": ADJUSTMENT, "gps": 0.0}
     for cloud, added in to_gps.items():  # to seconds of week, or to the other continuous system
         week = np.floor((middle + added) / WEEK)
@@ -203,15 +203,15 @@ def _candidates(times, span):
 
 
 def _inside(times, passes, constant):
-    """Share of the times that fall inside passes (k, 2) of the trajectory, or its span (2,)."""
+    """Share of the times inside passes (k, 2) of the trajectory, or its time span (2,)."""
     starts, ends = np.reshape(passes, (-1, 2)).T
     number = np.searchsorted(starts, times + constant, side="right") - 1
     return np.mean((number >= 0) & (times + constant <= ends[number]))
 
 
 def _best(candidates, times, trajectory, systems):
-    """The TimeMatch with most times in passes, or else in all, the first of equals; or None."""
-    for passes in (trajectory.passes, trajectory.gps_time[[0, -1]]):  # gaps hold any by chance
+    """TimeMatch with most times in passes, otherwise in all; the first of equal ones; or None."""
+    for passes in (trajectory.passes, trajectory.gps_time[[0, -1]]):  # gaps contain any by chance
         fits = [
             TimeMatch(float(constant), cloud, system, float(inside))
             for flagged in systems
@@ -225,7 +225,7 @@ def _best(candidates, times, trajectory, systems):
 
 
 def usual_systems(times: np.ndarray) -> tuple[str, ...]:
-    """Names of the systems whose range times lie in, the likelier first.
+    """Names of the systems whose range includes the times, the most likely first.
 
     Parameters
     ----------
@@ -242,7 +242,7 @@ def usual_systems(times: np.ndarray) -> tuple[str, ...]:
 
 
 def _settle_equal(match, times):
-    """Name the system of equal times by their size: a constant of zero says nothing of it."""
+    """Name the system of equal times by their size, because a constant of zero does not show it."""
     usual = usual_systems(times)
     if match.constant != 0.0 or match.cloud_system in usual:
         return match
@@ -250,15 +250,15 @@ def _settle_equal(match, times):
 
 
 def _others(flagged, times):
-    """The systems that the header does not name, the likelier by the size of the times first."""
+    """Systems that the header does not name, sorted by likelihood from the size of the times."""
     usual = usual_systems(times)
     others = [system for system in SYSTEMS if system != flagged]
     return sorted(others, key=lambda system: system not in usual)
 
 
 def _other_systems(lag, earlier):
-    """Pairs (s, name) of what systems beside GPS time differ from it by, up to whole weeks."""
-    days = range(1, 7) if earlier <= DAY else ()  # else of another day, not seconds of the day
+    """Pairs (s, name) of other systems' differences from GPS time, up to whole weeks."""
+    days = range(1, 7) if earlier <= DAY else ()  # otherwise of another day, not seconds of day
     unix = (EPOCH - date(1970, 1, 1)).days * DAY - lag
     differences = {lag: "UTC", unix: "Unix time", unix % WEEK: "Unix time"}
     differences |= {day * DAY: "seconds of the day" for day in days}
@@ -266,7 +266,7 @@ def _other_systems(lag, earlier):
 
 
 def _nothing_fits(name, times, span, setting):
-    """A sentence with both spans, the likely cause and the way out."""
+    """Sentence with both time spans, the likely cause and the remedy."""
     candidates = _candidates(times, span)
     shares = [(_inside(times, span, constant), cloud) for constant, cloud, _ in candidates]
     largest = max(inside for inside, cloud in shares if setting in ("auto", cloud))
@@ -303,17 +303,17 @@ def _nothing_fits(name, times, span, setting):
 
 
 def utc_lag(*times: np.ndarray) -> int:
-    """GPS time minus UTC on the day of times, by the first that tell it, or else today's. Units: s.
+    """GPS time minus UTC on the day of the times that show it first, or today. Units: s.
 
     Parameters
     ----------
     *times : (n,) arrays
-        Of cloud or trajectory, each in its own system. Units: s.
+        Times of cloud or trajectory, each in its own system. Units: s.
     """
     for some in times:
         if (system := usual_systems(some)[0]) != "week":
             seconds = float(some[0]) + ADJUSTMENT * (system == "standard")
-            # of garbage too, to the 23rd century
+            # also of invalid values, up to the 23rd century
             return leap_seconds(EPOCH + timedelta(days=np.clip(seconds / DAY, 0, 1e5)))
     return leap_seconds(date.max)
 
@@ -321,7 +321,7 @@ def utc_lag(*times: np.ndarray) -> int:
 def gps_epoch(trajectory: Trajectory, clouds: Sequence[CloudFile]) -> datetime | None:
     """Date and time at which a trajectory's gps_time is zero, in GPS time.
 
-    Seconds of the week tell no date; a cloud of the drive whose times count on does.
+    Seconds of week do not show the date, but a cloud of the drive with continuous times does.
 
     Parameters
     ----------
@@ -331,7 +331,7 @@ def gps_epoch(trajectory: Trajectory, clouds: Sequence[CloudFile]) -> datetime |
     Returns
     -------
     datetime.datetime or None
-        None where no file states the week.
+        None if no file states the week.
     """
     start = datetime.combine(EPOCH, datetime.min.time())
     continuous = {"standard": ADJUSTMENT, "gps": 0.0}
@@ -342,13 +342,13 @@ def gps_epoch(trajectory: Trajectory, clouds: Sequence[CloudFile]) -> datetime |
         if cloud.time_system not in continuous:
             continue
         seconds = continuous[cloud.time_system] - cloud.time_constant
-        if seconds % WEEK == 0:  # else times of the header's own offset
+        if seconds % WEEK == 0:  # otherwise times with the header's own offset
             return start + timedelta(seconds=seconds)
     return None
 
 
 def leap_seconds(day: date) -> int:
-    """GPS time minus UTC on a day, by the table of the IANA time zone database. Units: s.
+    """GPS time minus UTC on a day, from the table of the IANA time zone database. Units: s.
 
     Parameters
     ----------
@@ -366,22 +366,23 @@ def leap_seconds(day: date) -> int:
 
 
 def count_on(times: ArrayLike, period: float = WEEK) -> tuple[np.ndarray, np.ndarray | None]:
-    """Times of successive epochs that count on where seconds of the week start again.
+    """Continue times of successive epochs where seconds of week restart.
 
-    They do where times fall by a week, less a pause of up to a day, as no mistake in a file does.
+    A restart is a decrease by a week, minus a pause of up to a day, which no fault in a file
+    causes.
 
     Parameters
     ----------
     times : (n,) array
         Units: s.
     period : float
-        After which they start again. Units: s.
+        Period after which they restart. Units: s.
 
     Returns
     -------
     times : (n,) array
     periods : (n,) int array, or None
-        Number of periods that were added; None where times never start again.
+        Number of periods that were added; None if times never restart.
 
     Examples
     --------
@@ -397,14 +398,14 @@ def count_on(times: ArrayLike, period: float = WEEK) -> tuple[np.ndarray, np.nda
 
 
 def counting_on(record: dict[str, np.ndarray], period: float = WEEK) -> dict[str, np.ndarray]:
-    """Columns of a file whose gps_time counts on; with the weeks that were added, if any.
+    """Columns of a file with continued gps_time, and the added weeks, if any.
 
     Parameters
     ----------
     record : dict
         Name of a column to an (n,) array.
     period : float
-        As of count_on.
+        See count_on.
 
     Returns
     -------
@@ -418,9 +419,10 @@ def counting_on(record: dict[str, np.ndarray], period: float = WEEK) -> dict[str
 
 
 def _new_week(times):
-    """Limit (s) below which seconds of week are of the next one; infinite below zero without it.
+    """Limit (s) below which seconds of week belong to the next week; minus infinity without one.
 
-    Times at both ends of a week, and none for six days between them, are of a drive over its end.
+    Times at both ends of a week, and none for six days between them, belong to a drive across its
+    end.
     """
     ordered = np.sort(times)
     gaps = np.diff(ordered)
@@ -432,14 +434,14 @@ def _new_week(times):
 
 
 def lacks_time(times: np.ndarray) -> np.ndarray:
-    """Which points have no time: (n,) bool; what is no number, and 0 or -1 in their place.
+    """Flag (n,) of points without a time: not a number, or 0 or -1 instead.
 
     Parameters
     ----------
     times : (n,) array
-        As stored. Units: s.
+        Stored times. Units: s.
     """
-    times = np.round(times, 6)  # s; an offset that was added and taken off again leaves less
+    times = np.round(times, 6)  # s; a remainder of an offset added and removed is smaller
     is_placeholder = np.isin(times, PLACEHOLDERS)
     is_missing = is_placeholder | ~np.isfinite(times)
     if np.count_nonzero(is_placeholder) == 1 and not is_missing.all():
@@ -450,12 +452,12 @@ def lacks_time(times: np.ndarray) -> np.ndarray:
 
 
 def listed_times(times: np.ndarray) -> str:
-    """Values of points without a time, with the number of each where they differ.
+    """Values of points without a time, with the number of each if they differ.
 
     Parameters
     ----------
     times : (n,) array
-        Of these points, as stored. Units: s.
+        Stored times of these points. Units: s.
     """
     values, counts = np.unique(np.round(times, 6), return_counts=True)
     if len(values) == 1:

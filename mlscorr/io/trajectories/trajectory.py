@@ -1,4 +1,4 @@
-"""Trajectories from CSV, SBET and the files of others, and back to CSV."""
+"""Trajectories from CSV, SBET and foreign files, and back to CSV."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,14 +30,14 @@ NOTHING_GIVEN = TrajectorySection(file="")
 
 @dataclass(frozen=True)
 class TrajectoryFile:
-    """A trajectory as it was read, and what was understood of its file.
+    """Trajectory as read, and the interpretation of its file.
 
     Parameters
     ----------
     trajectory : Trajectory
     is_sbet : bool
     layout : str or None
-        A sentence; None for an SBET and for our own columns, where nothing had to be understood.
+        A sentence; None for an SBET and for our own columns, which need no interpretation.
     """
 
     trajectory: Trajectory
@@ -48,15 +48,15 @@ class TrajectoryFile:
 def read_trajectory(
     path: str | Path, crs: str | None = None, accuracy: str | Path | None = None
 ) -> Trajectory:
-    """Trajectory of a .csv file, an SBET, or a file of others.
+    """Read a trajectory from a .csv file, an SBET, or a foreign file.
 
     Parameters
     ----------
     path : path
     crs : str, optional
-        Projected CRS that an SBET is brought into; a CSV is in map coordinates already.
+        Projected CRS for an SBET; a CSV is already in map coordinates.
     accuracy : path, optional
-        An SBET's smrmsg or a POF's POQ; a CSV carries its sigmas in its own columns.
+        An SBET's smrmsg or a POF's POQ; a CSV has sigmas in its own columns.
 
     Returns
     -------
@@ -66,13 +66,13 @@ def read_trajectory(
     Raises
     ------
     ValueError
-        For missing columns, cells that are not numbers, times that don't increase, radians where
-        degrees belong, and an unknown kind of file.
+        For missing columns, cells that are not numbers, times that do not increase, radians instead
+        of degrees, and an unknown kind of file.
 
     Warns
     -----
     UserWarning
-        When the heading disagrees with the course over ground.
+        If the heading disagrees with the course over ground.
     """
     return read_trajectory_file(path, crs, accuracy).trajectory
 
@@ -83,14 +83,14 @@ def read_trajectory_file(
     accuracy: str | Path | None = None,
     section: TrajectorySection = NOTHING_GIVEN,
 ) -> TrajectoryFile:
-    """Trajectory of a file whose kind its content tells, or the suffix of a POF.
+    """Read a trajectory file, whose kind follows from its contents, or from the suffix of a POF.
 
     Parameters
     ----------
     path, crs, accuracy
         See read_trajectory.
     section : TrajectorySection, optional
-        What survey.toml says of columns and conventions.
+        Columns and conventions from survey.toml.
 
     Returns
     -------
@@ -99,7 +99,7 @@ def read_trajectory_file(
     Raises
     ------
     ValueError, UserWarning
-        As read_trajectory; also for what can be understood in two ways.
+        See read_trajectory; also for ambiguous files.
     """
     path = as_path(path)
     with open_file(path) as file:
@@ -137,7 +137,7 @@ def read_trajectory_file(
 
 
 def _read_geographic(path, crs, accuracy, section, is_pof):
-    """TrajectoryFile of an SBET or a POF, which take no columns and no conventions."""
+    """TrajectoryFile of an SBET or a POF, which have no columns or conventions."""
     given = sorted(section.model_fields_set & set(TrajectorySection.model_fields) - NAMED)
     if given:
         raise ValueError(
@@ -153,8 +153,8 @@ def _read_geographic(path, crs, accuracy, section, is_pof):
 def write_trajectory_csv(path: str | Path, trajectory: Trajectory) -> None:
     """Write a trajectory with its sigmas, if any: 1e-6 s, 1e-5 m, 1e-7 deg, heading from 0 to 360.
 
-    A column session follows where steps alone don't part the sessions of the POS. Seconds of week
-    start again where those of the input do. The file appears whole or not at all.
+    A column session follows if time steps alone do not separate the sessions of the POS. Seconds of
+    week restart where those of the input do. The file is written atomically.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def write_trajectory_csv(path: str | Path, trajectory: Trajectory) -> None:
     Raises
     ------
     OSError
-        When the disk refuses.
+        If the disk refuses.
     """
     angles = np.degrees(np.column_stack(angles_from_attitude(trajectory.attitude)))
     blocks = [trajectory.file_time[:, None], trajectory.position, angles]
@@ -192,7 +192,7 @@ def write_trajectory_csv(path: str | Path, trajectory: Trajectory) -> None:
 
 
 def _trajectory_of(path, table):
-    """The Trajectory of a table in our own columns and conventions."""
+    """Trajectory of a table in our own columns and conventions."""
     _check_values(path, table)
     angles = np.column_stack([table[name] for name in COLUMNS[4:]])
     position = np.column_stack([table[name] for name in COLUMNS[1:4]])

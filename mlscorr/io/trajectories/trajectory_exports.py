@@ -1,4 +1,4 @@
-"""Results for other programs: SBET with its smrmsg, TUM, and layers for a GIS."""
+"""Exports for other programs: SBET with its smrmsg, TUM, and layers for a GIS."""
 
 import json
 from collections.abc import Sequence
@@ -25,24 +25,24 @@ from mlscorr.survey import AXES, Trajectory
 
 SUFFIXES = (".sbet", ".out", ".tum", *FEATURE_SUFFIXES)
 TUM = ".tum"
-WEAK_STRETCHES = "weak.geojson"  # is written anyway
+WEAK_STRETCHES = "weak.geojson"  # is always written
 
 
 def check_exports(names: Sequence[str], crs: str | None = None, is_read: bool = False) -> None:
-    """Refuse names of files that can't be written beside the results.
+    """Refuse names of files that cannot be written next to the results.
 
     Parameters
     ----------
     names : sequence of str
     crs : str, optional
-        Of the survey, which all but TUM need.
+        CRS of the survey, required for all except TUM.
     is_read : bool
-        Whether the survey is read, so that it has a crs or has none.
+        True if the survey is read, so that its crs is known.
 
     Raises
     ------
     ValueError
-        For folders, unknown suffixes, and all but TUM without a crs.
+        For folders, unknown suffixes, and all except TUM without a crs.
     """
     for name in names:
         suffix = _suffix(name, "--trajectory", SUFFIXES, ".sbet, .out (SBET), .tum (TUM)")
@@ -53,12 +53,12 @@ def check_exports(names: Sequence[str], crs: str | None = None, is_read: bool = 
 def check_target_exports(
     names: Sequence[str], crs: str | None = None, is_read: bool = False
 ) -> None:
-    """Refuse names of files for targets that can't be written beside the results.
+    """Refuse names of files for targets that cannot be written next to the results.
 
     Parameters
     ----------
     names, crs, is_read
-        As of check_exports.
+        See check_exports.
 
     Raises
     ------
@@ -72,12 +72,12 @@ def check_target_exports(
 
 
 def check_distinct(names: Sequence[str]) -> None:
-    """Refuse names of exports of which one file would replace another.
+    """Refuse names of exports if one file would replace another.
 
     Parameters
     ----------
     names : sequence of str
-        All that are asked for.
+        All requested names.
 
     Raises
     ------
@@ -92,7 +92,7 @@ def check_distinct(names: Sequence[str]) -> None:
 
 
 def _suffix(name, option, known, others=""):
-    """The suffix of an export's name, if it can be written."""
+    """Suffix of an export's name, if it can be written."""
     suffix = Path(name).suffix.lower()
     if Path(name).name != name or suffix not in known or name.lower() == WEAK_STRETCHES:
         kinds = ", ".join(filter(None, [others, "or .gpkg (GeoPackage)"]))
@@ -104,7 +104,7 @@ def _suffix(name, option, known, others=""):
 
 
 def _require_crs(name, suffix, crs):
-    """Refuse what a survey without a CRS, or with a wrong one, can't be written as."""
+    """Refuse formats that require a valid CRS if the survey has none."""
     if crs is None and suffix in FEATURE_SUFFIXES:
         raise ValueError(f"A GIS needs the CRS of {name}: set crs in survey.toml.")
     if crs is None:
@@ -115,7 +115,7 @@ def _require_crs(name, suffix, crs):
 def export_targets(
     path: str | Path, targets: Sequence[dict[str, Any]], kinds: dict[str, str], crs: str
 ) -> list[str]:
-    """Write surveyed points as a GeoPackage or GeoJSON, as the suffix says.
+    """Write surveyed points as a GeoPackage or GeoJSON, depending on the suffix.
 
     Parameters
     ----------
@@ -141,22 +141,22 @@ def export_trajectory(
     crs: str | None,
     recorded: Trajectory | None = None,
 ) -> list[str]:
-    """Write a trajectory as its suffix says; files appear whole or not at all.
+    """Write a trajectory in the format of its suffix; files are written atomically.
 
     The wander angle of an SBET is zero: its velocities are north, west, up. Velocities, and
     accelerations and rates about the body axes forward, right, down, are derivatives of the
-    trajectory, which cross no gap. Beside it stands smrmsg_NAME.out, where the trajectory has
-    sigmas: at each epoch, for a second is long beside a target. TUM's quaternions are of the body
-    axes right, forward, up.
+    trajectory, which do not cross gaps. smrmsg_NAME.out is added if the trajectory has sigmas, with
+    one row per epoch, because a second is too long near a target. TUM's quaternions refer to the
+    body axes right, forward, up.
 
     Parameters
     ----------
     path : path
     trajectory : Trajectory
     crs : str or None
-        Needed for all but TUM.
+        Required for all except TUM.
     recorded : Trajectory, optional
-        With the same epochs: a GeoPackage or GeoJSON has the size of the correction, too.
+        With the same epochs; adds the size of the correction to a GeoPackage or GeoJSON.
 
     Returns
     -------
@@ -166,7 +166,7 @@ def export_trajectory(
     Raises
     ------
     ValueError
-        For a crs that can't be left for latitude and longitude.
+        If the crs cannot be converted to latitude and longitude.
     """
     path = Path(path)
     if path.suffix.lower() in FEATURE_SUFFIXES:
@@ -196,7 +196,7 @@ def export_trajectory(
 
 
 def _write_records(path, fields, columns):
-    """Records of float64, zero where a field is not given."""
+    """Write records of float64, with zero for missing fields."""
     table = np.zeros((len(columns["gps_time"]), len(fields)), "<f8")
     for name, values in columns.items():
         table[:, fields.index(name)] = values
@@ -207,7 +207,7 @@ def _write_records(path, fields, columns):
 def write_weak(
     folder: Path, stretches: Sequence[dict[str, Any]], trajectory: Trajectory, crs: str | None
 ) -> list[str]:
-    """Write weak.csv, and weak.geojson where the CRS is known, into a folder.
+    """Write weak.csv into a folder, and weak.geojson if the CRS is known.
 
     Parameters
     ----------
@@ -215,7 +215,7 @@ def write_weak(
     stretches : sequence of dict
         ``weak[]`` of report.json.
     trajectory : Trajectory
-        The corrected one, in which every stretch lies.
+        Corrected trajectory, which contains all intervals.
     crs : str or None
 
     Returns
@@ -240,10 +240,10 @@ def write_weak(
 
 
 def _features(stretches, trajectory, crs):
-    """A line for each stretch: RFC 7946, so longitude and latitude by WGS 84."""
+    """Line features of all intervals, in longitude and latitude in WGS 84 (RFC 7946)."""
     features = []
     for row in stretches:
-        count = 2 + int(row["length_m"])  # a vertex a metre
+        count = 2 + int(row["length_m"])  # a vertex per meter
         position = trajectory.at(np.linspace(row["from"], row["to"], count)).position
         line = to_lonlat(check_crs(crs), position)
         geometry = {"type": "LineString", "coordinates": line.tolist()}

@@ -1,4 +1,4 @@
-"""One trajectory of several files: sessions of the POS, joined in order of time."""
+"""One trajectory from several files: sessions of the POS, joined in order of time."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -17,15 +17,15 @@ KINDS = ("position", "attitude")
 
 @dataclass(frozen=True)
 class SessionFile:
-    """A file of [trajectory] or of one [[trajectory]].
+    """File of [trajectory] or of one [[trajectory]].
 
     Parameters
     ----------
     path : Path
     accuracy : Path or None
-        Of an SBET.
+        Accuracy file of an SBET.
     section : TrajectorySection
-        What survey.toml says of it.
+        Its section of survey.toml.
     """
 
     path: Path
@@ -35,20 +35,20 @@ class SessionFile:
 
 @dataclass(frozen=True)
 class Sessions:
-    """The trajectory of a survey, and what it was made of.
+    """Trajectory of a survey, and its sources.
 
     Parameters
     ----------
     trajectory : Trajectory
-        Of all sessions.
+        Trajectory of all sessions.
     parts : tuple of Trajectory
-        Of each file.
+        Trajectory of each file.
     is_sbet : bool
-        Whether one of the files is.
+        True if one of the files is an SBET.
     layouts : tuple of str
-        How tables of others were understood.
+        Notes on how foreign tables were interpreted.
     notes : tuple of str
-        How the files were joined, and what was added to their times.
+        Notes on how the files were joined, and on constants added to times.
     """
 
     trajectory: Trajectory
@@ -61,15 +61,15 @@ class Sessions:
 def read_sessions(
     files: Sequence[SessionFile], crs: str | None = None, pos: Pos | None = None
 ) -> Sessions:
-    """The trajectory of a survey's one file, or of several that are joined.
+    """Read the trajectory of a survey from one file, or join several.
 
     Parameters
     ----------
     files : sequence of SessionFile
     crs : str, optional
-        As of read_trajectory.
+        See read_trajectory.
     pos : Pos, optional
-        What survey.toml says of a trajectory without sigmas.
+        Accuracy from survey.toml for a trajectory without sigmas.
 
     Returns
     -------
@@ -78,7 +78,7 @@ def read_sessions(
     Raises
     ------
     ValueError
-        As read_trajectory_file, and where the files can't be of one drive.
+        See read_trajectory_file; also if the files cannot belong to one drive.
     """
     read = [read_trajectory_file(f.path, crs, f.accuracy, f.section) for f in files]
     names = [file.path.name for file in files]
@@ -106,7 +106,7 @@ def read_sessions(
 
 
 def _summary(names, parts, joined):
-    """A sentence on several files."""
+    """Sentence on several files."""
     order = np.argsort([part.gps_time[0] for part in parts])
     listed = ", ".join(f"{names[i]} {_span(parts[i])}" for i in order)
     return (
@@ -120,12 +120,12 @@ def _span(part):
 
 
 def check_systems(names: Sequence[str], parts: Sequence[Trajectory]) -> None:
-    """Refuse trajectories that can't be of one time system by the size of their times.
+    """Refuse trajectories in different time systems, judged by the size of their times.
 
     Parameters
     ----------
     names : sequence of str
-        Of the files, for messages.
+        Names of the files, for messages.
     parts : sequence of Trajectory
 
     Raises
@@ -143,15 +143,15 @@ def check_systems(names: Sequence[str], parts: Sequence[Trajectory]) -> None:
 
 
 def across_week_end(parts: Sequence[Trajectory]) -> list[Trajectory]:
-    """Trajectories whose seconds of week count on from the end of a week into the next one.
+    """Continue seconds of week of trajectories across the end of a week.
 
-    A week is added to the first of a week where all together are then shorter, and last less than
-    half a week: a drive from Saturday to Sunday, and not the week between Sunday and Saturday.
+    A week is added to times at the start of a week if the total duration then becomes shorter and
+    is less than half a week: a drive from Saturday to Sunday, not from Sunday to Saturday.
 
     Parameters
     ----------
     parts : sequence of Trajectory
-        Of one time system.
+        In one time system.
     """
     starts, ends = np.array([part.gps_time[[0, -1]] for part in parts]).T
     if starts.min() < 0 or usual_systems(ends) != ("week",):
@@ -171,14 +171,14 @@ def across_week_end(parts: Sequence[Trajectory]) -> list[Trajectory]:
 
 
 def _weeks(part):
-    """Number (n,) of weeks that were added to the times of a part."""
+    """Number (n,) of weeks that were added to the times of a trajectory."""
     if part.weeks is None:
         return np.zeros(len(part), int)
     return part.weeks
 
 
 def _week_ends(names, parts):
-    """A sentence on each trajectory to whose times weeks were added."""
+    """Sentence on each trajectory to whose times weeks were added."""
     for name, part in zip(names, parts, strict=True):
         if part.weeks is None:
             continue
@@ -193,20 +193,20 @@ def _week_ends(names, parts):
 def with_sigmas(
     names: Sequence[str], parts: Sequence[Trajectory], pos: Pos | None
 ) -> tuple[list[Trajectory], list[str]]:
-    """All trajectories with the sigmas that one of them states, and sentences on those of [pos].
+    """Add the sigmas stated by one trajectory to all, with sentences on those of [pos].
 
     Parameters
     ----------
     names : sequence of str
-        Of the files, for messages.
+        Names of the files, for messages.
     parts : sequence of Trajectory
     pos : Pos or None
-        What is believed of those without sigmas.
+        Assumed accuracy of those without sigmas.
 
     Raises
     ------
     ValueError
-        Where nothing is.
+        If there is none.
     """
     parts = list(parts)
     notes = []
@@ -232,31 +232,31 @@ def with_sigmas(
 def join_sessions(
     names: Sequence[str], parts: Sequence[Trajectory], pos: Pos
 ) -> tuple[Trajectory, list[str]]:
-    """One trajectory of several, in order of time; from one to the next is a gap.
+    """Join several trajectories in order of time, with gaps between them.
 
-    What two of them have in common is taken once, of the one that starts first, and joins them
-    without a gap where both are the same to the millimetre: one export that was cut.
+    The overlap of two of them is used once, from the one that starts first. It joins them without a
+    gap if both agree to a millimeter, as parts of one export.
 
     Parameters
     ----------
     names : sequence of str
-        Of the files, for messages.
+        Names of the files, for messages.
     parts : sequence of Trajectory
-        All with sigmas, or none.
+        Either all with sigmas, or none.
     pos : Pos
-        Whose sigmas are believed where they have none.
+        Its sigmas are assumed if they have none.
 
     Returns
     -------
     trajectory : Trajectory
-        Without sessions where its steps part them.
+        Without sessions if its time steps separate them.
     notes : list of str
-        Sentences on what overlaps.
+        Sentences on overlaps.
 
     Raises
     ------
     ValueError
-        Where two are at different places at the same time.
+        If two are at different positions at the same time.
     """
     if any(part.weeks is not None for part in parts):
         parts = [replace(part, weeks=_weeks(part)) for part in parts]
@@ -293,14 +293,14 @@ def join_sessions(
 
 
 def _numbers(part):
-    """Sessions (n,) of a part by itself, from 0."""
+    """Sessions (n,) of a single trajectory, from 0."""
     if part.session is None:
         return np.zeros(len(part), int)
     return part.session - part.session.min()
 
 
 def _are_one(names, first, second, is_common, pos):
-    """Whether two trajectories are one; a ValueError where they are at different places."""
+    """True if two trajectories are the same; raises ValueError if their positions differ."""
     there = Trajectory.at(first, second.gps_time[is_common])
     apart = np.linalg.norm(there.position - second.position[is_common], axis=1)
     turned = (there.attitude * second.attitude[is_common].inv()).magnitude()

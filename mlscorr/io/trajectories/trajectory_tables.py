@@ -1,9 +1,9 @@
 """Trajectories in tables: our own columns, those of Inertial Explorer and others, and TUM's.
 
-TUM's rows are `time x y z qx qy qz qw` without a header, parted by blanks. With a header its names
-say which column is what: other programs write qw first. Files of positions alone are refused: GNSS
-gives no attitude (RTKLIB manual, appendix B.1, has the columns of its solution files), and
-geocentric coordinates are none of a map.
+TUM's rows are `time x y z qx qy qz qw` without a header, separated by blanks. With a header, its
+names define the columns, because other programs write qw first. Files with only positions are
+refused, because GNSS gives no attitude (for RTKLIB's columns see its manual, appendix B.1), and so
+are geocentric coordinates, which are not map coordinates.
 """
 
 import re
@@ -40,7 +40,7 @@ from mlscorr.io.trajectories.time_systems import counting_on
 from mlscorr.survey import AXES, SurveyFileError
 
 POSITION_SUFFIX = ".pos"
-_RTKLIB = {"q", "ns", "ratio"}  # plain names: quality, number of satellites, ratio of ambiguities
+_RTKLIB = {"q", "ns", "ratio"}  # plain names: quality, number of satellites, ambiguity ratio
 _RADII = (6.34e6, 6.40e6)  # m, from the Earth's center to its surface (6 357 to 6 378 km) and above
 _LARGEST_HEIGHT = 2e4  # m, of any vehicle; geocentric Z is less only within 0.2 deg of the equator
 _PLACES = (("latitude", "longitude"), ("easting", "northing"), ("x", "y"))
@@ -55,7 +55,7 @@ _PROJECTED = (
 COLUMNS = ("gps_time", *AXES, *ANGLES)
 POSITION_SIGMAS = ("sigma_easting", "sigma_northing", "sigma_height")
 ATTITUDE_SIGMAS = ("sigma_roll", "sigma_pitch", "sigma_heading")
-SESSION = ("session",)  # of the POS, in a trajectory that was joined of several
+SESSION = ("session",)  # of the POS, in a trajectory joined from several
 GRID = "clockwise from grid north"
 TRUE = "clockwise from true north"
 FROM_EAST = "counterclockwise from east"
@@ -63,8 +63,8 @@ TUM = ("gps_time", *AXES, *QUATERNION)
 ORDER = re.compile(r"q.{0,3}|.*(quat|orient|rot).*|w")  # plain names of a quaternion's columns
 TIME_UNITS = {"nanoseconds": 1e-9, "microseconds": 1e-6, "milliseconds": 1e-3}  # s
 EARLIEST = 1e8  # s since 1970: 1973
-LATEST = 1e11  # s since 1970: 5138; a thousand times more, so that sizes of units don't overlap
-TRUE_NORTH_USUAL = {"hell", "hdngsd", "eastsd"}  # columns of Inertial Explorer and POSPac alone
+LATEST = 1e11  # s since 1970: 5138; 1000 times more, so that units do not overlap
+TRUE_NORTH_USUAL = {"hell", "hdngsd", "eastsd"}  # columns only in Inertial Explorer and POSPac
 HINTS = {
     ("easting", "x"): (
         " Say under [trajectory.columns] in survey.toml which of X and Y is easting, or longitude "
@@ -86,7 +86,7 @@ HINTS = {
 def read_table(
     path: Path, section: TrajectorySection, crs: str | None
 ) -> tuple[dict[str, np.ndarray], str | None]:
-    """Columns of a trajectory in our names, units and conventions, and what was understood.
+    """Columns of a trajectory in our names, units and conventions, and their interpretation.
 
     Parameters
     ----------
@@ -99,12 +99,12 @@ def read_table(
     table : dict
         Name of a column to an (n,) array. Units: s, m, deg.
     layout : str or None
-        A sentence; None for our own columns without conventions of others.
+        A sentence; None for our own columns and conventions.
 
     Raises
     ------
     ValueError
-        For missing columns, cells that are no numbers, and conventions that are not known.
+        For missing columns, cells that are not numbers, and unknown conventions.
     """
     groups = (POSITION_SIGMAS, ATTITUDE_SIGMAS, SESSION)
     chosen = section.columns.chosen
@@ -167,7 +167,7 @@ def read_table(
 def read_terrascan(
     path: Path, section: TrajectorySection, crs: str | None
 ) -> tuple[dict[str, np.ndarray], str]:
-    """Columns of a TerraScan trajectory in our conventions, and what was understood.
+    """Columns of a TerraScan trajectory in our conventions, and their interpretation.
 
     Parameters
     ----------
@@ -206,14 +206,14 @@ def tum_columns(cells: Sequence[str]) -> Mapping[str, int]:
 
 
 def _is_quaternion(names, chosen):
-    """Whether a quaternion gives the attitude: it was chosen, or there are no angles beside it."""
+    """True if a quaternion gives the attitude: it was chosen, or there are no angles."""
     is_there = not set(QUATERNION).isdisjoint(names)
     has_angles = {"roll", "pitch"} <= set(names) and not {"heading", "yaw"}.isdisjoint(names)
     return is_there and (not has_angles or not set(QUATERNION).isdisjoint(chosen))
 
 
 def _check_order(layout, lacking, chosen):
-    """Refuse a quaternion by place where a header names its columns, in words that aren't known."""
+    """Refuse a quaternion by position if a header names its columns in unknown words."""
     if layout.header or "qw" not in layout.columns or chosen:
         return
     header = likely_header(layout.path, TRAJECTORY_NAMES)
@@ -228,7 +228,7 @@ def _check_order(layout, lacking, chosen):
 
 
 def _in_seconds(layout, table):
-    """The table with times in seconds, and words on the unit where their size tells it."""
+    """Table with times in seconds, and a phrase on the unit if it was deduced from their size."""
     known = np.abs(table["gps_time"][np.isfinite(table["gps_time"])])
     if "gps_time" in layout.factors or not len(known):
         return table, ""
@@ -241,9 +241,9 @@ def _in_seconds(layout, table):
 
 
 def _used(layout: TableLayout, is_quaternion: bool) -> TableLayout:
-    """The layout with the columns that are used: one kind of place, sigmas of all axes or none.
+    """Layout with the used columns: one kind of position, sigmas of all axes or none.
 
-    With a quaternion x is east and y north: turned about a height, no others are right-handed.
+    With a quaternion, x is east and y north, because other axes would not be right-handed.
     """
     columns = layout.columns
     if is_quaternion and "easting" not in columns and "latitude" not in columns:
@@ -267,11 +267,11 @@ def _used(layout: TableLayout, is_quaternion: bool) -> TableLayout:
 
 
 def _place_in_degrees(path, layout, values, angles):
-    """The table, with latitude and longitude in degrees where all angles are said to be radians."""
+    """Table with latitude and longitude in degrees, if all angles are stated in radians."""
     table = dict(zip(layout.columns, values, strict=True))
     place = {name: table[name] for name in ("latitude", "longitude") if name in table}
     if not place or not all(np.abs(degrees).max() <= np.pi for degrees in place.values()):
-        return table  # within 3.14 deg of 0, 0 there is no land
+        return table  # there is no land within 3.14 deg of 0, 0
     if angles != "rad":
         raise OpenQuestion(
             f"{path} has latitudes and longitudes that seem to be radians: none exceeds pi. If so, "
@@ -283,7 +283,7 @@ def _place_in_degrees(path, layout, values, angles):
 
 
 def _usual_heading(layout, section):
-    """How headings count where survey.toml doesn't say: from true north beside a latitude."""
+    """Default heading convention: from true north if there is a latitude."""
     if "latitude" in layout.columns:
         return TRUE
     if not section.heading and set(map(plain, layout.header)) & TRUE_NORTH_USUAL:
@@ -297,12 +297,12 @@ def _usual_heading(layout, section):
 
 
 def position_file(path: Path) -> str:
-    """The sentences on a file of positions alone, or of geocentric ones; empty for any other.
+    """Sentences on a file of only positions, or of geocentric ones; empty for any other.
 
     Parameters
     ----------
     path : Path
-        A table in which columns of a trajectory are missing.
+        Table without some columns of a trajectory.
     """
     header = likely_header(path, TRAJECTORY_NAMES)
     if header and all(map(NUMBER.fullmatch, header)):
@@ -344,7 +344,7 @@ def _check_projected(path, table):
 
 
 def _is_geocentric_table(path, known):
-    """Return True if X, Y and Z of a table are geocentric by their size."""
+    """True if X, Y and Z of a table are geocentric, judged by their size."""
     columns = ("x", "y", "height")
     if not set(columns) <= set(known):
         return False
@@ -354,12 +354,12 @@ def _is_geocentric_table(path, known):
         )
         places = {name: layout.columns[name] for name in columns}
         return _is_geocentric(read_numbers(replace(layout, columns=places)).T)
-    except ValueError:  # which its reader says
+    except ValueError:  # its reader reports the fault
         return False
 
 
 def _is_geocentric(places):
-    """Return True if geocentric places (x, y, z; m) lie near the Earth's surface."""
+    """True if geocentric positions (x, y, z; m) are near the Earth's surface."""
     is_far = np.abs(np.median(places[2])) > _LARGEST_HEIGHT
     return bool(is_far and _RADII[0] < _radius(places) < _RADII[1])
 

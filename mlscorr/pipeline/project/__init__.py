@@ -1,4 +1,4 @@
-"""Many drives as one project: tasks of one file each, joined by what is small."""
+"""Many drives as one project: tasks for single files, joined by small data."""
 
 from mlscorr.pipeline.project.checking import check_project
 from mlscorr.pipeline.project.correction import Options, check_project_output, correct_project

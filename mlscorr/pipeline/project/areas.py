@@ -1,10 +1,10 @@
-"""Areas of a city, each estimated by itself with a margin about it.
+"""Areas of a city, each estimated separately with a margin.
 
-Ties may join the drives of a whole city, and what solves them together grows faster than they do.
-What a place far away tells of a drive here has faded on the way. So a city is cut where as much
-was driven on both sides, until no part holds more than a machine takes at once; what that costs
-goes with the time of the drives, however much they saw. Areas share no estimate: each uses what was
-recorded in it and in its margin, and no more.
+Ties may join the drives of a whole city, and the cost of a common solution grows faster than their
+number. The influence of distant data on a drive decays along the path. A city is therefore split
+where both sides have equal driving time, until every part fits a machine; the cost depends on the
+duration of the drives, not on the number of their points. Areas share no estimate: each uses only
+the data recorded in it and in its margin.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from mlscorr.ties import SETTINGS as TIES
 
 @dataclass(frozen=True)
 class Area:
-    """A rectangle of the map; areas cover it, and don't overlap.
+    """Rectangle of the map; areas cover it without overlap.
 
     Parameters
     ----------
     low, high : (2,) array
-        Its corners, infinite where the city ends. Units: m.
+        Its corners, infinite at the edge of the city. Units: m.
     margin : float
-        How far it is estimated beyond them. Units: m.
+        Width of the estimated margin. Units: m.
     """
 
     low: np.ndarray
@@ -35,7 +35,7 @@ class Area:
     margin: float
 
     def contains(self, position: np.ndarray) -> np.ndarray:
-        """Which positions (n,) are its own.
+        """Flag (n,) of positions within the area.
 
         Parameters
         ----------
@@ -46,9 +46,9 @@ class Area:
         return np.all((plan >= self.low) & (plan < self.high), axis=1)
 
     def weight(self, position: np.ndarray) -> np.ndarray:
-        """How much (n,) its estimate counts beside its neighbours': from one inside to zero.
+        """Weight (n,) of its estimate relative to its neighbors': from one inside to zero.
 
-        A half at its edge, with which that of the area beyond sums up to one.
+        At its edge it is one half; the weights of both areas sum to one.
 
         Parameters
         ----------
@@ -60,7 +60,7 @@ class Area:
         return np.clip((1.0 + inside / self.margin) / 2, 0.0, 1.0)
 
     def parted(self, axis: int, at: float) -> tuple[Area, Area]:
-        """Both sides of a cut.
+        """Return both sides of a cut.
 
         Parameters
         ----------
@@ -74,7 +74,7 @@ class Area:
 
 
 def margin_of(drives: Sequence[FoundDrive]) -> float:
-    """How far drives come, on average, while the POS error is about one. Units: m.
+    """Mean distance that drives cover within the correlation time of the POS error. Units: m.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def margin_of(drives: Sequence[FoundDrive]) -> float:
 
 
 def places_each_second(drives: Sequence[FoundDrive]) -> np.ndarray:
-    """A place (n, 3) of what drives saw in each second of them. Units: m.
+    """One position (n, 3) of features for each second of drives. Units: m.
 
     Parameters
     ----------
@@ -99,9 +99,9 @@ def places_each_second(drives: Sequence[FoundDrive]) -> np.ndarray:
 
 
 def areas_of(places: np.ndarray, limit: int, margin: float) -> list[Area]:
-    """Areas that hold so many of some places at most, those in their margins too.
+    """Areas with at most a given number of positions, including those in their margins.
 
-    None is cut that is less than four margins wide.
+    Areas less than four margins wide are not split.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def areas_of(places: np.ndarray, limit: int, margin: float) -> list[Area]:
 
 
 def drive_areas(drives: Sequence[FoundDrive], limit: int) -> list[Area]:
-    """Areas in which drives spend so many seconds at most, those in their margins too.
+    """Areas with at most a given number of seconds of drives, including their margins.
 
     Parameters
     ----------
@@ -140,16 +140,16 @@ def drive_areas(drives: Sequence[FoundDrive], limit: int) -> list[Area]:
 
 @dataclass(frozen=True)
 class Piece:
-    """What of a drive lies in an area and its margin.
+    """Part of a drive within an area and its margin.
 
     Parameters
     ----------
     drive : FoundDrive
-        Of these epochs alone.
+        Drive with only these epochs.
     rows : (n,) bool array
-        Which epochs of the whole drive.
+        Selected epochs of the whole drive.
     control : (m,) bool array
-        Which of its observations of control points.
+        Selected observations of control points.
     """
 
     drive: FoundDrive
@@ -158,7 +158,7 @@ class Piece:
 
 
 def pieces_of(drives: Sequence[FoundDrive], area: Area) -> list[Piece]:
-    """The Pieces of drives that come into an area or its margin.
+    """Pieces of drives that enter an area or its margin.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ def pieces_of(drives: Sequence[FoundDrive], area: Area) -> list[Piece]:
 
 
 def _epochs_in(drive, area):
-    """Which epochs (n,) of a drive lie there, those beside them and short excursions included."""
+    """Flag (n,) of a drive's epochs there, including adjacent ones and short excursions."""
     trajectory = drive.survey.trajectory
     inside = area.weight(trajectory.position) > 0.0
     there = np.flatnonzero(inside)
@@ -184,7 +184,7 @@ def _epochs_in(drive, area):
 
 
 def _piece(drive, rows):
-    """The Piece of some epochs of a drive."""
+    """Piece of some epochs of a drive."""
     recorded = drive.survey.trajectory
     features = drive.features
     last = len(recorded) - 1

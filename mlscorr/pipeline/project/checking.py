@@ -1,4 +1,4 @@
-"""``check`` of a project: all that is wrong with its drives before they are corrected."""
+"""``check`` of a project: all faults of its drives before their correction."""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -22,17 +22,17 @@ NO_CONTROL = (
 
 
 def check_project(path: str | Path) -> CheckedSurvey:
-    """Check all drives of a project, as ``check`` does one survey, without correcting them.
+    """Check all drives of a project, like ``check`` for one survey, without correcting them.
 
     Parameters
     ----------
     path : path
-        project.toml, or the folder that holds it.
+        project.toml, or its folder.
 
     Returns
     -------
     CheckedSurvey
-        Of all drives: their faults, with their names, and what they take together.
+        Result for all drives: faults with names, and total resources.
     """
     faults = Faults()
     with glance():
@@ -57,7 +57,7 @@ def check_project(path: str | Path) -> CheckedSurvey:
 
 
 def _surveys(project: ProjectParts, faults: Faults) -> list[Survey]:
-    """Surveys of the drives, with the clouds that can be read."""
+    """Surveys of the drives, with the readable clouds."""
     tasks = [task.arguments for task in stages.tile_tasks(project)]
     read = [(owners, faults.of("data", read_tile, path, owners)) for path, owners in tasks]
     surveys = []
@@ -75,7 +75,7 @@ def _surveys(project: ProjectParts, faults: Faults) -> list[Survey]:
 
 
 def _checked(survey: Survey) -> tuple[Survey, CheckedSurvey]:
-    """What a check says of a drive, by its name."""
+    """Check of a drive, with its name."""
     checked = checked_survey(survey, Faults(), needs_control=False)
     name = survey.name
     return survey, replace(
@@ -87,7 +87,7 @@ def _checked(survey: Survey) -> tuple[Survey, CheckedSurvey]:
 
 
 def _check_control(project, checked, faults):
-    """Say which drives have no surveyed point near, and which points are near no drive."""
+    """Report drives without surveyed points nearby, and points without a drive."""
     for survey, _ in checked:
         if not len(survey.surveyed):
             faults.warn(NO_CONTROL.format(survey.name))
@@ -109,7 +109,7 @@ def _all(what: str, checked: Sequence[tuple[Survey, CheckedSurvey]]) -> Iterable
 
 
 def _notes(checked):
-    """Notes on the drives, with their names where they are not on all."""
+    """Notes on the drives, with names unless they apply to all."""
     count = Counter(_all("notes", checked))
     return tuple(
         dict.fromkeys(
@@ -121,7 +121,7 @@ def _notes(checked):
 
 
 def _with_control(amounts: Sequence[Amount], project: ProjectParts) -> tuple[Amount, ...]:
-    """Amounts with the surveyed points of the project: some lie near two drives."""
+    """Amounts with the surveyed points of the project, because some are near two drives."""
     numbers = {"control points": len(project.control), "check points": len(project.check)}
     source = project.layout or "of all drives"
     return tuple(
@@ -131,7 +131,7 @@ def _with_control(amounts: Sequence[Amount], project: ProjectParts) -> tuple[Amo
 
 
 def _sums(parts: Sequence[Sequence[Amount]]) -> tuple[Amount, ...]:
-    """Amounts of all drives together; of memory, the largest of them: a worker holds one file."""
+    """Total amounts of all drives; for memory the largest, because a worker processes one file."""
     total: dict[tuple[str, str], Amount] = {}
     for amount in (amount for own in parts for amount in own):
         key = amount.what, amount.unit

@@ -1,4 +1,4 @@
-"""All drives of a project: those that saw the same things together, area by area if too many."""
+"""All drives of a project: overlapping ones together, split into areas if there are too many."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -18,15 +18,15 @@ from mlscorr.pipeline.project.settings import SETTINGS
 
 @dataclass(frozen=True)
 class AreaInput:
-    """What is recorded in an area and its margin, and how it is estimated.
+    """Recorded data of an area and its margin, and estimation parameters.
 
     Parameters
     ----------
     area : Area
     pieces : list of Piece
-        Of the drives that come there.
+        Pieces of the drives in it.
     order, origin
-        As of project_drives.
+        See project_drives.
     """
 
     area: Area
@@ -40,7 +40,7 @@ class AreaInput:
         return sum(len(piece.drive.features) for piece in self.pieces)
 
     def results(self) -> list[AreaResult]:
-        """What it tells of each drive."""
+        """Return its results for each drive."""
         pieces = {piece.drive.survey.name: piece for piece in self.pieces}
         results = []
         for group in near_drives([piece.drive for piece in self.pieces]):
@@ -52,12 +52,12 @@ class AreaInput:
 
 
 def stored_results(folder: Path, key: str) -> list[AreaResult]:
-    """The results of an AreaInput that lies in a store.
+    """Results of an AreaInput in a store.
 
     Parameters
     ----------
     folder : Path
-        Of the store.
+        Folder of the store.
     key : str
     """
     inputs: AreaInput = TaskStore(folder).get("pieces", key)
@@ -65,7 +65,7 @@ def stored_results(folder: Path, key: str) -> list[AreaResult]:
 
 
 def in_turn(inputs: Iterable[AreaInput]) -> list[list[AreaResult]]:
-    """The results of areas, one after the other.
+    """Results of areas, one after the other.
 
     Parameters
     ----------
@@ -82,21 +82,21 @@ def project_drives(
     work: Callable[[Iterable[AreaInput]], list[list[AreaResult]]] = in_turn,
     limit: int = SETTINGS.area_seconds,
 ) -> Iterator[tuple[CorrectedSurvey, DriveState]]:
-    """The results of all drives.
+    """Yield the results of all drives.
 
     Parameters
     ----------
     drives : sequence of FoundDrive
     order : int
-        Of the trend of a drive by itself; drives together have a shift in common.
+        Order of the trend of a single drive; several drives have a common shift.
     origin : (3,) array
-        Of planes and poles. Units: m.
+        Origin of planes and poles. Units: m.
     with_ties : bool
-        Else each drive is by itself.
+        False to estimate each drive separately.
     work : function of AreaInputs
-        Gives the results of each.
+        Returns the results of each.
     limit : int
-        Of the time that drives spend in an area and its margin. Units: s.
+        Limit of the driving time in an area and its margin. Units: s.
     """
     if with_ties:
         groups = near_drives(drives)
@@ -118,14 +118,14 @@ def drives_by_areas(
     origin: np.ndarray,
     work: Callable[[Iterable[AreaInput]], list[list[AreaResult]]] = in_turn,
 ) -> Iterator[tuple[CorrectedDrive, DriveState]]:
-    """The results of drives, each merged of those of its pieces.
+    """Yield the results of drives, each merged from those of its pieces.
 
     Parameters
     ----------
     drives : sequence of FoundDrive
     areas : sequence of Area
     order, origin, work
-        As of project_drives.
+        See project_drives.
     """
     inputs = (AreaInput(area, pieces_of(drives, area), order, origin) for area in areas)
     results: dict[str, list[AreaResult]] = {drive.survey.name: [] for drive in drives}

@@ -1,4 +1,4 @@
-"""From what files hold to corrected drives: matched, estimated together, and parted again."""
+"""From findings in files to corrected drives: matched, estimated together, and split again."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -28,13 +28,13 @@ STATES = {
 
 @dataclass(frozen=True)
 class DriveState:
-    """What holds a drive.
+    """State of a drive's control and ties.
 
     Parameters
     ----------
     name : str
     state : str
-        Of STATES.
+        One of STATES.
     tied_with : dict
         Number of used ties with each other drive, and their RMS before and after (m).
     """
@@ -45,13 +45,13 @@ class DriveState:
 
 
 def found_drive(survey: Survey, files: Sequence[FileFinding]) -> FoundDrive:
-    """A drive with its matched points.
+    """Make a drive with its matched points.
 
     Parameters
     ----------
     survey : Survey
     files : sequence of FileFinding
-        Of each of its clouds.
+        Findings of its clouds.
     """
     finding, features = join_findings(survey, files)
     trajectory = survey.trajectory.scanned_at(finding.candidates.seconds)
@@ -62,13 +62,13 @@ def found_drive(survey: Survey, files: Sequence[FileFinding]) -> FoundDrive:
 def corrected_drives(
     part: JointEstimate, area: Area | None = None
 ) -> list[tuple[CorrectedSurvey, DriveState]]:
-    """The results of drives that were estimated together.
+    """Results of drives that were estimated together.
 
     Parameters
     ----------
     part : JointEstimate
     area : Area, optional
-        Of which the drives are pieces: ties elsewhere don't count.
+        Area of the pieces: ties elsewhere do not count.
     """
     joint = part.joint
     estimate = part.estimate
@@ -76,7 +76,7 @@ def corrected_drives(
     if joint.is_single and area is None:
         return [(CorrectedSurvey(**drive_fields(joint.drives[0], estimate)), states[0])]
     places = place_control(estimate)
-    # an area is no drive
+    # an area is not a drive
     if area is not None:
         section = {}
     else:
@@ -107,13 +107,13 @@ def drive_fields(drive: FoundDrive, estimate: Estimate) -> dict[str, Any]:
     ----------
     drive : FoundDrive
     estimate : Estimate
-        Of its own control points and epochs.
+        Estimate for its own control points and epochs.
     """
     return corrected_fields(drive.survey, drive.control, drive.check, drive.finding, estimate)
 
 
 def _state(part, number, area):
-    """The DriveState of one of some drives that were estimated together."""
+    """DriveState of one of several drives that were estimated together."""
     joint = part.joint
     estimate = part.estimate
     drive = part.joint.drives[number]
@@ -129,7 +129,7 @@ def _state(part, number, area):
 
 
 def _ties(part, number, area):
-    """Used ties of a drive with each other one, of those in an area."""
+    """Used ties of a drive with each other one, within an area."""
     residuals = part.estimate.ties
     shared: dict[str, dict] = {}
     if residuals is None:
@@ -151,7 +151,7 @@ def _ties(part, number, area):
 
 
 def tied_sentence(state: DriveState) -> str:
-    """A sentence on a drive's ties with others; empty without any.
+    """Sentence on a drive's ties with others; empty without any.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def tied_sentence(state: DriveState) -> str:
 
 
 def bare_survey(survey: Survey) -> Survey:
-    """A survey without what only a report needs.
+    """Return a survey without data that only a report needs.
 
     Parameters
     ----------
@@ -180,13 +180,13 @@ def bare_survey(survey: Survey) -> Survey:
 
 
 def motion_of(corrected: CorrectedSurvey, with_sigma: bool) -> MovedClouds:
-    """How a drive's clouds are moved, without what only a report needs.
+    """Motion of a drive's clouds, without data that only a report needs.
 
     Parameters
     ----------
     corrected : CorrectedSurvey
     with_sigma : bool
-        Whether points get their sigmas.
+        True if points get their sigmas.
     """
     survey = corrected.survey
     correction = corrected.estimate.correction

@@ -42,25 +42,25 @@ from mlscorr.pipeline.project.running import Run
 from mlscorr.pipeline.project.tasks import VERSION
 from mlscorr.survey import Statement
 
-STORE = "tasks"  # of the folder within the results
+STORE = "tasks"  # name of the folder within the results
 
 
 @dataclass(frozen=True)
 class Options:
-    """How a project is corrected.
+    """Options of a project's correction.
 
     Parameters
     ----------
     order, ties
-        As of mlscorr.correct.
+        See mlscorr.correct.
     sigma, page, trajectories, targets, displacement
-        As of CorrectedSurvey.write.
+        See CorrectedSurvey.write.
     workers, scheduler
-        As of mlscorr.pipeline.project.engine.engine.
+        See mlscorr.pipeline.project.engine.engine.
     resume : bool
-        Whether results that are there already are used.
+        True to use existing results.
     overwrite : bool
-        Whether what is there already may be replaced.
+        True to replace existing files.
     """
 
     order: int = 0
@@ -77,7 +77,7 @@ class Options:
 
     @property
     def additions(self) -> Additions:
-        """What clouds get beside new places."""
+        """Return the additions to clouds."""
         return Additions(self.sigma, self.displacement)
 
 
@@ -92,26 +92,26 @@ def correct_project(
     Parameters
     ----------
     path : path or ProjectParts
-        project.toml, or the folder that holds it; or what was read of it.
+        project.toml, its folder, or its contents.
     out : path
         Folder for the results: a folder of each drive, project.json, project.html, log.txt, and
         the results of tasks.
     options : Options, optional
     tell : function of a Statement
-        Is told how far it has come; ``progress_sentence`` words that.
+        Receives the progress; ``progress_sentence`` words it.
 
     Returns
     -------
     ProjectResult
-        What failed is named there.
+        It lists failures.
 
     Raises
     ------
     ValueError
-        For anything wrong in project.toml or between its drives, where the folder holds anything
-        without ``resume`` or ``overwrite``, and where no control point was found at all.
+        For faults in project.toml or between its drives, if the folder contains anything without
+        ``resume`` or ``overwrite``, or if no control point was found at all.
     OSError
-        When writing fails.
+        If writing fails.
     """
     options = options or Options()
     out = as_path(out).absolute()
@@ -135,7 +135,7 @@ def correct_project(
 
 
 def check_project_output(project: ProjectParts, out: Path, options: Options) -> None:
-    """Refuse a folder for the results that holds others, or an input."""
+    """Refuse an output folder that contains other results, or an input."""
     store = TaskStore(out / STORE)
     is_ours = is_folder(store.folder)
     if is_ours and not store.is_begun():
@@ -157,7 +157,7 @@ def check_project_output(project: ProjectParts, out: Path, options: Options) -> 
 
 @dataclass(frozen=True)
 class _Work:
-    """A run through all stages."""
+    """Run through all stages."""
 
     project: ProjectParts
     out: Path
@@ -167,12 +167,12 @@ class _Work:
 
     @property
     def ties(self) -> TieUse:
-        """Which ties are used."""
+        """Use of ties."""
         first = self.project.drives[0].parts.settings
         return self.options.ties or ("auto" if first.ties.use == "auto" else "off")
 
     def result(self) -> ProjectResult:
-        """The stages in their order."""
+        """Run the stages in order."""
         planned = self._planned()
         keys = self._estimated(planned, np.floor(planned[0].survey.trajectory.position[0]))
         clouds = self._clouds(planned, keys)
@@ -192,7 +192,7 @@ class _Work:
         return result
 
     def _planned(self) -> list[stages.PlannedDrive]:
-        """The drives with the clouds that can be read."""
+        """Drives with the readable clouds."""
         tasks = stages.tile_tasks(self.project)
         self.progress.begin("tiles", tasks)
         tiles = self.run.results(tasks)
@@ -218,7 +218,7 @@ class _Work:
         return planned
 
     def _estimated(self, planned, origin):
-        """Keys of each drive's results in the store: (corrected, motion) by its name."""
+        """Keys of each drive's results in the store: (corrected, motion) by name."""
         with_ties = self.ties != "off"
         store = self.run.store
         tasks = {d.survey.name: stages.finding_tasks(store, d, origin, with_ties) for d in planned}
@@ -238,7 +238,7 @@ class _Work:
         return keys
 
     def _estimate(self, planned, tasks, findings, keys, origin):
-        """Put each drive's results into the store."""
+        """Store each drive's results."""
         self.progress.say(Statement("drives estimated", values={"drives": len(planned)}))
         drives = []
         for drive in planned:
@@ -262,13 +262,13 @@ class _Work:
             self.run.store.put("states", key, drive_result(corrected, state))
 
     def _areas(self, key, areas):
-        """The results of each AreaInput."""
+        """Results of each AreaInput."""
         tasks = stages.area_tasks(self.run.store, key, areas)
         self.progress.begin("areas", tasks)
         return self.run.all_results(tasks)
 
     def _clouds(self, planned, keys):
-        """WrittenClouds of each drive by its name."""
+        """WrittenClouds of each drive by name."""
         tasks = stages.cloud_tasks(self.run.store, planned, keys, self.out, self.options.additions)
         every = [task for task, _ in tasks]
         self.progress.begin("clouds", every)
@@ -281,7 +281,7 @@ class _Work:
         return {name: WrittenClouds.join(own) for name, own in clouds.items()}
 
     def _reports(self, planned, keys, clouds):
-        """What each drive's report wrote, by the drive's name."""
+        """Output of each drive's report, by name of the drive."""
         store = self.run.store.folder
         page = self.options.page
         exports = self.options.trajectories, self.options.targets
@@ -295,7 +295,7 @@ class _Work:
 
 
 def _path(task):
-    """Path of the cloud that a task reads."""
+    """Path of the cloud of a task."""
     return task.arguments[0].path
 
 
@@ -309,13 +309,13 @@ def _points(survey):
 
 
 def _contents(survey):
-    """What the files of a survey are and hold; of clouds the keys of their tasks tell that."""
+    """Identity and contents of a survey's files; for clouds the keys of their tasks."""
     pairs = [(file.what, file.path) for file in survey.inputs]
     return pairs, [FileIdentity.of(path).content for what, path in pairs if what != "cloud"]
 
 
 def _is_there(store, key):
-    """Whether all of a drive's results are in the store, undamaged."""
+    """True if all of a drive's results are in the store, undamaged."""
     try:
         for kind in ("states", "motions", "corrected"):
             store.get(kind, key)

@@ -1,4 +1,4 @@
-"""project.json: what became of each drive, and what failed."""
+"""project.json: the result of each drive, and failures."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -26,13 +26,13 @@ RATINGS = {"controlled": "green", "tied": "green", "relative": "red", "uncorrect
 
 @dataclass(frozen=True)
 class DriveResult:
-    """What a project shows of a drive.
+    """Data of a drive shown by a project.
 
     Parameters
     ----------
     state : DriveState
     position_sigma : dict
-        As largest_sigma has it.
+        See largest_sigma.
     track : (k, 3) array
         Easting, northing (m) and 3D sigma (m) along the drive, NaN in its gaps.
     """
@@ -43,7 +43,7 @@ class DriveResult:
 
 
 def drive_result(corrected: CorrectedSurvey, state: DriveState) -> DriveResult:
-    """What a project shows of a drive.
+    """Make the data of a drive shown by a project.
 
     Parameters
     ----------
@@ -61,16 +61,16 @@ def drive_result(corrected: CorrectedSurvey, state: DriveState) -> DriveResult:
 
 @dataclass(frozen=True)
 class ProjectResult:
-    """What became of a project.
+    """Result of a project.
 
     Parameters
     ----------
     document : dict
-        The content of project.json.
+        Contents of project.json.
     tracks : dict
-        Track of each drive by its name, as of DriveResult.
+        Track of each drive by name; see DriveResult.
     reports : dict
-        report.json of each drive by its name.
+        report.json of each drive by name.
     """
 
     document: dict
@@ -79,20 +79,20 @@ class ProjectResult:
 
     @property
     def is_whole(self) -> bool:
-        """Whether nothing failed, and no drive and no point was left as it was."""
+        """True if nothing failed, and every drive and point was corrected."""
         left = [row["state"] == "uncorrected" for row in self.document["drives"]]
         untouched = [report["coverage"]["points_untouched"] for report in self.reports.values()]
         return not any([*self.document["faults"], *left, *untouched])
 
 
 def older_clouds(out: Path, clouds: Mapping[str, WrittenClouds]) -> list[str]:
-    """Clouds among results that an earlier run left there: of files or drives that are no more.
+    """Clouds of an earlier run among the results, for files or drives that no longer exist.
 
     Parameters
     ----------
     out : Path
     clouds : dict
-        WrittenClouds of each drive of this run, by its name.
+        WrittenClouds of each drive of this run, by name.
     """
     made = {normpath(f"{name}/{file}") for name, own in clouds.items() for file, *_ in own.files}
     there = [path for path in out.glob("*/*") if path.suffix.lower() in (".las", ".laz")]
@@ -100,14 +100,14 @@ def older_clouds(out: Path, clouds: Mapping[str, WrittenClouds]) -> list[str]:
 
 
 def older_results(store: TaskStore, reports: Sequence[Written]) -> list[str]:
-    """Files that reports of an earlier run wrote, of other results, and that none replaced.
+    """Report files of an earlier run that were not replaced.
 
     Parameters
     ----------
     store : TaskStore
-        That keeps what they wrote.
+        Store with the list of their files.
     reports : sequence of Written
-        Of this run.
+        Reports of this run.
     """
     made = {name for each in reports for name, _ in each.outputs}
     now = [each.value | {"outputs": ()} for each in reports]
@@ -127,13 +127,13 @@ def project_document(
     run: Run,
     older: Sequence[str] = (),
 ) -> ProjectResult:
-    """What became of a project.
+    """Make the result of a project.
 
     Parameters
     ----------
     project : ProjectParts
     drives : sequence of (DriveResult, dict)
-        With the report.json of each.
+        Each with its report.json.
     run : Run
     older : sequence of str
         Files of an earlier run.
@@ -162,7 +162,7 @@ def project_document(
 
 
 def _row(result, report):
-    """The row of a drive in project.json."""
+    """Row of a drive in project.json."""
     state = result.state
     control = report["control"]
     check = report["check"]
@@ -190,7 +190,7 @@ def _rmse(points, key):
 
 
 def _statements(project, rows, drives, faults):
-    """What stands first on the page: drives, control, files."""
+    """First rows of the page: drives, control, files."""
     count = {state: [row["name"] for row in rows if row["state"] == state] for state in STATES}
     held = len(count["controlled"]) + len(count["tied"])
     others = [(s, names) for s, names in count.items() if names and s != "controlled"]
@@ -231,7 +231,7 @@ def _statements(project, rows, drives, faults):
 
 
 def _minded(rows, reports):
-    """A statement on drives whose own first screen isn't green: the worst of each, red first."""
+    """Statement on drives whose own first screen is not green: the worst of each, red first."""
     doubts = [
         (row["rating"], row["name"], _reason(row, report))
         for row, report in zip(rows, reports, strict=True)
@@ -245,36 +245,36 @@ def _minded(rows, reports):
 
 
 def _reason(row, report):
-    """Why a drive is rated as it is, and the first warning of it, which may be the cause.
+    """Reason for a drive's rating, and its first warning, which may be the cause.
 
-    A result says first what the correction brought.
+    A result starts with the effect of the correction.
     """
     facts = [fact for fact in report["statements"] if fact["rating"] == row["rating"]]
     if not facts:
         return row["meaning"]
     first = facts[0]
     texts = [item["text"] for item in facts[0]["items"]]
-    # that counts them alone
+    # that only counts them
     if first["what"] == "Warnings":
         reason = ""
     else:
         reason = first["sentence"]
     if first["what"] == "Result" and texts:
-        _, *worse = texts  # after the figures
+        _, *worse = texts  # after the numbers
         reason = worse[0] if worse else facts[1]["sentence"]  # check points: none, or some missing
     warned = [fact["items"][0] for fact in report["statements"] if fact["what"] == "Warnings"]
     return " ".join([reason, *(item["text"] for item in warned)]).strip()
 
 
 def _lost(number):
-    """A statement on lost workers and schedulers, where there were any."""
+    """Statement on lost workers and schedulers, if there were any."""
     if number:
         sentence = f"Lost workers or schedulers: {number}; what they were at was done again."
         yield StatementRow("Workers", "amber", sentence)
 
 
 def _left(older):
-    """A statement on files of an earlier run, where there are any."""
+    """Statement on files of an earlier run, if there are any."""
     if older:
         sentence = (
             f"{len(older)} file{'s are' if len(older) > 1 else ' is'} left of an earlier run: of "

@@ -1,4 +1,4 @@
-"""The part of one drive in an estimate that several drives made together."""
+"""Part of one drive in a common estimate of several drives."""
 
 from dataclasses import dataclass, replace
 
@@ -13,11 +13,11 @@ from mlscorr.pos import PosErrors
 
 @dataclass(frozen=True, repr=False)
 class DriveEstimate(Estimate):
-    """What several drives tell together of one of them, in its own times."""
+    """Result of a common estimate for one of several drives, in its own times."""
 
     @property
     def alternatives(self) -> tuple[Alternative, ...]:
-        """Of the shift that drives have in common there are no other orders."""
+        """Empty, because there are no other orders of the common shift of drives."""
         return ()
 
     def _guard_warnings(self):
@@ -28,14 +28,14 @@ class DriveEstimate(Estimate):
 
 @dataclass(frozen=True, repr=False)
 class CorrectedDrive(CorrectedSurvey):
-    """A drive of several that were corrected together.
+    """One of several drives that were corrected together.
 
     Parameters
     ----------
     next_control : tuple of NextControl
-        Where more control would help all of them most, those on this drive.
+        Best positions for further control for all drives, limited to this drive.
     tie_section : dict
-        What ties did, as report.json has it.
+        Effect of ties, as in report.json.
     """
 
     next_control: tuple[NextControl, ...] = ()
@@ -43,16 +43,16 @@ class CorrectedDrive(CorrectedSurvey):
 
 
 def drive_estimate(joint: JointDrives, estimate: Estimate, number: int, note: str) -> DriveEstimate:
-    """The part of one drive in an estimate of all.
+    """Make the part of one drive in an estimate of all.
 
     Parameters
     ----------
     joint : JointDrives
     estimate : Estimate
     number : int
-        Of the drive.
+        Index of the drive.
     note : str
-        A sentence on its ties with others.
+        Sentence on its ties with others.
     """
     trajectory = joint.drives[number].survey.trajectory
     shift = joint.shifts[number]
@@ -84,7 +84,7 @@ def drive_estimate(joint: JointDrives, estimate: Estimate, number: int, note: st
 
 
 def _cut(correction, trajectory, shift):
-    """The Correction of a drive's epochs, and the way before these (m)."""
+    """Correction of a drive's epochs, and distance along the path before these (m)."""
     whole = correction.corrected
     first, last = np.searchsorted(whole.gps_time, trajectory.gps_time[[0, -1]] + shift)
     rows = slice(first, last + 1)
@@ -96,7 +96,7 @@ def _cut(correction, trajectory, shift):
 
 
 def _adjustment(adjustment, rows, trajectory, shift):
-    """The Adjustment of a drive's own control points, in its own times."""
+    """Adjustment of a drive's own control points, in its own times."""
     targets = adjustment.targets
     if len(rows):
         targets = targets.select(rows)
@@ -123,7 +123,7 @@ def _ties(joint, residuals, number):
 
 
 def _held(support, trajectory, shift, chainage):
-    """The Support of a drive, in its own times and along its own way."""
+    """Support of a drive, in its own times and along its own path."""
     first, last = trajectory.gps_time[[0, -1]]
 
     def inside(start, end):

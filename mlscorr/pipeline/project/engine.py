@@ -1,4 +1,4 @@
-"""Who works on tasks: this process, processes of this machine, or a cluster of others."""
+"""Execution of tasks: in this process, in local processes, or in a cluster."""
 
 import ctypes
 import multiprocessing
@@ -21,21 +21,21 @@ LARGE_ARRAY = 1 << 20  # B; glibc keeps freed ones of up to 32 MB: 0.15 GB after
 
 
 class Loop:
-    """No process but this, one call after the other: what loses it ends the run."""
+    """Only this process, one call after the other: its loss ends the run."""
 
     width = 1
     lost = 0
     losses = ()
 
     def submit(self, function: Callable, *arguments: object) -> Future:
-        """A Future that is done."""
+        """Return a completed Future."""
         future: Future = Future()
         future.set_result(function(*arguments))
         return future
 
 
 class Processes:
-    """Processes of this machine, which are started anew where one is lost.
+    """Local processes, which are restarted if one is lost.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class Processes:
         self._others = {*multiprocessing.active_children()}
 
     def submit(self, function: Callable, *arguments: object) -> Future:
-        """The Future of a call."""
+        """Return the Future of a call."""
         try:
             return self._pool().submit(function, *arguments)
         except BrokenProcessPool:
@@ -62,44 +62,44 @@ class Processes:
 
     def _pool(self):
         if self._executor is None:
-            context = multiprocessing.get_context("spawn")  # a fork may inherit held locks
+            context = multiprocessing.get_context("spawn")  # a forked process may inherit locks
             self._executor = ProcessPoolExecutor(
                 self.width, context, _start_worker, (temporary_folder(),)
             )
         return self._executor
 
     def close(self) -> None:
-        """End the processes, whatever they are at."""
+        """End the processes immediately."""
         if self._executor is not None:
             self._executor.shutdown(wait=False, cancel_futures=True)
             self._executor = None
             for process in {*multiprocessing.active_children()} - self._others:
-                process.terminate()  # what it is at is whole or not there
+                process.terminate()  # its current output is complete or absent
                 process.join()
 
 
 def _in_single_threads(function, *arguments):
-    """The result of a call in a worker that others started; libraries read this at their start."""
+    """Result of a call in a worker started by others; libraries read this at their start."""
     for name in THREADS:
         os.environ.setdefault(name, "1")
     return function(*arguments)
 
 
 def _start_worker(folder):
-    """Leave interruptions to the process that waits for this one, and end with it.
+    """Ignore interruptions in a worker, leave them to the parent, and end with it.
 
-    What it keeps for a while goes into that one's folder, which goes however this one ends. Large
-    arrays' memory returns to the system at once, as dask has it, too.
+    Temporary data go into the parent's folder, which is removed however this process ends. Memory
+    of large arrays returns to the system at once, as with dask.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     tempfile.tempdir = folder
-    with suppress(AttributeError, OSError, TypeError):  # a C library that isn't GNU's
+    with suppress(AttributeError, OSError, TypeError):  # a C library other than GNU's
         ctypes.CDLL(None).mallopt(-3, LARGE_ARRAY)  # M_MMAP_THRESHOLD of malloc.h
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
 def _end_with_parent():
-    """End this process when the one that waits for it was killed: nobody else would."""
+    """End this process if its parent was killed, because nobody else would."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()
@@ -112,16 +112,16 @@ class Cluster:
     Parameters
     ----------
     scheduler : str
-        Its address.
+        Address of the scheduler.
     tell : function of a Statement
-        Is told when there is something to wait for.
+        Receives statements on waiting.
 
     Raises
     ------
     ValueError
-        Where no scheduler answers there, or no worker comes: both in dask's time to connect.
+        If no scheduler answers, or no worker connects, within dask's time to connect.
     ImportError
-        Without the extra ``cluster``.
+        If the extra ``cluster`` is missing.
     """
 
     def __init__(self, scheduler: str, tell: Callable[[Statement], object]) -> None:
@@ -151,7 +151,7 @@ class Cluster:
                 f"some, as dask worker {scheduler} --nworkers 8 --nthreads 1, let its cluster "
                 f"scale, or wait for longer: {LONGER} in the environment."
             ) from None
-        # tried in vain again and again
+        # repeated attempts failed
         self.lost = 0
         self.losses = (KilledWorker,)
         self._calls: WeakSet[Future] = WeakSet()
@@ -161,19 +161,19 @@ class Cluster:
 
     @property
     def width(self) -> int:
-        """Threads that its workers have now: a cluster grows and shrinks while it works.
+        """Current number of worker threads: a cluster grows and shrinks while it works.
 
         Raises
         ------
         CancelledError
-            Where the scheduler ended, and none answered at its address in dask's time to connect.
+            If the scheduler ended, and none answered at its address within dask's time to connect.
         """
         is_lost = False
         while self._client.status in ("running", "connecting"):
             if not is_lost and self._client.status == "connecting":
                 is_lost = True
                 self._tell(Statement("scheduler lost", values=self._waiting))
-            # That it ended may not be known yet, else this waits for it; or dask just gives up
+            # Its end may not be known yet, and then this waits for it; or dask just gives up
             with suppress(OSError, AttributeError, RuntimeError):
                 threads = sum(self._client.nthreads().values())
                 if self._client.status == "running":
@@ -182,33 +182,37 @@ class Cluster:
         raise CancelledError
 
     def _renew(self):
-        """After another connection cancel calls of the one before: some may never end else."""
+        """After another connection, cancel calls of the previous one, some of which may never
+        end.
+        """
         if self._client.scheduler_comm is not self._connection:
             for call in [call for call in self._calls if not call.done()]:
                 call.cancel()
-                call.set_running_or_notify_cancel()  # wakes who waits; else RuntimeError: it ended
+                call.set_running_or_notify_cancel()  # wakes waiters; else RuntimeError: it ended
             self._connection = self._client.scheduler_comm
             self._client.subscribe_topic("all", self._count)
             self.lost += 1
             self._tell(Statement("scheduler back"))
 
     def submit(self, function: Callable, *arguments: object) -> Future:
-        """The Future of a call; cancelled where the connection to the scheduler ends before it."""
+        """Return the Future of a call; canceled if the connection to the scheduler ends before
+        it.
+        """
         call = self._executor.submit(_in_single_threads, function, *arguments)
         self._calls.add(call)
         return call
 
     def _count(self, event):
-        """Count a worker that nobody sent away; the scheduler tells what happens."""
+        """Count an unexpectedly lost worker, as reported by the scheduler."""
         fact = event[1]
         self.lost += fact.get("action") == "remove-worker" and not fact.get("expected", False)
 
     def close(self) -> None:
-        """Leave the cluster as it is."""
+        """Leave the cluster unchanged."""
         self._client.close()
 
 
-# Works on calls, ``width`` at a time; one of ``losses`` tells that it lost a worker by a call.
+# Works on calls, ``width`` at a time; ``losses`` are the errors of a worker lost during a call.
 Engine = Loop | Processes | Cluster
 
 
@@ -216,23 +220,23 @@ Engine = Loop | Processes | Cluster
 def engine(
     workers: int = 1, scheduler: str | None = None, tell: Callable[[Statement], object] = str
 ) -> Iterator[Engine]:
-    """The engine that is asked for.
+    """Open the requested engine.
 
     Parameters
     ----------
     workers : int
-        Processes of this machine; one is this process itself.
+        Number of local processes; one is this process itself.
     scheduler : str, optional
-        Address of a cluster's.
+        Address of a cluster's scheduler.
     tell : function of a Statement
-        As of Cluster.
+        See Cluster.
 
     Raises
     ------
     ValueError
-        Where both are given, and as of Cluster.
+        If both are given; see also Cluster.
     ConnectionError
-        When the scheduler ends before its calls, and isn't started again.
+        If the scheduler ends before its calls, and is not restarted.
     """
     check_engine(workers, scheduler)
     if scheduler is None and workers == 1:
@@ -243,7 +247,7 @@ def engine(
     else:
         chosen = Cluster(scheduler, tell)
     before = {name: value for name, value in os.environ.items() if name in THREADS}
-    os.environ.update(dict.fromkeys(THREADS, "1"))  # of the processes that are started from here
+    os.environ.update(dict.fromkeys(THREADS, "1"))  # of processes started from here
     try:
         yield chosen
     except CancelledError:  # of calls that no scheduler knows any more
@@ -259,12 +263,12 @@ def engine(
 
 
 def check_engine(workers: int, scheduler: str | None) -> None:
-    """Refuse workers of this machine and of a cluster together.
+    """Refuse local workers together with a cluster.
 
     Parameters
     ----------
     workers, scheduler
-        As of engine.
+        See engine.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What touches points: pure functions of one file and small values, whose results are files."""
+"""Tasks on points: pure functions of one file and small values, with files as results."""
 
 import shutil
 from collections.abc import Collection, Sequence
@@ -24,15 +24,15 @@ from mlscorr.survey import CloudFile, ControlPoints, Survey, Trajectory
 
 @dataclass(frozen=True)
 class Tile:
-    """A cloud file by its header.
+    """Cloud file described by its header.
 
     Parameters
     ----------
     file : CloudFile
     note : str
-        On its times.
+        Note on its times.
     box : (2, 3) array
-        Corners that its header states. Units: m.
+        Corners in its header. Units: m.
     """
 
     file: CloudFile
@@ -42,7 +42,7 @@ class Tile:
 
 @dataclass(frozen=True)
 class TileOwner:
-    """A drive that has points in a cloud file.
+    """Drive with points in a cloud file.
 
     Parameters
     ----------
@@ -50,9 +50,9 @@ class TileOwner:
     ends : Trajectory
         Its first and last epoch.
     system, crs, noise_classes
-        As of cloud_file.
+        See cloud_file.
     ids : tuple of int or None
-        The point_source_ids of its points; None where all points of the file are its.
+        The point_source_ids of its points; None if it has all points of the file.
     """
 
     name: str
@@ -64,18 +64,18 @@ class TileOwner:
 
 
 def read_tile(path: Path, owners: Sequence[TileOwner]) -> dict[str, Tile]:
-    """A cloud file by its header, and by some of its times, for each drive with points in it.
+    """Read a cloud file's header and some of its times, for each drive with points in it.
 
     Parameters
     ----------
     path : Path
     owners : sequence of TileOwner
-        One without ids, or some with different ones.
+        One without IDs, or several with different ones.
 
     Raises
     ------
     ValueError
-        As of cloud_file, and for points of no drive.
+        See cloud_file; also for points without a drive.
     """
     layout = read_layout(path)
     box = cloud_box(layout)
@@ -103,15 +103,15 @@ def read_tile(path: Path, owners: Sequence[TileOwner]) -> dict[str, Tile]:
 
 
 def refuse(drive: str, ids: Sequence[int], files: Sequence[CloudFile]) -> None:
-    """Say that a drive has no points: the task of such a drive.
+    """Raise the error of a drive without points, as the task of such a drive.
 
     Parameters
     ----------
     drive : str
     ids : sequence of int
-        The point_source_ids that none of its files has.
+        The point_source_ids missing in all of its files.
     files : sequence of CloudFile
-        What its files have of other drives.
+        Parts of its files that belong to other drives.
 
     Raises
     ------
@@ -128,7 +128,7 @@ def refuse(drive: str, ids: Sequence[int], files: Sequence[CloudFile]) -> None:
 
 @lru_cache(maxsize=SETTINGS.cached)
 def _kept(folder: Path, kind: str, key: str) -> Any:
-    """A result that many tasks need."""
+    """Result that many tasks need, cached."""
     return TaskStore(folder).get(kind, key)
 
 
@@ -141,21 +141,21 @@ def find(
     origin: np.ndarray,
     with_ties: bool,
 ) -> FileFinding:
-    """What a cloud file holds.
+    """Find targets and ties in a cloud file.
 
     Parameters
     ----------
     file : CloudFile
     folder : Path
-        Of the store.
+        Folder of the store.
     drive : str
-        Key of the drive's Survey there, without surveyed points.
+        Key of the drive's Survey in the store, without surveyed points.
     identity : FileIdentity
-        Of the file when its task was planned.
+        Identity of the file when its task was planned.
     surveyed : ControlPoints
-        Near the file.
+        Points near the file.
     origin : (3,) array
-        As of find_in_file. Units: m.
+        See find_in_file. Units: m.
     with_ties : bool
     """
     survey: Survey = _kept(folder, "drives", drive)
@@ -166,7 +166,7 @@ def find(
 
 
 def _check_same(path, identity):
-    """Refuse a file that changed since its task was planned."""
+    """Refuse a file that changed after its task was planned."""
     if FileIdentity.of(path) != identity:
         raise OSError(
             f"{path} was replaced or changed while it was read: another program may still be "
@@ -182,21 +182,21 @@ def write(
     target: Path,
     additions: Additions,
 ) -> Written:
-    """Write the corrected copy of a file, whole or not at all.
+    """Write the corrected copy of a file atomically.
 
     Parameters
     ----------
     folder : Path
-        Of the store.
+        Folder of the store.
     motions : tuple of str
-        Key there of the MovedClouds of each drive that has points in the file.
+        Keys of the MovedClouds of each drive with points in the file.
     path : Path
     identity : FileIdentity
-        Of the file when its task was planned.
+        Identity of the file when its task was planned.
     target : Path
         Folder of the results.
     additions : Additions
-        What the files get beside new places.
+        Additions to the files.
     """
     kept = [_kept(folder, "motions", key) for key in motions]
     drives = [replace(each, survey=_of_file(each.survey, path)) for each in kept]
@@ -207,7 +207,7 @@ def write(
 
 
 def with_clouds(survey: Survey, clouds: Collection[CloudFile]) -> Survey:
-    """A survey with some of its clouds alone.
+    """Return a survey with only some of its clouds.
 
     Parameters
     ----------
@@ -222,14 +222,14 @@ def with_clouds(survey: Survey, clouds: Collection[CloudFile]) -> Survey:
 
 
 def _of_file(survey, path):
-    """The survey of one of its files."""
+    """Survey of one of its files."""
     survey = with_clouds(survey, [file for file in survey.clouds if file.path == path])
     return replace(survey, scanners=tuple(m for m in survey.scanners if m.clouds))
 
 
 @contextmanager
 def _moved_into(store, target):
-    """A folder whose files go into another one when all are whole; and what becomes of them."""
+    """Temporary folder whose files are moved into another one when complete, and their fate."""
     outputs: list[tuple[str, FileIdentity]] = []
     with TaskStore(store).part() as part:
         part.mkdir()
@@ -247,21 +247,21 @@ def _moved_into(store, target):
 
 @dataclass(frozen=True)
 class ReportInput:
-    """Which drive is reported on.
+    """Input of a drive's report.
 
     Parameters
     ----------
     folder : Path
-        Of the store.
+        Folder of the store.
     corrected : str
-        Key of the CorrectedSurvey there.
+        Key of the CorrectedSurvey in the store.
     written : WrittenClouds
-        Of all its files.
+        Clouds of all its files.
     target : Path
         Folder of the drive's results.
     page : bool
     trajectories, targets : tuple of str
-        As of CorrectedSurvey.write.
+        See CorrectedSurvey.write.
     """
 
     folder: Path
@@ -274,7 +274,7 @@ class ReportInput:
 
 
 def report(inputs: ReportInput) -> Written:
-    """Write all of a drive's results but its clouds.
+    """Write all results of a drive except its clouds.
 
     Parameters
     ----------

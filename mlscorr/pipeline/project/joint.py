@@ -1,6 +1,6 @@
-"""Drives as one survey: one trajectory, times made distinct, passes counted over all.
+"""Several drives as one survey: one trajectory, distinct times, passes numbered over all.
 
-Drives near each other are estimated together; those that ties don't join keep their own estimate.
+Nearby drives are estimated together; those without ties keep their own estimate.
 """
 
 from collections.abc import Sequence
@@ -31,7 +31,7 @@ from mlscorr.ties import SETTINGS as TIES
 
 @dataclass(frozen=True)
 class FoundDrive:
-    """A drive and what its files hold.
+    """Drive and the findings in its files.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class FoundDrive:
         With the surveyed points near its clouds.
     finding : MatchedTargets
     features : TieFeatures
-        With the numbers of its passes.
+        With its pass numbers.
     control, check : Matched
     """
 
@@ -57,16 +57,16 @@ class FoundDrive:
 
 @dataclass(frozen=True)
 class JointDrives:
-    """Drives as one survey.
+    """Several drives as one survey.
 
     Parameters
     ----------
     drives : tuple of FoundDrive
         In the order of their times in the joint survey.
     shifts : (k,) array
-        Whole weeks that make times distinct: joint = recorded + shift. Units: s.
+        Whole weeks added to make times distinct: joint = recorded + shift. Units: s.
     survey : Survey
-        With the trajectory of all, without clouds.
+        With the common trajectory, without clouds.
     """
 
     drives: tuple[FoundDrive, ...]
@@ -75,26 +75,26 @@ class JointDrives:
 
     @property
     def is_single(self) -> bool:
-        """Whether it is one drive as it stands."""
+        """True if it is one unchanged drive."""
         return self.survey is self.drives[0].survey
 
     @property
     def bases(self) -> np.ndarray:
-        """Number (k,) of the passes before those of each drive."""
+        """Number (k,) of passes before those of each drive."""
         return np.cumsum([0, *(drive.passes for drive in self.drives[:-1])])
 
     def drive_numbers(self, pass_number: np.ndarray) -> np.ndarray:
-        """Number of the drive of each pass, from 0.
+        """Index of the drive of each pass, from 0.
 
         Parameters
         ----------
         pass_number : int array
-            Of the joint survey.
+            Passes of the joint survey.
         """
         return np.searchsorted(self.bases, pass_number - 1, side="right") - 1
 
     def control(self) -> Matched:
-        """The matched control points of all drives."""
+        """Matched control points of all drives."""
         observed = [
             replace(
                 drive.control.observations,
@@ -114,7 +114,7 @@ class JointDrives:
         Parameters
         ----------
         origin : (3,) array
-            As they were found with. Units: m.
+            Origin used when they were found. Units: m.
         """
         names = list(self.survey.by_scanner)
         parts = []
@@ -134,7 +134,7 @@ class JointDrives:
 
 
 def join_drives(drives: Sequence[FoundDrive]) -> JointDrives:
-    """Drives as one survey.
+    """Join drives to one survey.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def join_drives(drives: Sequence[FoundDrive]) -> JointDrives:
 
 
 def _scanners(surveys):
-    """The scanners of all drives by their names; none where each drive has one."""
+    """Scanners of all drives by name; empty if each drive has one."""
     if not any(survey.scanners for survey in surveys):
         return ()
     parts = {n: part for survey in surveys[::-1] for n, part in survey.by_scanner.items()}
@@ -179,9 +179,9 @@ def _scanners(surveys):
 
 
 def distinct_times(trajectories: Sequence[Trajectory]) -> np.ndarray:
-    """Whole weeks (k,) that must be added to times, so that no two drives share any. Units: s.
+    """Whole weeks (k,) to add to times, so that no two drives share any. Units: s.
 
-    Two vehicles drive at the same time, and seconds of the week come again.
+    Two vehicles may drive at the same time, and seconds of week repeat.
 
     Parameters
     ----------
@@ -201,16 +201,16 @@ def distinct_times(trajectories: Sequence[Trajectory]) -> np.ndarray:
 
 @dataclass(frozen=True)
 class JointEstimate:
-    """Drives that ties hold together, and the estimate of all of them.
+    """Drives connected by ties, and their common estimate.
 
     Parameters
     ----------
     joint : JointDrives
-        With drives beside these, which nothing ties to them.
+        Also includes drives without ties to them.
     estimate : Estimate
-        Of all of the joint drives.
+        Estimate of all joint drives.
     names : set of str
-        Of the drives that hold together.
+        Names of the connected drives.
     """
 
     joint: JointDrives
@@ -221,18 +221,19 @@ class JointEstimate:
 def estimate_group(
     group: Sequence[FoundDrive], order: int, origin: np.ndarray, with_ties: bool
 ) -> list[JointEstimate]:
-    """The POS errors of drives near each other, of those together that ties join.
+    """Estimate the POS errors of nearby drives, together if ties connect them.
 
-    Where ties part them, those with all of the control keep their estimate, which the others have
-    not moved. These are estimated anew, without a shift in common with control that isn't theirs.
+    If ties form separate groups, the group with all of the control keeps the estimate, which the
+    others did not affect. The others are estimated again, without a common shift from foreign
+    control.
 
     Parameters
     ----------
     group : sequence of FoundDrive
     order : int
-        Of the trend of a drive by itself; drives together have a shift in common.
+        Order of the trend of a single drive; several drives have a common shift.
     origin : (3,) array
-        Of planes and poles. Units: m.
+        Origin of planes and poles. Units: m.
     with_ties : bool
     """
     joint = join_drives(group)
@@ -253,7 +254,7 @@ def estimate_group(
 
 
 def _tied(joint, estimate):
-    """Lists of the drives that used ties join."""
+    """Lists of drives connected by used ties."""
     number = len(joint.drives)
     pairs = np.empty((2, 0), int)
     if estimate.ties is not None:
@@ -263,7 +264,7 @@ def _tied(joint, estimate):
 
 
 def near_drives(drives: Sequence[FoundDrive]) -> list[list[FoundDrive]]:
-    """Lists of drives whose planes and poles lie within the search radius, or about so.
+    """Lists of drives whose planes and poles are approximately within the search radius.
 
     Parameters
     ----------
@@ -285,6 +286,6 @@ def near_drives(drives: Sequence[FoundDrive]) -> list[list[FoundDrive]]:
 
 
 def _grouped(drives, labels):
-    """Lists of drives of one label each, in the order of their first."""
+    """Lists of drives with the same label, in order of their first."""
     groups = [np.flatnonzero(labels == label) for label in dict.fromkeys(labels.tolist())]
     return [[drives[number] for number in group] for group in groups]

@@ -1,7 +1,7 @@
-"""A drive through several areas: what each tells of it, as one result.
+"""Drive through several areas: their results merged.
 
-Corrections are averaged by weights of the place, so that two visits of a place move alike. What is
-said of a moment, a control point or a tie is said by the area in which it lies.
+Corrections are averaged with position-dependent weights, so that two visits of a place move alike.
+Results for a moment, a control point or a tie come from the area that contains it.
 """
 
 from __future__ import annotations
@@ -34,17 +34,17 @@ from mlscorr.survey import Ties, Trajectory
 
 @dataclass(frozen=True)
 class AreaResult:
-    """What an area tells of a drive.
+    """Result of an area for a drive.
 
     Parameters
     ----------
     area : Area
     rows, control : bool array
-        Of which of the drive's epochs and observations of control points, as of Piece.
+        Selected epochs and observations of control points of the drive; see Piece.
     corrected : CorrectedDrive
-        These epochs.
+        Corrected epochs.
     estimate : DriveEstimate
-        Of these, without covariances.
+        Estimate of these, without covariances.
     state : DriveState
     """
 
@@ -59,7 +59,7 @@ class AreaResult:
     def of(
         cls, area: Area, piece: Piece, corrected: CorrectedDrive, state: DriveState
     ) -> AreaResult:
-        """The result of a piece of a drive."""
+        """Make the result of a piece of a drive."""
         estimate = corrected.estimate
         assert isinstance(estimate, DriveEstimate)
         bare = replace(estimate, correction=replace(estimate.correction, covariance=None))
@@ -70,13 +70,13 @@ class AreaResult:
 def merged_drive(
     drive: FoundDrive, parts: Sequence[AreaResult]
 ) -> tuple[CorrectedDrive, DriveState]:
-    """A drive as one, and what holds it.
+    """Merge a drive, and its state.
 
     Parameters
     ----------
     drive : FoundDrive
     parts : sequence of AreaResult
-        Of all areas through which it comes.
+        Results of all areas that it crosses.
     """
     position = drive.survey.trajectory.position
     home = np.array([part.area.contains(position) for part in parts])
@@ -92,7 +92,7 @@ def merged_drive(
 
 
 def _estimate(drive, parts, home, main):
-    """The DriveEstimate of a drive; what is of no moment is that of its main area."""
+    """DriveEstimate of a drive; time-independent parts come from its main area."""
     survey = drive.survey
     correction = _averaged(survey.trajectory, parts)
     used, left_out = _control(drive, parts, home)
@@ -127,10 +127,10 @@ def _estimate(drive, parts, home, main):
 
 
 def _averaged(trajectory: Trajectory, parts: Sequence[AreaResult]) -> Correction:
-    """The Correction by those of all areas; its sigmas are averaged, as if they erred alike."""
+    """Correction averaged over all areas; sigmas are averaged as for fully correlated errors."""
     n = len(trajectory)
     total = np.zeros(len(trajectory))
-    mean = np.zeros((n, 12))  # change, turn, sigmas of position and attitude
+    mean = np.zeros((n, 12))  # change, rotation, sigmas of position and attitude
     for part in parts:
         old = part.estimate.correction.recorded
         new = part.estimate.correction.corrected
@@ -151,13 +151,13 @@ def _averaged(trajectory: Trajectory, parts: Sequence[AreaResult]) -> Correction
 
 
 def _epochs(drive, gps_time):
-    """Numbers of the epochs at or after times."""
+    """Indices of the epochs at or after times."""
     known = drive.survey.trajectory.gps_time
     return np.clip(np.searchsorted(known, gps_time), 0, len(known) - 1)
 
 
 def _control(drive, parts, home):
-    """Which observations of control points took part (m,), and what they leave (m, 3) left out."""
+    """Flag (m,) of used observations of control points, and leave-one-out residuals (m, 3)."""
     at = _epochs(drive, drive.control.gps_time)
     used = np.zeros(len(at), bool)
     left_out = np.full((len(at), 3), np.nan)
@@ -184,7 +184,7 @@ def _ties(parts, correction):
 
 
 def _support(parts, home, corrected):
-    """The Support of a drive."""
+    """Support of a drive."""
     time = corrected.gps_time
     codes = np.full(len(corrected), HELD)
     for part, is_home in zip(parts, home, strict=True):
@@ -200,7 +200,7 @@ def _support(parts, home, corrected):
 
 
 def _places(drive, parts, home):
-    """Where one more control point each would help most, the best first; as many as of an area."""
+    """Best positions for one more control point each, as many as for an area."""
     places = [
         place
         for part, is_home in zip(parts, home, strict=True)
@@ -212,7 +212,7 @@ def _places(drive, parts, home):
 
 
 def _state(parts, home, used):
-    """The DriveState of a drive: without control of its own as of the area that holds it least."""
+    """DriveState of a drive; without its own control that of the least constrained area."""
     order = list(STATES)
     least = max(
         order.index(part.state.state)
@@ -227,7 +227,7 @@ def _state(parts, home, used):
 
 
 def _joined(rows):
-    """Numbers of ties and their RMS before and after, by those of some areas."""
+    """Numbers of ties and their RMS before and after, from those of several areas."""
     number = np.array([row["n"] for row in rows])
 
     def rms(key):
@@ -237,5 +237,5 @@ def _joined(rows):
 
 
 def _distinct(parts):
-    """Sentences of some parts, each once."""
+    """Sentences of several parts, each once."""
     return tuple(dict.fromkeys(text for part in parts for text in part))

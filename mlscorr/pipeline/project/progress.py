@@ -1,4 +1,4 @@
-"""How far a project has come: sentences at intervals, a log, and what status reads."""
+"""Progress of a project: sentences at intervals, a log, and data for status."""
 
 import json
 from collections.abc import Callable, Iterator, Sequence
@@ -18,13 +18,13 @@ from mlscorr.survey import Statement
 
 @dataclass
 class Progress:
-    """Counts tasks and tells how far they have come.
+    """Counter of tasks that reports progress.
 
     Parameters
     ----------
     log : text stream
     plan : Path
-        Where the tasks of each stage are listed, for status.
+        List of the tasks of each stage, for status.
     tell : function of a Statement
     """
 
@@ -46,12 +46,12 @@ class Progress:
         print(now, " ".join(text.split()), file=self.log, flush=True)
 
     def say(self, statement: Statement) -> None:
-        """Tell a statement, and write its sentence into the log.
+        """Report a statement, and write its sentence into the log.
 
         Parameters
         ----------
         statement : Statement
-            Of a key of PROGRESS.
+            With a key of PROGRESS.
         """
         self.note(progress_sentence(statement))
         self.tell(statement)
@@ -75,7 +75,7 @@ class Progress:
         self.due = monotonic() + SETTINGS.interval
 
     def ended(self, outcome: Outcome) -> None:
-        """Count a task that ended; its warnings and its fault are told.
+        """Count a finished task, and report its warnings and fault.
 
         Parameters
         ----------
@@ -100,11 +100,11 @@ class Progress:
             self.say(self._stage_progress(task.kind))
 
     def _stage_progress(self, kind):
-        """How far a stage has come, its rate, and the time that is left."""
+        """Progress of a stage, its rate, and the remaining time."""
         counts = self.counts
         tasks = self.stages[kind]
         total = sum(max(task["points"], 1) for task in tasks)
-        rate = counts["worked"] / (monotonic() - counts["start"])  # what was there took no time
+        rate = counts["worked"] / (monotonic() - counts["start"])  # existing results took no time
         left = None
         if rate:
             left = (total - counts["points"]) / rate
@@ -123,13 +123,13 @@ class Progress:
 
 @contextmanager
 def logged(log: Path, plan: Path, tell: Callable[[Statement], object]) -> Iterator[Progress]:
-    """Progress with its log; what ends the run early stands there, too.
+    """Open Progress with its log, which also records an early end of the run.
 
     Parameters
     ----------
     log : Path
     plan, tell
-        As of Progress.
+        See Progress.
     """
     with telling_space(log.parent), appended(log) as stream:
         progress = Progress(stream, plan, tell)

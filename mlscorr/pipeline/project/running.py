@@ -1,4 +1,4 @@
-"""Tasks to their ends: those whose results are there are left, lost workers' are tried again."""
+"""Running tasks: existing results are used, tasks of lost workers are repeated."""
 
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
@@ -20,13 +20,13 @@ FAILED = "{} of {} parts needed together failed ({}): {.fault} --resume works on
 
 
 def present(store: TaskStore, kind: str, key: str) -> tuple[Any, tuple[str, ...]] | None:
-    """The result of a task with its warnings; None where it, or what it wrote, lacks or is damaged.
+    """Result of a task with its warnings; None if it, or its output, is missing or damaged.
 
     Parameters
     ----------
     store : TaskStore
     kind, key : str
-        Of the task.
+        Kind and key of the task.
     """
     try:
         result, texts = store.get(kind, key)
@@ -39,18 +39,18 @@ def present(store: TaskStore, kind: str, key: str) -> tuple[Any, tuple[str, ...]
 
 @dataclass
 class Run:
-    """Works on tasks and counts what happens.
+    """Runner of tasks that counts events.
 
     Parameters
     ----------
     store : TaskStore
     engine : Engine
     watch : function of an Outcome
-        Is told of each task that ended.
+        Receives each finished task.
     tell : function of a Statement
-        Is told of tasks that lost their worker.
+        Receives statements on tasks that lost their worker.
     faults : list of Outcome
-        Of tasks without a result.
+        Outcomes of tasks without a result.
     """
 
     store: TaskStore
@@ -60,12 +60,12 @@ class Run:
     faults: list[Outcome] = field(default_factory=list)
 
     def results(self, tasks: Sequence[Task]) -> dict[str, Any]:
-        """Results by the names of their tasks; those that fail are among the faults, not here.
+        """Return results by name of the task; failed ones are among the faults instead.
 
         Parameters
         ----------
         tasks : sequence of Task
-            Of distinct names.
+            With distinct names.
         """
         results: dict[str, Any] = {}
         rest = []
@@ -85,17 +85,17 @@ class Run:
         return {task.name: results[task.name] for task in tasks if task.name in results}
 
     def all_results(self, tasks: Sequence[Task]) -> list[Any]:
-        """Results of tasks of which none can be spared, in their order.
+        """Return results of tasks that are all required, in order.
 
         Parameters
         ----------
         tasks : sequence of Task
-            Of distinct names.
+            With distinct names.
 
         Raises
         ------
         ValueError
-            Where some fail; says which.
+            If some fail; the message lists them.
         """
         results = self.results(tasks)
         if left := [task.name for task in tasks if task.name not in results]:
@@ -103,7 +103,7 @@ class Run:
         return list(results.values())
 
     def _outcomes(self, tasks) -> Iterator[Outcome]:
-        """The Outcome of each task, as they end; long ones are begun first, so that all workers
+        """Yield the Outcome of each finished task; long ones start first, so that all workers
         end at about the same time.
         """
         waiting = deque(sorted(tasks, key=lambda task: -task.points - task.near_points))
@@ -111,9 +111,9 @@ class Run:
         running = {}
         losses: Counter[tuple[str, bool]] = Counter()
         while waiting or suspects or running:
-            is_single = bool(suspects)  # what loses workers is tried by itself: it may be to blame
+            is_single = bool(suspects)  # a suspected cause of lost workers runs alone
             source = suspects if is_single else waiting
-            width = self.engine.width  # a cluster that restarts is waited for here, in any case
+            width = self.engine.width  # waits for a restarting cluster, in any case
             limit = 1 if is_single else SETTINGS.waiting * width
             while source and len(running) < limit:
                 task = source.popleft()
@@ -123,7 +123,7 @@ class Run:
                 task, was_single = running.pop(future)
                 try:
                     yield Outcome(task, *future.result())
-                except CancelledError:  # with the connection to a scheduler: no task is to blame
+                except CancelledError:  # with the connection to a scheduler: not caused by a task
                     self.tell(Statement("task lost with scheduler", values={"task": task.name}))
                     (suspects if was_single else waiting).appendleft(task)
                 except self.engine.losses:
@@ -132,5 +132,5 @@ class Run:
                     is_first = losses[task.name, False] == 1 and not was_single
                     if losses[task.name, True] >= SETTINGS.losses:
                         yield Outcome(task, LOSS.format(SETTINGS.losses))
-                    else:  # all that were at work lose theirs with the one that is to blame
+                    else:  # all running tasks lose their workers together with the culprit
                         (waiting if is_first else suspects).append(task)

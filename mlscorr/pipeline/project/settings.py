@@ -1,4 +1,4 @@
-"""Numbers that projects rest on."""
+"""Settings of projects."""
 
 from dataclasses import dataclass
 
@@ -7,11 +7,11 @@ from dataclasses import dataclass
 class Settings:
     """Limits and choices, each with its unit and reason."""
 
-    losses: int = 2  # times that a task may lose its worker before it is to blame; guard
-    waiting: int = 2  # tasks handed out for each worker: the next is there when one ends; guard
-    area_seconds: int = 6_500  # that drives spend in an area and its margin: 2 GB, minutes; guard
-    interval: float = 10.0  # s between two lines on progress, and looks at a cluster; guard
-    cached: int = 2  # drives that a worker holds: that of this task, and of the one before; guard
+    losses: int = 2  # times that a task may lose its worker before it is blamed; guard
+    waiting: int = 2  # tasks assigned to each worker: the next is ready when one ends; guard
+    area_seconds: int = 6_500  # of drives in an area and its margin: 2 GB, minutes; guard
+    interval: float = 10.0  # s between two progress lines, and checks of a cluster; guard
+    cached: int = 2  # drives cached by a worker: current and previous task; guard
 
 
 SETTINGS = Settings()

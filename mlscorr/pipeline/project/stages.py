@@ -1,4 +1,4 @@
-"""The tasks of a project: which there are, and what the result of each depends on."""
+"""Tasks of a project, and the dependencies of their results."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from mlscorr.wording import counted
 
 
 def tile_tasks(project: ProjectParts) -> list[Task]:
-    """Tasks that read the headers of all clouds, each once.
+    """Make the tasks that read the headers of all clouds, each once.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def tile_tasks(project: ProjectParts) -> list[Task]:
     for path, own in tiles.values():
         try:
             identity = FileIdentity.of(path)
-        except OSError:  # its task says why
+        except OSError:  # its task reports the reason
             identity = None
         key = digest(VERSION, identity, path, own)
         folder = _folder(own)
@@ -51,13 +51,13 @@ def tile_tasks(project: ProjectParts) -> list[Task]:
 
 
 def refusals(project: ProjectParts, read: Sequence[tuple]) -> list[Task]:
-    """Tasks of drives without a point in any of their files, all of which can be read: they fail.
+    """Make failing tasks for drives without points in any of their readable files.
 
     Parameters
     ----------
     project : ProjectParts
     read : sequence of (sequence of TileOwner, dict or None)
-        What read_tile was given, and its result if it has any.
+        Input of read_tile, and its result if it has any.
     """
     tasks = []
     for name, ids in ((drive.name, drive.ids) for drive in project.drives):
@@ -69,14 +69,14 @@ def refusals(project: ProjectParts, read: Sequence[tuple]) -> list[Task]:
 
 
 def _folder(drives):
-    """Where the corrected copy of a file of some drives lies."""
+    """Folder for the corrected copy of a file of some drives."""
     if len(drives) == 1:
         return drives[0].name
     return SHARED_TILES
 
 
 def task_name(drive: str, file: Path | CloudFile) -> str:
-    """Name of a task of one file.
+    """Name of a task for one file.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def task_name(drive: str, file: Path | CloudFile) -> str:
 
 @dataclass(frozen=True)
 class PlannedDrive:
-    """A drive whose clouds are known by their headers.
+    """Drive whose clouds are known by their headers.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ class PlannedDrive:
     identities: dict[Path, FileIdentity]
 
     def without(self, lost: Collection[Path]) -> PlannedDrive:
-        """The drive without the files, by their paths, that could not be read.
+        """Return the drive without unreadable files, given by path.
 
         Parameters
         ----------
@@ -118,7 +118,7 @@ class PlannedDrive:
 def planned_drive(
     project: ProjectParts, drive: DriveParts, tiles: Sequence[file_tasks.Tile]
 ) -> PlannedDrive:
-    """A drive with the clouds that can be read, and with the surveyed points near them.
+    """Make a drive with the readable clouds, and the surveyed points near them.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def planned_drive(
     Raises
     ------
     ValueError
-        As SurveyParts.survey.
+        See SurveyParts.survey.
     """
     survey = drive.parts.survey([(tile.file, tile.note) for tile in tiles])
     boxes = {tile.file.path: tile.box for tile in tiles}
@@ -147,13 +147,13 @@ def planned_drive(
 
 
 def check_control_near(project: ProjectParts, surveys: Sequence[Survey]) -> None:
-    """Refuse drives of which none has a control point near its clouds, before these are read.
+    """Refuse drives without any control point near their clouds, before these are read.
 
     Parameters
     ----------
     project : ProjectParts
     surveys : sequence of Survey
-        Of planned drives.
+        Surveys of planned drives.
 
     Raises
     ------
@@ -170,15 +170,15 @@ def check_control_near(project: ProjectParts, surveys: Sequence[Survey]) -> None
 
 
 def near_boxes(survey: Survey, points: ControlPoints, boxes: Iterable[np.ndarray]) -> ControlPoints:
-    """The surveyed points whose images may lie in boxes that headers state.
+    """Surveyed points whose targets may be in boxes from headers.
 
     Parameters
     ----------
     survey : Survey
-        How far away they may lie.
+        Its search radius is used.
     points : ControlPoints
     boxes : iterable of (2, 3) arrays
-        Where a box can't be, all points are near it. Units: m.
+        All points are near an invalid box. Units: m.
     """
     inside = np.zeros(len(points), bool)
     margin = search_radius(survey, points)[:, None]
@@ -192,14 +192,14 @@ def near_boxes(survey: Survey, points: ControlPoints, boxes: Iterable[np.ndarray
 def finding_tasks(
     store: TaskStore, drive: PlannedDrive, origin: np.ndarray, with_ties: bool
 ) -> list[Task]:
-    """Tasks that look for targets and ties in a drive's clouds.
+    """Make the tasks that search for targets and ties in a drive's clouds.
 
-    Surveyed points far from a file, their roles and their sigmas don't change what it holds.
+    Distant surveyed points, and roles and sigmas of all, do not affect their keys.
 
     Parameters
     ----------
     store : TaskStore
-        In which the drive is kept, for the tasks.
+        Store for the drive, for the tasks.
     drive : PlannedDrive
     origin : (3,) array
         Units: m.
@@ -228,7 +228,7 @@ def finding_tasks(
 
 
 def _share_near(survey, points, box):
-    """Share of a box near surveyed points, by area, added up over these."""
+    """Share of a box near surveyed points, by area, summed over these."""
     low, high = box[:, :2]
     radius = search_radius(survey, points)[:, None]
     ends = np.clip([points.position[:, :2] + sign * radius for sign in (-1, 1)], low, high)
@@ -242,7 +242,7 @@ def cloud_tasks(
     out: Path,
     additions: Additions,
 ) -> list[tuple[Task, list[str]]]:
-    """Tasks that write corrected clouds, each with the names of the drives whose points it holds.
+    """Make the tasks that write corrected clouds, each with the names of its drives.
 
     Parameters
     ----------
@@ -282,14 +282,14 @@ def cloud_tasks(
 
 
 def area_tasks(store: TaskStore, key: str, areas: Iterable[AreaInput]) -> list[Task]:
-    """Tasks that estimate areas.
+    """Make the tasks that estimate areas.
 
     Parameters
     ----------
     store : TaskStore
-        In which what each area holds is kept, for the tasks.
+        Store for the contents of each area, for the tasks.
     key : str
-        Of all that these depend on.
+        Key of all dependencies.
     areas : iterable of AreaInput
     """
     tasks = []
@@ -302,7 +302,7 @@ def area_tasks(store: TaskStore, key: str, areas: Iterable[AreaInput]) -> list[T
 
 
 def report_task(inputs: file_tasks.ReportInput, drive: PlannedDrive) -> Task:
-    """The task that reports on a drive.
+    """Make the task that reports on a drive.
 
     Parameters
     ----------

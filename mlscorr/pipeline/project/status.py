@@ -1,4 +1,4 @@
-"""``status``: how far a project has come, from what its run keeps."""
+"""``status``: progress of a project, from the records of its run."""
 
 import json
 from pathlib import Path
@@ -11,7 +11,7 @@ from mlscorr.survey import Statement
 
 
 def project_status(out: str | Path) -> dict:
-    """How far a project has come, whether its run is at work or not.
+    """Progress of a project, during or after its run.
 
     Parameters
     ----------
@@ -21,14 +21,14 @@ def project_status(out: str | Path) -> dict:
     Returns
     -------
     dict
-        ``all`` and ``drives[]``: tasks and points done and planned, stage by stage; ``failures``
-        of what isn't done yet, the last line of the ``log``, that on ``progress``, which says rate
-        and time left, and whether a run ``is_running``: None where that can't be told.
+        ``all`` and ``drives[]``: tasks and points done and planned, stage by stage; ``failures`` of
+        unfinished tasks, the last line of the ``log``, that on ``progress`` with rate and remaining
+        time, and ``is_running``, which is None if unknown.
 
     Raises
     ------
     ValueError
-        Where no project was ever corrected into the folder, or the list of its tasks is damaged.
+        If no project was ever corrected into the folder, or the list of its tasks is damaged.
     """
     out = as_path(out)
     store = TaskStore(out / STORE)
@@ -43,7 +43,7 @@ def project_status(out: str | Path) -> dict:
     for task in tasks:
         task["is_done"] = task["key"] in done[task["kind"]] and _is_left(store, task)
     drives: dict[str, list[dict]] = {}
-    for task in (task for task in tasks if task["drive"]):  # an area is of many
+    for task in (task for task in tasks if task["drive"]):  # an area has many
         drives.setdefault(task["drive"], []).append(task)
     is_running = store.is_locked()
     lines = read_bytes(out / "log.txt").decode().splitlines()
@@ -63,7 +63,7 @@ def project_status(out: str | Path) -> dict:
 
 
 def _planned(store):
-    """The tasks of each stage, as the run has written them down."""
+    """Tasks of each stage, as recorded by the run."""
     try:
         return dict(json.loads(read_bytes(store.plan)))
     except (ValueError, TypeError) as error:
@@ -74,13 +74,13 @@ def _planned(store):
 
 
 def _is_left(store, task):
-    """Whether what a task wrote is there as it was written; nothing of this is asked of a store."""
+    """True if a task's output is unchanged; stores are not checked for this."""
     is_asked = task["kind"] in ("clouds", "reports") and not is_remote(store.folder)
     return not is_asked or present(store, task["kind"], task["key"]) is not None
 
 
 def _failures(tasks, lines):
-    """The last failure of each file or area of which a task isn't done; none of repaired ones."""
+    """Last failure of each file or area with unfinished tasks, without repaired ones."""
     left = dict.fromkeys(" ".join(task["name"].split()) for task in tasks if not task["is_done"])
     failures = []
     for name in left:
@@ -91,7 +91,7 @@ def _failures(tasks, lines):
 
 
 def _stages(tasks):
-    """Tasks and points done and planned, stage by stage."""
+    """Tasks and points done and planned, by stage."""
     rows = []
     for kind, title in TITLES.items():
         own = [task for task in tasks if task["kind"] == kind]

@@ -1,4 +1,4 @@
-"""Tasks, how they are carried out, and how they end."""
+"""Tasks, their execution, and their outcomes."""
 
 import time
 import warnings
@@ -12,28 +12,29 @@ from threadpoolctl import threadpool_limits
 
 from mlscorr.io.store import FileIdentity, TaskStore, telling_space
 
-VERSION = version("mlscorr")  # results of another one are made again
+VERSION = version("mlscorr")  # results of another version are made again
 
 
 @dataclass(frozen=True)
 class Task:
-    """A function and its arguments, named by the hash of what its result depends on.
+    """Function and its arguments, identified by the hash of its dependencies.
 
     Parameters
     ----------
     kind : str
-        Of the stage.
+        Kind of the stage.
     key : str
     drive : str
     name : str
-        Of what it works on.
+        Name of its input.
     points : int
-        That it works on.
+        Number of its points.
     function : function
     arguments : tuple
         Paths and small values.
     near_points : float
-        Expected near surveyed points, once for each of these: they are looked at again.
+        Expected number near surveyed points, counted for each of these, because they are processed
+        again.
     """
 
     kind: str
@@ -48,16 +49,16 @@ class Task:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a task ended.
+    """Outcome of a task.
 
     Parameters
     ----------
     task : Task
     fault : str
-        Why it has no result; empty where it has.
+        Reason for a missing result; empty with a result.
     warnings : tuple of str
     seconds : float
-        That it took; none where its result was there.
+        Duration; zero for an existing result.
     """
 
     task: Task
@@ -67,18 +68,18 @@ class Outcome:
 
 
 def carry_out(task: Task, folder: Path) -> tuple[str, tuple[str, ...], float]:
-    """Work on a task, with one thread, and keep its result.
+    """Carry out a task with one thread, and store its result.
 
     Parameters
     ----------
     task : Task
     folder : Path
-        Of the store.
+        Folder of the store.
 
     Returns
     -------
     fault, warnings, seconds
-        As of the Outcome. Its task stays with who gave it: no worker sends trajectories back.
+        See Outcome. The task itself is not returned, so that no worker sends trajectories back.
     """
     start = time.perf_counter()
     store = TaskStore(folder)
@@ -94,27 +95,27 @@ def carry_out(task: Task, folder: Path) -> tuple[str, tuple[str, ...], float]:
                 store.put(task.kind, task.key, (result, tuple(texts)))
         except (ValueError, OSError) as error:
             fault = str(error) or type(error).__name__
-        except Exception as error:  # a night's work doesn't end by what nobody thought of
+        except Exception as error:  # an unexpected error must not end a night's work
             fault = f"{type(error).__name__}: {error}. Please report this."
     return fault, tuple(texts), time.perf_counter() - start
 
 
 @dataclass(frozen=True)
 class Written:
-    """What a task says of files that it wrote.
+    """Record of the files written by a task.
 
     Parameters
     ----------
     value : list of WrittenClouds, or dict
     outputs : tuple of (str, FileIdentity)
-        By their names within a folder.
+        By name within a folder.
     """
 
     value: Any
     outputs: tuple[tuple[str, FileIdentity], ...]
 
     def is_whole(self, folder: Path) -> bool:
-        """Whether the files are as they were written.
+        """Return True if the files are unchanged.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""The sentences that a run of a project says on its way, on the terminal and in its log."""
+"""Progress sentences of a project's run, for the terminal and its log."""
 
 from mlscorr.survey import Statement, Wording
 from mlscorr.wording import counted, percent
@@ -13,7 +13,7 @@ TITLES = {
 
 
 def duration(seconds: float) -> str:
-    """A time in words.
+    """Format a duration in words.
 
     >>> duration(59.6), duration(3725)
     ('1 min', '1 h 2 min')
@@ -63,11 +63,11 @@ PROGRESS: dict[str, Wording] = {
 
 
 def progress_sentence(statement: Statement) -> str:
-    """The sentence of what a run says on its way.
+    """Return the sentence of a progress statement.
 
     Parameters
     ----------
     statement : Statement
-        Of a key of PROGRESS.
+        With a key of PROGRESS.
     """
     return statement.sentence(PROGRESS)

@@ -1,4 +1,4 @@
-"""The pages of a diagnosis and of a plan, and their figures."""
+"""Pages of a diagnosis and of a plan, and their figures."""
 
 from mlscorr.report.gap._plan import accuracy_sentence
 from mlscorr.report.gap.first_screen import gap_screen

@@ -1,4 +1,4 @@
-"""Channels beside geometry, and distances as other fields state them: sentences, rows, a figure."""
+"""Non-geometric channels, and distances used in other fields: sentences, rows, a figure."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from mlscorr.report.headline import StatementRow
 from mlscorr.report.style import BLUE, GREY, VERMILLION, legend_above, new_figure, styled
 from mlscorr.wording import joined, known, plain
 
-WORDS = {  # of channels: what they are, their figure, how it is called on an axis
+WORDS = {  # of channels: meaning, figure, axis label
     "intensity": ("Intensity", "real over simulated, beside the usual ratio", "Ratio"),
     "density": ("Density", "real over simulated number", "Ratio"),
     "dropout": ("Lost beams", "real less simulated share", "Share"),
@@ -39,8 +39,8 @@ SAMPLES = {  # of the clouds
 
 
 class ChannelRow(NamedTuple):
-    """A bin of a channel: its real and simulated figure, both compared, sigma, blocks; and whether
-    it differs.
+    """Bin of a channel: real and simulated figure, comparison, sigma, blocks; flag of a
+    difference.
     """
 
     channel: str
@@ -51,7 +51,7 @@ class ChannelRow(NamedTuple):
 
 
 class DistanceRow(NamedTuple):
-    """A distance, and whether it is more than between halves of the simulation; texts."""
+    """Distance, and whether it exceeds that between halves of the simulation, as texts."""
 
     sample: str
     figure: str
@@ -64,12 +64,12 @@ class DistanceRow(NamedTuple):
 
 
 def channel_statements(document: dict) -> Iterator[StatementRow]:
-    """Whether channels beside geometry differ, where any could be compared.
+    """Yield statements on differences in non-geometric channels, if any could be compared.
 
     Parameters
     ----------
     document : dict
-        The content of gap.json.
+        Contents of gap.json.
     """
     parts = [], []
     for each in document.get("contrasts", ()):
@@ -94,7 +94,7 @@ def channel_rows(document: dict) -> list[ChannelRow]:
     Parameters
     ----------
     document : dict
-        The content of gap.json.
+        Contents of gap.json.
     """
     rows = []
     for each in document.get("contrasts", ()):
@@ -116,7 +116,7 @@ def distance_rows(document: dict) -> list[DistanceRow]:
     Parameters
     ----------
     document : dict
-        The content of gap.json.
+        Contents of gap.json.
     """
     return [
         DistanceRow(
@@ -135,12 +135,12 @@ def distance_rows(document: dict) -> list[DistanceRow]:
 
 @styled
 def channels_figure(document: dict) -> Figure:
-    """Each channel by what it may depend on, with 95 % intervals; orange-red where it differs.
+    """Draw each channel by its covariates, with 95 % intervals; orange-red for differences.
 
     Parameters
     ----------
     document : dict
-        The content of gap.json.
+        Contents of gap.json.
     """
     tables = [(each, table) for each in document["contrasts"] for table in each["tables"]]
     columns = min(3, len(tables))

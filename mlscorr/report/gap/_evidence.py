@@ -1,4 +1,4 @@
-"""Figures of the evidence: the ladder of candidates, and which parameters can be told apart."""
+"""Figures of the evidence: the ladder of candidates, and separability of parameters."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -21,7 +21,7 @@ from mlscorr.report.style import (
 )
 from mlscorr.wording import known, percent
 
-FAMILIES = {  # colour, hatch, words
+FAMILIES = {  # color, hatch, words
     "none": (GREY, "", "nothing wrong"),
     "unknown": (ORANGE, "////", "something unknown"),
     "noise": (GREEN, "....", "noise class"),
@@ -31,12 +31,12 @@ FAMILIES = {  # colour, hatch, words
 
 @styled
 def ladder_figure(document: dict) -> Figure:
-    """Evidence of each label over none, in powers of ten; the best at the top.
+    """Draw the evidence of each label over none, in powers of ten; the best at the top.
 
     Parameters
     ----------
     document : dict
-        The content of gap.json.
+        Contents of gap.json.
     """
     rungs = ladder(document)
     names = []
@@ -73,12 +73,12 @@ def ladder_figure(document: dict) -> Figure:
 
 
 def ladder(document: dict) -> list[dict]:
-    """Rows of evidence[] that are drawn, the best first; none and unknown are always there.
+    """Drawn rows of evidence[], best first, always including none and unknown.
 
     Parameters
     ----------
     document : dict
-        The content of gap.json.
+        Contents of gap.json.
     """
     rungs = [row for row in document["evidence"] if known(row["log_evidence_ratio"])]
     rungs = sorted(rungs, key=lambda row: -row["log_evidence_ratio"])
@@ -112,9 +112,9 @@ def _legend(rungs):
 
 
 def classes_in_order(separability: dict) -> tuple[list[int], list[tuple[int, int]]]:
-    """Order of the parameters with those of one class side by side, and (first, last) of each.
+    """Order of the parameters with those of one class adjacent, and (first, last) of each class.
 
-    Parameters of a class's effects that can be told from all others are not among them.
+    Parameters of a class's effects that are separable from all others are excluded.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def _squares(separability):
 
 @styled
 def heat_figure(separability: dict) -> Figure:
-    """Squared correlation of the parameters, those of a class together in a box.
+    """Draw squared correlations of the parameters, with a box around each class.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The innovations over time and on the map: what a row tells that those before it did not."""
+"""Innovations over time and on the map: the new information of each row."""
 
 from math import erfc, sqrt
 from typing import NamedTuple
@@ -29,7 +29,7 @@ STRIPE = "#efefef"
 
 
 class ChannelStyle(NamedTuple):
-    """How the rows of a channel are drawn and called."""
+    """Style and name of the rows of a channel."""
 
     color: str
     mark: str
@@ -46,12 +46,12 @@ CHANNELS = {
 
 
 def channel_style(channel: str) -> ChannelStyle:
-    """Colour, mark and words of a channel.
+    """Color, mark and words of a channel.
 
     Parameters
     ----------
     channel : str
-        As rows have it.
+        Channel of the rows.
     """
     return CHANNELS.get(
         channel, ChannelStyle(style.GREY, "x", channel.replace("_", " ").capitalize())
@@ -59,12 +59,12 @@ def channel_style(channel: str) -> ChannelStyle:
 
 
 def passes_of(gps_time: np.ndarray) -> np.ndarray:
-    """Start and end (k, 2) of the stretches in which rows were seen, in their order.
+    """Start and end (k, 2) of the intervals with rows, sorted.
 
     Parameters
     ----------
     gps_time : (n,) array
-        In any order; NaN is left out. Units: s.
+        In any order; NaN is ignored. Units: s.
 
     >>> passes_of(np.array([0.0, 1.0, 2.0, 300.0, 301.0]))
     array([[  0.,   2.],
@@ -84,12 +84,12 @@ def passes_of(gps_time: np.ndarray) -> np.ndarray:
 
 @style.styled
 def innovations_figure(document: dict) -> Figure:
-    """Innovations before (top) and after (bottom), each pass in a panel of its own.
+    """Draw innovations before (top) and after (bottom), with one panel per pass.
 
     Parameters
     ----------
     document : dict
-        The content of gap.json.
+        Contents of gap.json.
     """
     rows = document["innovations"]
     windows = document["windows"]
@@ -102,7 +102,7 @@ def innovations_figure(document: dict) -> Figure:
         passes = np.array([[passes[0, 0], passes[-1, 1]]])
     width = np.maximum(np.diff(passes)[:, 0], 0.12 * np.diff(passes).max())
     figure = style.new_figure(4.6)
-    figure.set_dpi(180)  # of the marks, which are drawn as a picture
+    figure.set_dpi(180)  # of the marks, which are rasterized
     panels = figure.subplots(
         2, len(passes), sharey=True, sharex="col", squeeze=False, width_ratios=np.maximum(width, 1)
     )
@@ -147,7 +147,7 @@ def _draw(panel, time, values, channel, styles, limit):
 
 
 def _outside(values):
-    """RMS of the innovations, and how many lie outside of the stripe, in words."""
+    """RMS of the innovations, and number outside the stripe, in words."""
     values = values[np.isfinite(values)]
     stripe = SETTINGS.stripe_sigmas
     if len(values) == 0:
@@ -179,12 +179,12 @@ def _legend(styles, windows):
 
 @styled
 def site_map(document: dict) -> Figure:
-    """Plan with the rows coloured by innovation, before and after side by side.
+    """Draw a plan with rows colored by innovation, before and after side by side.
 
     Parameters
     ----------
     document : dict
-        The content of gap.json; or of plan.json, which has no rows yet.
+        Contents of gap.json, or of plan.json, which has no rows yet.
     """
     site = document["map"]
     rows = site.get("rows") or []
@@ -210,7 +210,7 @@ def site_map(document: dict) -> Figure:
 
 
 def _draw_state(panel, site, rows, state):
-    """Draw one state; returns what the colours are of, if there are any."""
+    """Draw one state; return the object of the color scale, if there is one."""
     track = np.array([numbers(place[:2]) for place in site["trajectory"]]).reshape(-1, 2)
     panel.plot(*_parted(track).T, **TRACK, zorder=1, label="Trajectory")
     colours = None
@@ -243,7 +243,7 @@ def _draw_state(panel, site, rows, state):
 
 
 def _parted(track):
-    """The track with NaN where it leaps, so that no line crosses from pass to pass."""
+    """Track with NaN at its jumps, so that no line connects passes."""
     step = np.hypot(*np.diff(track, axis=0).T)
     if (step > 0).any():
         usual = np.median(step[step > 0])

@@ -9,15 +9,15 @@ from mlscorr.wording import known
 def sentences_of(
     label: str, parameters: list[dict], where: Callable[[type[Effect]], str]
 ) -> list[str]:
-    """A sentence with its numbers for each effect of a label; what it is, where it has none.
+    """Sentences with numbers for each effect of a label, or its meaning without numbers.
 
     Parameters
     ----------
     label : str
     parameters : list of dict
-        Of the label's cause in gap.json.
+        Parameters of the label's cause in gap.json.
     where : function
-        Of the class of an effect: where or when it acts, in words.
+        Returns place or time of an effect class's action, in words.
     """
     kinds = effects_by_name()
     sentences = []
@@ -32,15 +32,15 @@ def sentences_of(
 
 
 def place_of(kind: type[Effect], target: str | None, windows: list[dict]) -> str:
-    """When an effect acts, or on which target, in words.
+    """Time of an effect, or its target, in words.
 
     Parameters
     ----------
     kind : class of an Effect
     target : str or None
-        Of the cause.
+        Target of the cause.
     windows : list of dict
-        Of gap.json, with start and end. Units: s.
+        Intervals of gap.json, with start and end. Units: s.
     """
     if kind.is_on_target():
         if target:
@@ -52,17 +52,17 @@ def place_of(kind: type[Effect], target: str | None, windows: list[dict]) -> str
         if window["effect"] == kind.name and known(start) and known(end):
             if end - start < 1.0:  # times are written in whole seconds
                 return f" at gps_time {start:.1f} s"
-            if kind.name == "position_step":  # from then on to the end of its pass
+            if kind.name == "position_step":  # until the end of its pass
                 return f" about gps_time {start:.0f} s"
             return f" between gps_time {start:.0f} s and {end:.0f} s"
     return ""
 
 
 def parameters_of(label: str, parameters: list[dict]) -> dict[str, dict[str, SizeEstimate]]:
-    """Parameters by the effects of a label, and by their names.
+    """Parameters of each effect of a label, by their names.
 
-    That of a pair has the effect's name before its own; without it, it belongs to the first effect
-    that has such a parameter and lacks it still.
+    For a pair, names are prefixed by the effect; without a prefix, a parameter belongs to the first
+    effect that has such a parameter and no value yet.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def parameters_of(label: str, parameters: list[dict]) -> dict[str, dict[str, Siz
         effect, _, name = row["name"].partition(" ")
         if effect not in owned or not name:
             name = row["name"]
-            plain = name.rstrip(" 0123456789")  # windows are numbered
+            plain = name.rstrip(" 0123456789")  # intervals are numbered
             owners = (e for e in owned if plain in expected[e] and name not in owned[e])
             effect = next(owners, next(iter(owned)))
         owned[effect][name] = SizeEstimate(row["estimate"], row["sigma"], row["unit"])

@@ -1,4 +1,6 @@
-"""What a planned survey will reach: accuracy along the drive, and how small an error would show."""
+"""Expected results of a planned survey: accuracy along the drive, and smallest detectable
+errors.
+"""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -18,12 +20,12 @@ from mlscorr.wording import known, length_in_words
 
 
 def accuracy_sentence(accuracy: dict) -> str:
-    """What a correction of the planned survey will reach.
+    """Sentence on the expected accuracy of a correction of the planned survey.
 
     Parameters
     ----------
     accuracy : dict
-        Of plan.json.
+        Section of plan.json.
     """
     worst = int(np.argmax(accuracy["sigma"]))
     return (
@@ -36,12 +38,12 @@ def accuracy_sentence(accuracy: dict) -> str:
 
 @styled
 def accuracy_figure(document: dict) -> Figure:
-    """Sigma of the corrected position over time, each pass in a panel of its own.
+    """Draw the sigma of the corrected position over time, with one panel per pass.
 
     Parameters
     ----------
     document : dict
-        The content of plan.json.
+        Contents of plan.json.
     """
     accuracy = document["accuracy"]
     time = numbers(accuracy["gps_time"])
@@ -49,7 +51,7 @@ def accuracy_figure(document: dict) -> Figure:
     control = numbers(accuracy["control_times"])
     places = numbers(place["gps_time"] for place in document["next_control"])
     passes = passes_of(time)
-    # Times at an end of a pass may lie beyond its last sigma, and belong to the nearer pass
+    # Times at an end of a pass may be after its last sigma, and belong to the nearer pass
     between = (passes[:-1, 1] + passes[1:, 0]) / 2
     width = np.maximum(np.diff(passes)[:, 0], 0.12 * np.diff(passes).max())
     figure = new_figure(2.6)
@@ -64,7 +66,7 @@ def accuracy_figure(document: dict) -> Figure:
             there = times[np.searchsorted(between, times) == number] - start
             panel.plot(there, np.zeros(len(there)), mark, color=color, markersize=8, label=words)
         panel.set_xlabel(f"Pass {number + 1}: s after {start:.0f}")
-    panels[0].set_ylim(bottom=-0.04 * sigma.max())  # of all, after all: it ends their scaling
+    panels[0].set_ylim(bottom=-0.04 * sigma.max())  # last, because it ends autoscaling
     panels[0].set_ylabel("Sigma (cm)")
     legend_above(figure, panels[0].get_legend_handles_labels()[0])
     return figure
@@ -72,12 +74,12 @@ def accuracy_figure(document: dict) -> Figure:
 
 @styled
 def detectable_figure(rows: list[DetectableRow]) -> Figure:
-    """How small an effect shows, over its usual size; left of one the survey can see it.
+    """Draw the smallest detectable size over the usual size; below one, the effect is visible.
 
     Parameters
     ----------
     rows : list of DetectableRow
-        The plainest first; those without a ratio are left out.
+        Sorted by visibility; rows without a ratio are omitted.
     """
     rows = [row for row in rows if known(row.ratio)]
     ratio = np.array([row.ratio for row in rows])

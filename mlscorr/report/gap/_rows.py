@@ -1,4 +1,4 @@
-"""What tables and figures read of the documents of a diagnosis and of a plan: rows and numbers."""
+"""Rows and numbers from the documents of a diagnosis and of a plan, for tables and figures."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from mlscorr.wording import DASH, column, known, percent, plain, signed
 
 
 def numbers(values: Iterable[float | None]) -> np.ndarray:
-    """Numbers of a document as an array, NaN where it has none.
+    """Numbers of a document as an array, NaN if missing.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ COVARIATES = {
 
 @dataclass(frozen=True)
 class BinRow:
-    """The gap of a bin of a covariate (mm), its share of the whole, and its null band."""
+    """Gap of a bin of a covariate (mm), its share of the whole, and its null band."""
 
     by: str
     bin: str
@@ -52,7 +52,7 @@ class BinRow:
 
 @dataclass(frozen=True)
 class CauseRow:
-    """A parameter of a cause; its numbers are texts in the unit."""
+    """Parameter of a cause; its numbers are texts in the unit."""
 
     title: str
     probability: float | None
@@ -67,14 +67,14 @@ class CauseRow:
 
 @dataclass(frozen=True)
 class DetectableRow:
-    """The smallest size of a parameter that shows, and its usual one: texts in the unit.
+    """Smallest detectable size of a parameter, and its usual one, as texts in the unit.
 
     Parameters
     ----------
     ratio : float or None
         Smallest over usual size.
     visible : str
-        Whether the survey can see it, in words.
+        Visibility in the survey, in words.
     """
 
     title: str
@@ -89,7 +89,7 @@ class DetectableRow:
 
 @dataclass(frozen=True)
 class RoundRow:
-    """What was put into the simulator, its size in a sentence, and the gap; texts."""
+    """Additions to the simulator, their size in a sentence, and the gap, as texts."""
 
     title: str
     size: str
@@ -99,12 +99,12 @@ class RoundRow:
 
 
 def round_rows(rounds: list[dict]) -> list[RoundRow]:
-    """Rows of the table of rounds.
+    """Make rows of the table of rounds.
 
     Parameters
     ----------
     rounds : list of dict
-        Of ``ablation`` in gap.json.
+        ``ablation`` of gap.json.
     """
     rows = []
     for each in rounds:
@@ -118,7 +118,7 @@ def round_rows(rounds: list[dict]) -> list[RoundRow]:
 
 
 def lone_rows(effects: list[dict]) -> list[RoundRow]:
-    """Rows of the table of effects by themselves, in the first round.
+    """Make rows of the table of single effects, in the first round.
 
     Parameters
     ----------
@@ -133,14 +133,14 @@ def lone_rows(effects: list[dict]) -> list[RoundRow]:
 
 
 def split_title(split: dict) -> str:
-    """What a split of the gap is by, in words with its unit.
+    """Covariate of a split of the gap, in words with its unit.
 
     Parameters
     ----------
     split : dict
-        Of where[] in gap.json.
+        Row of where[] in gap.json.
     """
-    logarithm = split["by"] == "intensity"  # which has no unit that would tell a reader more
+    logarithm = split["by"] == "intensity"  # its unit would not help a reader
     if split["unit"] and not logarithm:
         unit = f" ({split['unit']})"
     else:
@@ -149,12 +149,12 @@ def split_title(split: dict) -> str:
 
 
 def bin_rows(document: dict) -> list[BinRow]:
-    """Rows of the table of the gap by each covariate.
+    """Make rows of the table of the gap by each covariate.
 
     Parameters
     ----------
     document : dict
-        The content of gap.json.
+        Contents of gap.json.
     """
     rows = []
     for split in document["where"]:
@@ -178,12 +178,12 @@ def bin_names(split: dict) -> list[str]:
 
 
 def cause_rows(document: dict) -> list[CauseRow]:
-    """Rows of the table of causes, one for each parameter.
+    """Make rows of the table of causes, one for each parameter.
 
     Parameters
     ----------
     document : dict
-        The content of gap.json.
+        Contents of gap.json.
     """
     rows = []
     for cause in document["causes"]:
@@ -197,19 +197,19 @@ def cause_rows(document: dict) -> list[CauseRow]:
 
 
 def meanings(document: dict) -> list[tuple[str, str]]:
-    """Titles of all effects that the causes name, and what they are.
+    """Titles of all effects in the causes, and their meanings.
 
     Parameters
     ----------
     document : dict
-        The content of gap.json.
+        Contents of gap.json.
     """
     names = [name for cause in document["causes"] for name in cause["effect"].split("+")]
     return [(title(name), meaning(name)) for name in dict.fromkeys(names)]
 
 
 def detectable_rows(detectable: dict[str, list[dict]]) -> list[DetectableRow]:
-    """Rows of the table of the smallest sizes that show.
+    """Make rows of the table of the smallest detectable sizes.
 
     Parameters
     ----------
@@ -233,7 +233,7 @@ def detectable_rows(detectable: dict[str, list[dict]]) -> list[DetectableRow]:
 
 
 def _visibility(small, ratio):
-    """Whether the survey can see an effect, in words.
+    """Visibility of an effect in the survey, in words.
 
     >>> _visibility(0.02, 0.4), _visibility(0.02, 2.5)
     ('yes', 'only if 2.5 times the usual')
@@ -248,7 +248,7 @@ def _visibility(small, ratio):
 
 
 def worst_rows(rows: list[DetectableRow]) -> list[DetectableRow]:
-    """A row for each effect, that of its worst parameter; the plainest effect first.
+    """Row of each effect's worst parameter, sorted by visibility.
 
     Parameters
     ----------

@@ -1,36 +1,35 @@
-"""The numbers that the pages of a diagnosis rest on: what is worth a reader's eye."""
+"""Settings of the pages of a diagnosis: selection of displayed items."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Numbers of this room: they choose what is drawn and written, and change no result.
+    """Settings of this package: they select what is displayed, and change no result.
 
     Parameters
     ----------
     ladder_rows, ladder_letters : int
-        Labels on the ladder of evidence, and letters of each, at most: a page's height and half
-        of its width.
+        Largest number of labels on the ladder of evidence, and of letters of each: a page's height
+        and half of its width.
     written_correlation : float
-        From which on a squared correlation is written into its cell: half of the variance in
-        common.
+        Smallest squared correlation written into its cell: half of the variance in common.
     least_share : float
-        A bin's share of the gap is written where it is at least that, and so many times its share
-        of the rows as the inference asks for: else it says nothing of where the gap lies.
+        Smallest share of the gap written for a bin; it must also exceed the bin's share of the rows
+        by the factor of the inference.
     likely_probability : float
-        From which on a cause is not folded away.
+        Smallest probability of a cause that is not collapsed.
     stripe_sigmas : float
-        Half of the stripe in which innovations are expected. Units: sigma.
+        Half width of the stripe of expected innovations. Units: sigma.
     drawn_sigmas : tuple of float
-        Least and largest end of the axis of innovations. Units: sigma.
+        Smallest and largest end of the axis of innovations. Units: sigma.
     map_sigmas : float
-        At the ends of the map's colours. Units: sigma.
+        Value at the ends of the map's colors. Units: sigma.
     row_gap, row_gap_steps : float
-        Without a row, from which on two passes are parted: so long, and so many times the usual
-        step. Units: s, 1.
+        Smallest time without rows between two passes, absolute and relative to the usual step.
+        Units: s, 1.
     panels : int
-        Passes beside each other at most; more are drawn as one.
+        Largest number of passes side by side; more are drawn as one.
     """
 
     ladder_rows: int = 26

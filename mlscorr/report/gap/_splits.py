@@ -1,4 +1,4 @@
-"""Where the gap lies, and how far it shrinks: figures with the band that chance alone fills."""
+"""Location of the gap, and its reduction: figures with the band of chance."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -17,12 +17,12 @@ BAND = "#dcdcdc"
 
 @styled
 def where_figure(document: dict) -> Figure:
-    """The gap by each covariate, before and after, over what chance makes it. Units: mm.
+    """Draw the gap by each covariate, before and after, over the band of chance. Units: mm.
 
     Parameters
     ----------
     document : dict
-        The content of gap.json.
+        Contents of gap.json.
     """
     splits = document["where"]
     columns = 3
@@ -48,7 +48,7 @@ def where_figure(document: dict) -> Figure:
 
 
 def _limits(splits):
-    """Lower and upper end of what all panels show, with room for a number above."""
+    """Lower and upper limit of all panels, with space for a number above."""
     values = [numbers(split[key]) for split in splits for key in ("before", "after")]
     values = np.concatenate([[0.0], *values, *(_band(split).ravel() for split in splits)])
     low = np.nanmin(values)
@@ -92,11 +92,11 @@ def _split(panel, split, is_explained):
 
 
 def _draw_extent(panel, split, edges):
-    """The stretch in which the cause acts, where it holds more than its rows account for."""
+    """Draw the interval in which the cause acts, if its share exceeds that of its rows."""
     extent = split.get("extent")
     if extent and extent["share"] > INFERENCE.plain * extent["rows"]:
         turns = (0.0, 360.0) if split["by"] == "scan_angle" else (0.0,)
-        for turn in turns:  # an angle may be told as one of the next turn
+        for turn in turns:  # an angle may be given in the next turn
             low = max(extent["low"] - turn, edges[0])
             high = min(extent["high"] - turn, edges[-1])
             if low < high:
@@ -104,8 +104,8 @@ def _draw_extent(panel, split, edges):
 
 
 def _write_share(panel, split, edges, high, is_explained):
-    """Write the share of the bin that holds more than its rows account for: of what the cause
-    explains, or of the gap where that stands out.
+    """Write the share of a bin that exceeds that of its rows: of the explained part, or of a
+    significant gap.
     """
     count, share, before = (numbers(split[key]) for key in ("count", "share", "before"))
     of_rows = count / max(count.sum(), 1.0)
@@ -134,12 +134,12 @@ def _write_share(panel, split, edges, high, is_explained):
 
 @styled
 def closure_figure(document: dict) -> Figure:
-    """The gap on held-out data, where there is any, before and after: in all, and block by block.
+    """Draw the gap on held-out data, if any, before and after: in total, and by block.
 
     Parameters
     ----------
     document : dict
-        The content of gap.json.
+        Contents of gap.json.
     """
     closure = document["closure"]
     figure = new_figure(2.7)
@@ -181,7 +181,7 @@ def _whole(panel, closure):
 
 
 def _interval(closure):
-    """95 % (2,) of the gap after, by the interval of the share that is gone; it holds the gap."""
+    """95 % interval (2,) of the gap after, from that of the removed share; it contains the gap."""
     before, after, *shares = numbers([closure["before"], closure["after"], *closure["interval"]])
     square = np.sign(before) * before**2 * (1 - np.array(shares))
     ends = np.sort(np.sign(square) * np.sqrt(np.abs(square)))

@@ -1,4 +1,4 @@
-"""What the first screen of a diagnosis says: what is wrong, how sure, how far the gap shrinks."""
+"""First screen of a diagnosis: cause, certainty, and reduction of the gap."""
 
 from typing import NamedTuple
 
@@ -8,7 +8,7 @@ from mlscorr.report.gap._labels import place_of, sentences_of
 from mlscorr.report.headline import has_assumed_sigma
 from mlscorr.wording import DASH, joined, known, percent, signed, size, thousands
 
-GAPS = {  # by the kind of gap that a closure measures
+GAPS = {  # by kind of gap in a closure
     "systematic": "Systematic part of the gap (a mean over all rows)",
     "scatter": "Scatter beyond the stated one",
     "returns": "Returns beyond the expected ones",
@@ -18,7 +18,7 @@ AXES = {"E": "easting", "N": "northing", "H": "height"}
 
 
 class Fact(NamedTuple):
-    """A number beside the verdict: what it is, it, more in words, and what ends its sentence."""
+    """Number next to the verdict: name, value, remark in words, and end of its sentence."""
 
     title: str
     number: str
@@ -27,12 +27,12 @@ class Fact(NamedTuple):
 
 
 def is_closed(document: dict) -> bool:
-    """Whether anything was put into the simulator.
+    """True if anything was added to the simulator.
 
     Parameters
     ----------
     document : dict
-        The content of gap.json.
+        Contents of gap.json.
     """
     closure = document["closure"]
     return closure["effect"] not in (None, "", "none") and known(closure["before"])
@@ -41,16 +41,17 @@ def is_closed(document: dict) -> bool:
 def is_within(
     value: float | None, band: list[float | None], kind: str | None = None, is_left: bool = False
 ) -> bool:
-    """Whether a gap is what it may be when nothing is wrong; not, when one is not known.
+    """True if a gap is within its range by chance; False if either is unknown.
 
     Parameters
     ----------
     value : float or None
     band : list of 2 floats or None
     kind : str, optional
-        Of the gap: below the band more returns are lost than by chance, of others it is smaller.
+        Kind of the gap: below the band more returns are lost than by chance; for others it is
+        smaller.
     is_left : bool
-        Whether it is what a cause in the simulator leaves: below the band, too much was put in.
+        True for the gap after a cause was added: below the band, too much was added.
     """
     is_known = all(map(known, [value, *band]))
     is_low = is_known and value < band[0]
@@ -58,12 +59,12 @@ def is_within(
 
 
 def shrinking(document: dict) -> Fact:
-    """How far the gap shrinks once the simulator has the cause.
+    """Reduction of the gap with the cause in the simulator.
 
     Parameters
     ----------
     document : dict
-        The content of gap.json.
+        Contents of gap.json.
     """
     closure = document["closure"]
     gap = document["gap"]
@@ -93,15 +94,15 @@ def shrinking(document: dict) -> Fact:
 
 
 def shrunk(closure: dict) -> str:
-    """By how much the squared gap shrinks, with its interval, in words.
+    """Reduction of the squared gap, with its interval, in words.
 
-    Errors that the simulator with the cause makes far smaller than they are stand first: their
+    Errors far above the sigma of the simulator with the cause are mentioned first, because their
     square may be a small part of the gap's.
 
     Parameters
     ----------
     closure : dict
-        Of gap.json.
+        Section of gap.json.
     """
     (low, high), share, between = closure["interval"], closure["shrink"], ""
     if not known(share):
@@ -117,12 +118,12 @@ def shrunk(closure: dict) -> str:
 
 
 def _not_closed(closure: dict) -> str:
-    """Along which axes errors are far beyond their simulated sigma with the cause; else nothing.
+    """Axes with errors far above their simulated sigma with the cause; otherwise empty.
 
     Parameters
     ----------
     closure : dict
-        Of gap.json.
+        Section of gap.json.
     """
     errors = closure.get("over_sigma") or {"beyond": []}
     if not errors["beyond"]:
@@ -136,26 +137,26 @@ def _not_closed(closure: dict) -> str:
 
 
 def span(gap: dict) -> str:
-    """What a gap is when nothing is wrong, in words.
+    """Range of a gap if nothing is wrong, in words.
 
     Parameters
     ----------
     gap : dict
-        Of gap.json.
+        Section of gap.json.
     """
     if not all(map(known, gap["null_band"])):
         return DASH
     return " to ".join(signed(end, gap["unit"]) for end in gap["null_band"])
 
 
-CERTAINTY = (  # probability from which on one says so
+CERTAINTY = (  # smallest probability for each phrase
     (0.99, "practically certain"),
     (0.9, "very likely"),
     (0.66, "likely"),
     (0.5, "more likely than not"),
     (0.0, "only the likeliest of several"),
 )
-DIFFERENCE = {  # by what is left more than, where no cause is named
+DIFFERENCE = {  # by the threshold that residuals exceed, without a named cause
     "": "The survey and its simulation differ by no more than chance makes them differ.",
     "stated": "Errors are larger than what is stated makes them, but no error that is known "
     "explains them well enough to be named.",
@@ -168,17 +169,17 @@ NEGATIVE = "It is what the two differ by beyond chance; below zero: less than by
 
 
 class VerdictBox(NamedTuple):
-    """The box with the verdict.
+    """Box with the verdict.
 
     Parameters
     ----------
     tone : str
         good, bad or open.
     kicker : str
-        Above the sentences.
+        Line above the sentences.
     sentences : list of str
     large : int
-        How many of them, from the first, are the verdict itself.
+        Number of leading sentences that are the verdict itself.
     """
 
     tone: str
@@ -188,12 +189,12 @@ class VerdictBox(NamedTuple):
 
 
 def verdict(document: dict) -> VerdictBox:
-    """The box with the verdict of a diagnosis.
+    """Make the box with the verdict of a diagnosis.
 
     Parameters
     ----------
     document : dict
-        The content of gap.json.
+        Contents of gap.json.
     """
     answer = document["verdict"]
     kind = family(document["verdict"]["label"])
@@ -207,24 +208,24 @@ def verdict(document: dict) -> VerdictBox:
 
 
 def is_judged(document: dict) -> bool:
-    """Whether anything could be compared at all.
+    """True if anything could be compared at all.
 
     Parameters
     ----------
     document : dict
-        The content of gap.json.
+        Contents of gap.json.
     """
     answer = document["verdict"]
     return bool(answer["label"]) and known(answer["probability"]) and bool(document["evidence"])
 
 
 def is_named(document: dict) -> bool:
-    """Whether the verdict names a cause.
+    """True if the verdict names a cause.
 
     Parameters
     ----------
     document : dict
-        The content of gap.json.
+        Contents of gap.json.
     """
     return is_judged(document) and family(document["verdict"]["label"]) in ("effect", "noise")
 
@@ -288,13 +289,13 @@ def _number_word(number):
 
 
 def _same(document):
-    """Labels that this survey can't tell from the verdict's at its size."""
+    """Labels that this survey cannot separate from the verdict's at its size."""
     answer = document["verdict"]
     return [name for name in answer["same"] if name != answer["label"]]
 
 
 def _sentences(document, label):
-    """A sentence with its numbers for each effect of a label; what it is, where it has none."""
+    """Sentences with numbers for each effect of a label, or its meaning without numbers."""
     cause = next((cause for cause in document["causes"] if cause["effect"] == label), None)
     if cause is None:
         return [meaning(label)]
@@ -309,7 +310,7 @@ def _not_ruled_out(document: dict) -> str:
     Parameters
     ----------
     document : dict
-        The content of gap.json.
+        Contents of gap.json.
     """
     answer = document["verdict"]
     share = _probabilities(document)
@@ -318,18 +319,18 @@ def _not_ruled_out(document: dict) -> str:
 
 
 def _probabilities(document):
-    """Probability of each label that is known."""
+    """Probability of each known label."""
     share = {cause["effect"]: cause["probability"] for cause in document["causes"]}
     return share | {rung["label"]: rung["probability"] for rung in document["evidence"]}
 
 
 def facts(document: dict) -> list[Fact]:
-    """The numbers beside the verdict: how sure, where it shows most, how far it shrinks.
+    """Numbers next to the verdict: certainty, location, and reduction of the gap.
 
     Parameters
     ----------
     document : dict
-        The content of gap.json.
+        Contents of gap.json.
     """
     if not is_judged(document):
         return []
@@ -385,7 +386,7 @@ def _in_hundred(share: float | None) -> str:
 
 
 def chance(p_value: float | None) -> str:
-    """How often a survey would look as odd whose POS alone errs, by as much as fits this one.
+    """Frequency of equally odd surveys with only POS errors of this one's size, in words.
 
     Parameters
     ----------
@@ -413,12 +414,12 @@ def chance(p_value: float | None) -> str:
 
 
 def advice(document: dict) -> tuple[str, list[str]]:
-    """What to do now: a title and sentences.
+    """Recommended actions: a title and sentences.
 
     Parameters
     ----------
     document : dict
-        The content of gap.json or plan.json.
+        Contents of gap.json or plan.json.
     """
     if document["advice"]:
         return "What to do now", document["advice"]
@@ -426,12 +427,12 @@ def advice(document: dict) -> tuple[str, list[str]]:
 
 
 def smallest(detectable: dict[str, list[dict]]) -> list[tuple[str, str]]:
-    """Each effect in words and the smallest size of it that shows, by its worst part.
+    """Each effect in words and its smallest detectable size, by its worst component.
 
     Parameters
     ----------
     detectable : dict
-        By effect, of gap.json.
+        By effect, from gap.json.
     """
     rows = []
     for effect, parts in detectable.items():

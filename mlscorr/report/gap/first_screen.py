@@ -1,4 +1,4 @@
-"""What a diagnosis says first, in terminal, gap.json and page: two answers, and what is open."""
+"""First screen of a diagnosis in terminal, gap.json and page: two answers, and open questions."""
 
 from collections.abc import Iterator
 from itertools import groupby
@@ -17,7 +17,7 @@ from mlscorr.report.headline import (
 )
 from mlscorr.wording import joined, length_in_words
 
-RATINGS = {"good": "green", "open": "amber", "bad": "red"}  # by the tone of a verdict
+RATINGS = {"good": "green", "open": "amber", "bad": "red"}  # by tone of the verdict
 TIMES = [time for _, time, _ in POS.process_shapes]
 USES = {  # of defaults that are not estimated
     "pos.attitude_sigma": "how much larger or smaller it is, is open",
@@ -25,7 +25,7 @@ USES = {  # of defaults that are not estimated
     "scanner.range_noise": "how rough surfaces are is not compared with it",
     "scanner.angle_noise": "how rough surfaces are is not compared with it",
 }
-THINGS = {  # what a residual is of, in words
+THINGS = {  # observed items of residuals, in words
     "target": "Surveyed targets",
     "surface": "Reference surface",
     "shared": "Planes that two passes both saw",
@@ -38,7 +38,7 @@ def gap_screen(document: dict) -> dict[str, object]:
     Parameters
     ----------
     document : dict
-        Its other content.
+        Rest of the document.
     """
     box = verdict(document)
     first, *more = box.sentences
@@ -55,12 +55,12 @@ def gap_screen(document: dict) -> dict[str, object]:
 
 
 def accuracy(document: dict) -> Iterator[StatementRow]:
-    """Whether the recorded cloud is as accurate as POS, scanner and survey state.
+    """Yield statements on the accuracy of the recorded cloud relative to POS, scanner and survey.
 
     Parameters
     ----------
     document : dict
-        The content of gap.json.
+        Contents of gap.json.
     """
     parts = document["agreement"]
     if document["simulator"]["effects"]:
@@ -89,7 +89,7 @@ def accuracy(document: dict) -> Iterator[StatementRow]:
 
 
 def _unstated_accuracy(document, less):
-    """How far off the recorded cloud is, where nobody stated how far the POS may be off."""
+    """Statement on errors of the recorded cloud without a stated POS accuracy."""
     sizes = [
         (THINGS[part["channel"]], f"off by {length_in_words(part['rms_mm'] / 1e3)} (RMS per axis)")
         for part in document["agreement"]
@@ -102,7 +102,7 @@ def _unstated_accuracy(document, less):
 
 
 def _moved(document):
-    """What the cause itself does to points."""
+    """Statement on the shift of points by the cause itself."""
     causes = [c for c in document["causes"] if c["effect"] == document["verdict"]["label"]]
     if not is_named(document) or not causes or not causes[0]["rms_mm"]:
         return ()
@@ -111,12 +111,12 @@ def _moved(document):
 
 
 def unjudged(document: dict) -> Iterator[StatementRow]:
-    """The effects that this survey can say nothing of, by reason.
+    """Yield statements on effects that this survey cannot judge, by reason.
 
     Parameters
     ----------
     document : dict
-        The content of gap.json.
+        Contents of gap.json.
     """
     left = sorted(document["left_out"].items(), key=lambda item: item[1])
     if left:

@@ -1,4 +1,4 @@
-"""The pages and figures of a diagnosis, and of what a survey could diagnose before it is driven."""
+"""Pages and figures of a diagnosis, and of a planned survey's diagnosis."""
 
 from functools import partial
 
@@ -36,12 +36,12 @@ from mlscorr.wording import DASH, joined, known, percent, signed
 
 
 def diagnosis_figures(document: dict) -> Figures:
-    """Functions that draw the figures of a diagnosis, by name.
+    """Make functions that draw the figures of a diagnosis, by name.
 
     Parameters
     ----------
     document : dict
-        The content of gap.json; what was not determined is None.
+        Contents of gap.json, with None for undetermined values.
     """
     figures = {
         "where": (where_figure, document["where"]),
@@ -56,12 +56,12 @@ def diagnosis_figures(document: dict) -> Figures:
 
 
 def plan_figures(document: dict) -> Figures:
-    """Functions that draw the figures of a plan, by name.
+    """Make functions that draw the figures of a plan, by name.
 
     Parameters
     ----------
     document : dict
-        The content of plan.json.
+        Contents of plan.json.
     """
     figures = {}
     worst = worst_rows(detectable_rows(document["detectable"]))
@@ -81,7 +81,7 @@ def _separability(document):
     return {}
 
 
-SECTIONS = {  # in their order; one without anything to show is left out
+SECTIONS = {  # in order; empty ones are omitted
     "where": "Where it shows",
     "innovations": "Over time",
     "evidence": "Candidates",
@@ -108,14 +108,14 @@ PLANNED = {
 
 
 def diagnosis_page(document: dict, name: str) -> Page:
-    """The self-contained page of a diagnosis.
+    """Make the self-contained page of a diagnosis.
 
     Parameters
     ----------
     document : dict
-        The content of gap.json; what was not determined is None.
+        Contents of gap.json, with None for undetermined values.
     name : str
-        Of the survey.
+        Name of the survey.
     """
     separability = document["separability"]
     closure = document["closure"]
@@ -161,14 +161,14 @@ def diagnosis_page(document: dict, name: str) -> Page:
 
 
 def plan_page(document: dict, name: str) -> Page:
-    """The self-contained page of what a planned survey could show.
+    """Make the self-contained page of a planned survey's diagnosis.
 
     Parameters
     ----------
     document : dict
-        The content of plan.json.
+        Contents of plan.json.
     name : str
-        Of the survey.
+        Name of the survey.
     """
     detectable = rows.detectable_rows(document["detectable"])
     worst = rows.worst_rows(detectable)
@@ -194,7 +194,7 @@ def plan_page(document: dict, name: str) -> Page:
 
 
 def _page(document, name, headline, summary, sections, separability, content):
-    """The Page with what both have."""
+    """Page with the parts common to both."""
     advice_title, sentences = advice(document)
     common = {
         "document": document,
@@ -210,7 +210,7 @@ def _page(document, name, headline, summary, sections, separability, content):
 
 
 def _channels(document):
-    """What is shown of channels beside geometry, and of distances."""
+    """Content on non-geometric channels, and on distances."""
     contrasts = document.get("contrasts", ())
     gap = document["gap"]
     sides = (signed(gap[when], gap["unit"]) for when in ("before", "after"))
@@ -225,7 +225,7 @@ def _channels(document):
 
 
 def _open_causes(answer):
-    """The causes in words that a verdict leaves open, as one class; none where it is one cause."""
+    """Open causes of a verdict in words, as one class; empty for a single cause."""
     labels = dict.fromkeys([*answer["set"], *answer["same"]])
     causes = [lowered(title(label)) for label in labels if label not in ("none", "unknown")]
     if len(causes) > 1:
@@ -234,7 +234,7 @@ def _open_causes(answer):
 
 
 def _by_probability(rows):
-    """Rows of causes that are likely, or chosen, and the others."""
+    """Rows of likely or chosen causes, and the others."""
     least = SETTINGS.likely_probability
     probable = [row for row in rows if row.chosen or (row.probability or 0.0) >= least]
     probable = probable or rows[:1]
@@ -242,7 +242,7 @@ def _by_probability(rows):
 
 
 def _plan_verdict(worst, document):
-    """The verdict on a plan: what it can see, what not, and what it can't tell apart."""
+    """Verdict on a plan: visible, invisible and inseparable effects."""
     visible = [row.title for row in worst if row.visible == "yes"]
     hidden = [row.title for row in worst if row.visible not in ("yes", DASH)]
     if len(visible) == 1:

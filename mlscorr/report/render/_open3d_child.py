@@ -1,7 +1,7 @@
-"""Draw points with Open3D, in a process of its own that may fail: python open3d_child.py FOLDER.
+"""Draw points with Open3D in a separate process that may fail: python open3d_child.py FOLDER.
 
-The folder holds job.npz: in camera axes (right, up, towards the eye; m, the focus at zero) the
-points and colours of both sides, size in pixels, scale, the eye's distance, point size, and
+The folder contains job.npz: in camera axes (right, up, toward the eye; m, with the focus at zero)
+the points and colors of both sides, size in pixels, scale, the eye's distance, point size, and
 optionally a file with a reference surface. before.npy and after.npy are written into it.
 """
 
@@ -13,7 +13,7 @@ import numpy as np
 
 
 def main(folder: Path) -> None:
-    """Draw both sides with one renderer; a second one in a process would abort it."""
+    """Draw both sides with one renderer, because a second one in a process would abort it."""
     import open3d
 
     o3d: Any = open3d
@@ -23,10 +23,10 @@ def main(folder: Path) -> None:
     width, height = (int(v) for v in job["size"])
     renderer = rendering.OffscreenRenderer(width, height)
     scene = renderer.scene
-    scene.view.set_post_processing(False)  # colours stay exact, and frames repeat
+    scene.view.set_post_processing(False)  # colors remain exact, and frames repeat
     scene.set_background([1.0, 1.0, 1.0, 1.0])
     depths = [job[f"{side}_xyz"][:, 2] for side in ("before", "after") if len(job[f"{side}_xyz"])]
-    # the clipping planes lie a metre beyond the points
+    # the clipping planes are one meter beyond the points
     low = min((float(d.min()) for d in depths), default=0.0) - 1.0
     high = max((float(d.max()) for d in depths), default=0.0) + 1.0
     _set_camera(rendering, scene.camera, job, low, high)
@@ -60,7 +60,7 @@ def _set_camera(rendering, camera, job, low, high):
 
 
 def _reference(o3d, job):
-    """The reference surface in camera axes, grey, darker where it turns away from the eye."""
+    """Reference surface in camera axes, gray, darker where it is turned away from the eye."""
     mesh = o3d.io.read_triangle_mesh(str(job["reference"]))
     local = (np.asarray(mesh.vertices) - job["focus"]) @ job["axes"].T * [1.0, 1.0, -1.0]
     corners = local[np.asarray(mesh.triangles)].reshape(-1, 3)
@@ -68,12 +68,12 @@ def _reference(o3d, job):
     facing = np.abs(normal[:, 2]) / np.maximum(np.linalg.norm(normal, axis=1), 1e-12)
     shade = np.repeat(0.82 * (0.6 + 0.4 * facing), 3)
     rows = np.arange(len(corners)).reshape(-1, 3)
-    # 2 cm behind the points that lie on it
+    # 2 cm behind the points on it
     surface = o3d.geometry.TriangleMesh(
         o3d.utility.Vector3dVector(corners - [0.0, 0.0, 0.02]), o3d.utility.Vector3iVector(rows)
     )
     surface.vertex_colors = o3d.utility.Vector3dVector(np.repeat(shade[:, None], 3, axis=1))
-    surface.compute_vertex_normals()  # without them the software driver never ends
+    surface.compute_vertex_normals()  # without them the software renderer never ends
     return surface
 
 

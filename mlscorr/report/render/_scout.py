@@ -1,4 +1,4 @@
-"""A first pass over the cloud: an even sample of it, and how each target is turned."""
+"""First pass over the cloud: an even sample of it, and the orientation of each target."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -14,9 +14,9 @@ from mlscorr.survey import PointCloud
 
 @dataclass(frozen=True)
 class Scouted:
-    """An even sample of the cloud before and after, and unit normals (n, 3) of the targets.
+    """Even sample of the cloud before and after, and unit normals (n, 3) of the targets.
 
-    A normal is NaN where too few points lie on the target.
+    A normal is NaN if the target has too few points.
     """
 
     before: PointCloud
@@ -35,12 +35,12 @@ def scout(
     correction : anything with ``apply(cloud) -> cloud``
     targets : list of TargetRow
     sizes : (n,) array
-        Of the targets. Units: m.
+        Sizes of the targets. Units: m.
 
     Raises
     ------
     ValueError
-        For a cloud without points.
+        If the cloud has no points.
     """
     near = [[np.empty((0, 4))] for _ in targets]
     sample = EvenSample(SETTINGS.sample_points)
@@ -61,7 +61,7 @@ def scout(
 
 
 def _around(cloud, centre, radius):
-    """Points within a radius of a centre: coordinates relative to it, and intensity, (n, 4)."""
+    """Points within a radius of a center: coordinates relative to it, and intensity, (n, 4)."""
     rows = np.flatnonzero(np.abs(cloud.xyz[:, 0] - centre[0]) <= radius)
     local = cloud.xyz[rows] - centre
     near = (local**2).sum(axis=1) <= radius**2
@@ -69,13 +69,13 @@ def _around(cloud, centre, radius):
 
 
 def _normal(points):
-    """Unit normal of the bright ones of points (n, 4), NaN where they are too few."""
+    """Unit normal of the bright ones of points (n, 4), NaN if there are too few."""
     if len(points):
         points = points[points[:, 3] >= np.percentile(points[:, 3], 90) / 2, :3]
     if len(points) < SETTINGS.normal_points:
         return np.full(3, np.nan)
     centred = points - np.median(points, axis=0)
-    # what stands before or behind is left out by a second fit to the nearest points
+    # points in front or behind are excluded by a second fit to the nearest points
     for _ in range(2):
         normal = np.linalg.eigh(centred.T @ centred)[1][:, 0]
         away = np.abs(centred @ normal)

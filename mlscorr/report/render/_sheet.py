@@ -1,6 +1,6 @@
-"""A sheet: one view that is drawn, before and after, while the cloud goes by.
+"""Sheet: one view, drawn before and after while the cloud is streamed.
 
-Open3D is another way to draw it: in a child process, which cannot take this one down with it.
+Open3D can draw it, too, in a child process whose crash does not affect this one.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ CHILD = Path(__file__).with_name("_open3d_child.py")
 
 @dataclass(frozen=True)
 class Sheet:
-    """A view with its two canvases."""
+    """View with its two canvases."""
 
     view: View
     canvases: tuple[Canvas, Canvas]
 
     @classmethod
     def blank(cls, view: View) -> Sheet:
-        """Nothing drawn yet. Before a cut its points may lie anywhere."""
+        """Make an empty sheet. Before a cut its points may be anywhere."""
         depth = view.half_depth
         if view.is_cut:
             depth = np.inf
@@ -49,22 +49,22 @@ class Sheet:
             canvas.draw(xyz, value)
 
     def finished(self, by_open3d: bool = False, reference: str | Path | None = None) -> Picture:
-        """The Picture, by Open3D or the z-buffer.
+        """Return the Picture, by Open3D or the z-buffer.
 
         Parameters
         ----------
         by_open3d : bool
         reference : path, optional
-            A surface that Open3D draws behind the points.
+            Surface that Open3D draws behind the points.
 
         Raises
         ------
         RuntimeError
-            Where Open3D fails.
+            If Open3D fails.
         """
         view = self.view
         radius = max(canvas.radius for canvas in self.canvases)
-        if view.is_cut:  # a few points in a row are all there is to see
+        if view.is_cut:  # only a few points in a row are visible
             radius = max(radius, 0.004 * view.camera.size[0])
         pair = [canvas.grown(radius) for canvas in self.canvases]
         scale = colour_scale(view.colour, *(canvas.value for canvas in pair))
@@ -97,27 +97,27 @@ def draw_pair(
     reference: str | Path | None = None,
     timeout: float = SETTINGS.open3d_timeout,
 ) -> tuple[np.ndarray, ...]:
-    """Draw what two canvases show: two RGB arrays (h, w, 3) uint8.
+    """Draw the contents of two canvases as two RGB arrays (h, w, 3) uint8.
 
-    Only points that are nearest to the eye are sent, one for each pixel at most, so that time
-    and memory don't grow with the cloud.
+    Only points nearest to the eye are sent, at most one per pixel, so that time and memory do not
+    grow with the cloud.
 
     Parameters
     ----------
     canvases : pair of Canvas
-        Not grown.
+        Without enlarged points.
     colours : pair of (h, w, 3) uint8 arrays
     point_size : float
         Diameter in pixels.
     reference : path, optional
-        A mesh that is drawn behind the points.
+        Mesh drawn behind the points.
     timeout : float
         Units: s.
 
     Raises
     ------
     RuntimeError
-        With what happened, when the child fails.
+        With the reason, if the child fails.
     """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

@@ -1,4 +1,4 @@
-"""The views of a cloud: of a whole survey, of a wall in section, and of a target close up."""
+"""Views of a cloud: whole survey, section of a wall, and close-up of a target."""
 
 from collections.abc import Iterator
 
@@ -18,13 +18,13 @@ VIEWS = ("overview", "targets", "section")
 
 
 def overview(scouted: Scouted, rows: list[TargetRow], options: PictureOptions) -> View:
-    """The whole survey with the misclosures as enlarged arrows.
+    """Make the view of the whole survey with the misclosures as enlarged arrows.
 
     Parameters
     ----------
     scouted : Scouted
     rows : list of TargetRow
-        Those observed.
+        Observed targets.
     options : PictureOptions
     """
     step = -(-len(scouted.before) // SETTINGS.framing_points)
@@ -39,7 +39,7 @@ def overview(scouted: Scouted, rows: list[TargetRow], options: PictureOptions) -
     ends = np.stack([flat.min(axis=0), flat.max(axis=0)])
     focus = focus + ends.mean(axis=0) @ unit.axes[:2]
     across, up = np.ptp(ends, axis=0)
-    is_long = across > 1.8 * up  # so that both pictures fit one above the other
+    is_long = across > 1.8 * up  # so that both pictures fit in a stack
     if options.wide and is_long:
         size = options.wide
     else:
@@ -59,14 +59,14 @@ def overview(scouted: Scouted, rows: list[TargetRow], options: PictureOptions) -
 
 
 def _along(plan):
-    """The azimuth that lets a street of points (n, 2) run from left to right, north up."""
+    """Azimuth at which a street of points (n, 2) runs from left to right, north up."""
     east, north = np.linalg.eigh(np.cov((plan - plan[0]).T))[1][:, 1]
     azimuth = np.degrees(np.arctan2(east, north)) - 90.0
     return float(np.round((azimuth + 90.0) % 180.0 - 90.0))  # whole degrees, in [-90, 90]
 
 
 def _overview_title(rows):
-    """How far off the independent targets were and are; of a fit there is nothing to boast."""
+    """Title with the accuracy at independent targets; without numbers for a mere fit."""
     if any(row.role == "check" for row in rows):
         role = "check"
     else:
@@ -100,7 +100,7 @@ def _rmse(rows, state):
 
 
 def _symbols(rows, state, times) -> Iterator[Mark]:
-    """Arrows first, then a symbol for each target over them."""
+    """Yield arrows first, then a symbol for each target over them."""
     for row in rows:
         arrow = [row.surveyed, row.surveyed + times * getattr(row, state)]
         yield Mark("residual", np.stack(arrow), f"{times:,.0f}")
@@ -110,20 +110,20 @@ def _symbols(rows, state, times) -> Iterator[Mark]:
 def section(
     scouted: Scouted, options: PictureOptions, ties: TieResiduals | None = None
 ) -> View | None:
-    """A cut through the wall where the correction shows best; None where there is no wall.
+    """Make a section of the wall with the largest visible correction; None without a wall.
 
     Parameters
     ----------
     scouted : Scouted
     options : PictureOptions
     ties : TieResiduals, optional
-        Walls that passes both saw come first.
+        Walls in overlaps have priority.
     """
     place = find_place(scouted, ties)
     if place is None:
         return None
     across = place.normal
-    half = abs(place.shift @ across) + 4 * place.moved  # so much room is beside the misfit
+    half = abs(place.shift @ across) + 4 * place.moved  # space next to the misclosure
     half = float(np.clip(half, *SETTINGS.section_half_width))
     azimuth = float(np.degrees(np.arctan2(across[1], -across[0])))  # along the wall
     scale = options.size[0] / 2 / half
@@ -159,7 +159,7 @@ def section(
 
 
 def _visits(place):
-    """What the visits of a place are called: by their passes, or by their order."""
+    """Names of the visits of a position: their passes, or their order."""
     if place.passes:
         return tuple(f"scanned by pass {number}" for number in place.passes)
     if len(place.splits) < 2:
@@ -174,20 +174,20 @@ def target_view(
     trajectory: Trajectory,
     options: PictureOptions,
 ) -> View:
-    """A target close up, turned so that its misclosure is seen at full length.
+    """Make a close-up of a target, with its misclosure visible at full length.
 
     Parameters
     ----------
     rows : list of TargetRow
-        Of this target, one for each pass.
+        Rows of this target, one for each pass.
     normal : (3,) array
-        Of the target, either sign; NaN where it isn't known.
+        Normal of the target, with either sign; NaN if unknown.
     points : ControlPoints
-        Among them the target.
+        Points including the target.
     trajectory : Trajectory
     options : PictureOptions
     """
-    row = max(rows, key=lambda row: np.linalg.norm(row.before))  # the pass that is worst off
+    row = max(rows, key=lambda row: np.linalg.norm(row.before))  # the worst pass
     k = points.name.index(row.name)
     kind = points.kind[k]
     size = points.size[k]
@@ -219,7 +219,7 @@ def target_view(
 
 
 def _target_title(rows):
-    """How far off the target was and is, at most where it was seen several times."""
+    """Title with the error of the target before and after, the largest of several passes."""
     before, after = (
         max(np.linalg.norm(getattr(row, state)) for row in rows) for state in ("before", "after")
     )
@@ -237,7 +237,7 @@ def _target_title(rows):
 
 
 def _facing(normal, to_vehicle):
-    """The side of a target that was scanned: its unit normal towards the vehicle."""
+    """Scanned side of a target: its unit normal toward the vehicle."""
     if not np.isfinite(normal).all():
         return to_vehicle / np.linalg.norm(to_vehicle)
     if normal @ to_vehicle >= 0:
@@ -246,13 +246,13 @@ def _facing(normal, to_vehicle):
 
 
 def _direction(facing, misclosure):
-    """Where to look from: across the misclosure, and as near to face on as that allows."""
+    """Viewing direction: perpendicular to the misclosure, and as frontal as possible."""
     length = np.linalg.norm(misclosure)
     if length < SETTINGS.visible:
         return facing
     along = misclosure / length
     across = facing - (facing @ along) * along
-    if np.linalg.norm(across) < 1e-3:  # the target moves straight to the eye
+    if np.linalg.norm(across) < 1e-3:  # the target moves directly toward the eye
         if abs(facing[2]) > 0.7:
             across = np.array([0.0, -1.0, 0.0])
         else:
@@ -264,12 +264,12 @@ def _direction(facing, misclosure):
     if np.linalg.norm(turned) > 1e-9:
         turned /= np.linalg.norm(turned)
     direction = np.cos(angle) * facing + np.sin(angle) * turned
-    direction[2] = max(direction[2], 0.0)  # not from under the road
+    direction[2] = max(direction[2], 0.0)  # not from below the road
     return direction / np.linalg.norm(direction)
 
 
 def _outline(kind, size, normal):
-    """A disc's or an upright square's outline about the origin: (n, 3) in m."""
+    """Outline of a disc or an upright square about the origin: (n, 3) in m."""
     if abs(normal[2]) > 0.9:
         up = np.array([0.0, 1.0, 0.0])
     else:

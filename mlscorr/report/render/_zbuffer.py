@@ -1,4 +1,4 @@
-"""A z-buffer for points: each pixel keeps the nearest one, whatever the order they come in."""
+"""Z-buffer for points: each pixel keeps the nearest one, in any order of points."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ import numpy as np
 from mlscorr.compiled_loops import loop
 from mlscorr.report.render.view import Camera
 
-DEEPEST = 20_000.0  # m before and behind the focus
+DEEPEST = 20_000.0  # m in front of and behind the focus
 DEPTH_STEP = 1e-5  # m: 2 * DEEPEST / DEPTH_STEP fits 32 bits
 EMPTY = np.uint64(np.iinfo(np.uint64).max)
 
 
 @dataclass(frozen=True)
 class Canvas:
-    """The nearest point of each pixel.
+    """Nearest point of each pixel.
 
     Parameters
     ----------
     camera : Camera
     half_depth : float
-        Points farther before or behind the focus are not drawn. Units: m.
+        Points farther in front of or behind the focus are not drawn. Units: m.
     pixels : (height, width) array of uint64
 
-    A pixel holds one number: depth in steps of 0.01 mm in the upper 32 bits, the bits of the
-    point's float32 value in the lower ones. The smallest number wins, so points of equal depth
-    are decided by their values, and neither order nor chunks change the picture.
+    A pixel is one number: depth in steps of 0.01 mm in the upper 32 bits, the bits of the point's
+    float32 value in the lower ones. The smallest number wins. Points of equal depth are thus
+    ordered by value, and neither order nor chunks change the picture.
     """
 
     camera: Camera
@@ -36,18 +36,18 @@ class Canvas:
 
     @classmethod
     def blank(cls, camera: Camera, half_depth: float = np.inf) -> Canvas:
-        """Nothing drawn yet."""
+        """Make an empty canvas."""
         width, height = camera.size
         return cls(camera, min(half_depth, DEEPEST), np.full((height, width), EMPTY))
 
     def holds(self, xyz: np.ndarray) -> np.ndarray:
-        """Which points (n, 3) lie within half_depth of the focus: (n,) bool."""
+        """Flag (n,) of points (n, 3) within half_depth of the focus."""
         x, y, z = (xyz - self.camera.focus).T
         away = self.camera.axes[2]
         return np.abs(away[0] * x + away[1] * y + away[2] * z) <= self.half_depth
 
     def draw(self, xyz: np.ndarray, value: np.ndarray) -> None:
-        """Add points: (n, 3) in m, with values (n,)."""
+        """Add points (n, 3) in m, with values (n,)."""
         camera = self.camera
         _draw(
             np.ascontiguousarray(xyz, dtype=float),
@@ -62,7 +62,7 @@ class Canvas:
 
     @property
     def radius(self) -> float:
-        """Radius in pixels that lets neighbouring points touch, from how dense they lie."""
+        """Radius in pixels at which adjacent points touch, from their density."""
         block = 16  # pixels, in which the density of points is counted
         rows, columns = (-np.array(self.pixels.shape)) % block
         blocks = np.pad(self.drawn, ((0, rows), (0, columns)))
@@ -70,15 +70,15 @@ class Canvas:
         counts = np.sort(blocks[blocks > 0])
         if len(counts) == 0:
             return 0.0
-        half = np.searchsorted(np.cumsum(counts), counts.sum() / 2)  # seen from the median point
+        half = np.searchsorted(np.cumsum(counts), counts.sum() / 2)  # at the median point
         distance = block / np.sqrt(counts[half])  # to the next point
         return float(min(0.85 * distance, 7.0))  # surfaces close, and few points stay points
 
     def grown(self, radius: float) -> Canvas:
-        """The canvas with each point as a disc of a radius in pixels.
+        """Return the canvas with each point as a disc of a radius in pixels.
 
-        Where discs overlap the nearer point is seen: the same as if every point of the cloud
-        had been drawn as a disc about its pixel.
+        Where discs overlap, the nearer point is visible, as if every point of the cloud had been
+        drawn as a disc around its pixel.
         """
         steps = np.arange(-int(radius), int(radius) + 1)
         rows, columns = np.meshgrid(steps, steps, indexing="ij")
@@ -89,20 +89,20 @@ class Canvas:
 
     @property
     def value(self) -> np.ndarray:
-        """Values (height, width) of the points seen, NaN where there is none."""
+        """Values (height, width) of the visible points, NaN without one."""
         value = (self.pixels & np.uint64(0xFFFFFFFF)).astype(np.uint32).view(np.float32)
         return np.where(self.drawn, value, np.float32(np.nan))
 
     @property
     def drawn(self) -> np.ndarray:
-        """Whether a point is seen, for each pixel (height, width)."""
+        """Flag (height, width) of pixels with a visible point."""
         return self.pixels != EMPTY
 
     @property
     def points(self) -> np.ndarray:
-        """The points seen (n, 3) float32, to the pixel, in camera axes about the focus.
+        """Visible points (n, 3) float32, to the pixel, in camera axes relative to the focus.
 
-        They are right, up and towards the eye; pixels go row by row. Units: m.
+        The axes are right, up and toward the eye; pixels go row by row. Units: m.
         """
         row, column = np.nonzero(self.drawn)
         depth = (self.pixels[row, column] >> np.uint64(32)) * DEPTH_STEP - DEEPEST
@@ -114,9 +114,9 @@ class Canvas:
 
     @property
     def light(self) -> np.ndarray:
-        """How light each pixel is, in [0, 1]: those behind a near edge are darker.
+        """Brightness of each pixel, in [0, 1]: darker behind a near edge.
 
-        From depth alone, as eye-dome lighting (Boucheny 2009); slopes keep their colours.
+        It depends only on depth, as in eye-dome lighting (Boucheny 2009); slopes keep their colors.
         """
         return _light(self.pixels, self.camera.scale * DEPTH_STEP)
 
@@ -164,7 +164,7 @@ def _grow(pixels, disc, grown):
 
 @loop
 def _light(pixels, pixels_per_step):
-    deepest = 3.0  # pixels of depth beyond which an edge is not darker; half of it is no edge
+    deepest = 3.0  # pixels of depth at which an edge is darkest; half of it is no edge
     height, width = pixels.shape
     light = np.ones((height, width))
     for i in range(2, height - 2):
@@ -178,7 +178,7 @@ def _light(pixels, pixels_per_step):
                 right = pixels[i - a, j - b]
                 if EMPTY in (left, right):
                     continue
-                # the mean of opposite pixels: a slope by itself is no edge
+                # mean of opposite pixels, because a slope is not an edge
                 mean = (np.int64(left >> np.uint64(32)) + np.int64(right >> np.uint64(32))) / 2
                 behind = (here - mean) * pixels_per_step - deepest / 2
                 edge += min(max(behind, 0.0), deepest)

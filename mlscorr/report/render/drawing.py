@@ -1,4 +1,4 @@
-"""From the cloud to pictures: the views are drawn together while the cloud goes by."""
+"""From the cloud to pictures: all views are drawn together while the cloud is streamed."""
 
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -34,30 +34,30 @@ def draw(
     progress: Callable | None = None,
     ties: TieResiduals | None = None,
 ) -> Iterator[Picture]:
-    """Draw a recorded survey before and after a correction, by the same cameras and colours.
+    """Draw a recorded survey before and after a correction, with the same cameras and colors.
 
-    The cloud is streamed in flat memory: once to see where to look, and once to draw.
+    The cloud is streamed twice in flat memory: to choose the views, and to draw.
 
     Parameters
     ----------
     survey : Survey
     correction : anything with ``apply(cloud) -> cloud``
-        The sigma that remains is known where it has a ``corrected`` trajectory with sigmas.
+        The sigma after it is known if it has a ``corrected`` trajectory with sigmas.
     targets : list of TargetRow
     options : PictureOptions
-        Size, colour and camera.
+        Size, color and camera.
     views : sequence of str
         Of VIEWS: overview, targets, section.
     engine : str
-        ``zbuffer``, or ``open3d``: in a child process by way of Vulkan, slower, with the
-        survey's reference surface behind the points of the overview. Where that fails the
-        z-buffer draws, with a warning.
+        ``zbuffer``, or ``open3d``: in a child process through Vulkan, slower, with the survey's
+        reference surface behind the points of the overview. If that fails, the z-buffer is used,
+        with a warning.
     chunks : function, optional
         Returns an iterator of PointCloud; by default the survey's files are read.
     progress : function, optional
         ``progress(title, total)`` returns a function of the number of points just done.
     ties : TieResiduals, optional
-        Among whose facades the section is looked for first.
+        Their facades have priority for the section.
 
     Yields
     ------
@@ -66,7 +66,7 @@ def draw(
     Raises
     ------
     ValueError
-        For a view, colour, engine or size that there is not, and for a cloud without points.
+        If a view, color, engine or size is invalid, or the cloud has no points.
     """
     check_pictures(options, views, engine)
     stream = _stream(survey, chunks, progress)
@@ -86,7 +86,7 @@ def draw(
                     yield sheet.finished(True, survey.reference)
                     continue
                 except RuntimeError as error:
-                    engine = "zbuffer"  # for the views that follow too
+                    engine = "zbuffer"  # also for the following views
                     warnings.warn(f"{error}: the z-buffer draws the pictures.", stacklevel=2)
             yield sheet.finished()
 
@@ -94,17 +94,17 @@ def draw(
 def check_pictures(
     options: PictureOptions, views: Sequence[str] = VIEWS, engine: str = "zbuffer"
 ) -> None:
-    """Refuse what can't be drawn.
+    """Refuse options that cannot be drawn.
 
     Parameters
     ----------
     options, views, engine
-        As in draw.
+        See draw.
 
     Raises
     ------
     ValueError
-        For a view, colour, engine or size that there is not.
+        If a view, color, engine or size is invalid.
     """
     choices = (
         ("view", views, VIEWS),
@@ -124,7 +124,7 @@ def check_pictures(
 
 
 def _stream(survey, chunks, progress):
-    """A function of a title that returns an iterator of the cloud's chunks, with progress."""
+    """Function of a title that returns an iterator of the cloud's chunks, with progress."""
     total = sum(file.points for file in survey.clouds)
 
     def stream(title):
@@ -143,9 +143,9 @@ def _stream(survey, chunks, progress):
 
 
 def _views(survey, correction, rows, views, options, stream, ties):
-    """The views that are to_draw, after a first pass over the cloud."""
+    """Views to draw, after a first pass over the cloud."""
     points = survey.surveyed
-    close = rows if "targets" in views else []  # how the others are turned matters to no view
+    close = rows if "targets" in views else []  # other views do not need orientations
     sizes = points.size[[points.name.index(row.name) for row in close]]
     scouted = scout(stream, correction, close, sizes)
     to_draw = []
@@ -167,7 +167,7 @@ def _views(survey, correction, rows, views, options, stream, ties):
 
 
 def _add(sheets, chunk):
-    """Draw a chunk on all sheets; what they colour alike is computed once."""
+    """Draw a chunk on all sheets; values shared by several are computed once."""
     values = {}
     for sheet in sheets:
         key = (sheet.view.colour, sheet.view.splits)

@@ -1,4 +1,4 @@
-"""Pictures: what the cloud looks like before and after, and how each is laid out on paper."""
+"""Pictures of the cloud before and after, and their layout on paper."""
 
 import io
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ FRAME = (187, 187, 187)  # RGB
 
 @dataclass(frozen=True)
 class Picture:
-    """One view before and after, by the same camera and colour scale.
+    """One view before and after, with the same camera and color scale.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class Picture:
 
     @property
     def name(self) -> str:
-        """A name for a file, without suffix."""
+        """File name, without suffix."""
         return "".join(c if c.isalnum() or c in "-_." else "_" for c in self.view.name)
 
     def panels(self, decorated: bool = True) -> tuple[bytes, ...]:
@@ -67,7 +67,7 @@ class Picture:
         return [_panel(self.view, k, pixels, corner, height) for k, pixels in enumerate(sides)]
 
     def page(self, size: tuple[int, int]) -> bytes:
-        """The bytes of a PNG: before and after side by side under a title, with a legend.
+        """Return the bytes of a PNG: before and after side by side under a title, with a legend.
 
         Parameters
         ----------
@@ -101,7 +101,7 @@ def panel_size(page: tuple[int, int], stacked: bool = False) -> tuple[int, int]:
 def _panel_corners(panel, page):
     """Column and row of the upper left corner of both panels on their page.
 
-    They stand one above the other where there is no room side by side.
+    They are stacked if there is no room side by side.
     """
     top = round(HEAD * page[1])
     if 2 * panel[0] > page[0]:
@@ -118,7 +118,7 @@ def _png(image):
 
 
 def _few_colours(pixels):
-    """An image of 256 colours: a third of the bytes, and no difference to the eye."""
+    """Reduce an image to 256 colors: a third of the bytes, and no visible difference."""
     return Image.fromarray(pixels).quantize(256, dither=Image.Dither.NONE)
 
 
@@ -189,7 +189,7 @@ def _names(pen, marks, camera, size):
 
 
 def _words(figure, view, left):
-    """The title, and the note in the foot."""
+    """Write the title, and the note at the bottom."""
     figure.text(
         left,
         0.982,

@@ -1,4 +1,4 @@
-"""What a picture shows by colour: a number for each point, before and after."""
+"""Quantities shown by color: a number for each point, before and after."""
 
 from dataclasses import dataclass, replace
 from functools import cache
@@ -12,7 +12,7 @@ from mlscorr.report.style import AFTER, BEFORE, BLACK, BLUE, GREEN, GREY, ORANGE
 from mlscorr.survey import PointCloud, Scanner, Trajectory
 
 COLOURS = ("intensity", "height", "correction", "sigma")
-MAPS = {  # all darker than the paper at both ends, and readable in grey
+MAPS = {  # all darker than paper at both ends, and readable in gray
     "intensity": "cividis",
     "height": "viridis",
     "correction": "plasma",
@@ -24,20 +24,20 @@ LABELS = {
     "correction": ("How far off each point is: before, by its correction; after, one sigma", "m"),
     "sigma": ("One sigma of each point, as the trajectory states it", "m"),
 }
-GHOST = "#c9c9c9"  # the other state, behind
+GHOST = "#c9c9c9"  # the other state, in the background
 PAIRS = {"visit": (BLUE, VERMILLION, GREEN, ORANGE, SKY, BLACK), "state": (BEFORE, AFTER)}
 STATES = ("as recorded", "corrected", "the other of the two")
 
 
 @dataclass(frozen=True)
 class ColourScale:
-    """A scale of colours from a low to a high value, by a power of the share between them.
+    """Color scale from a low to a high value, by a power of the share between them.
 
     Parameters
     ----------
     low, high : float
     exponent : float
-        1 is linear; below it, small values take more of the colours.
+        1 is linear; below 1, small values get more of the colors.
 
     >>> ColourScale(0.0, 0.4, 0.5).middle
     0.1
@@ -48,27 +48,27 @@ class ColourScale:
     exponent: float = 1.0
 
     def share(self, value: np.ndarray) -> np.ndarray:
-        """Place of values on the scale, 0 to 1."""
+        """Return the position of values on the scale, 0 to 1."""
         return np.clip((value - self.low) / (self.high - self.low), 0, 1) ** self.exponent
 
     @property
     def middle(self) -> float:
-        """Value of the colour in the middle."""
+        """Value of the color in the middle."""
         return self.low + (self.high - self.low) * 0.5 ** (1 / self.exponent)
 
 
 @dataclass(frozen=True)
 class CloudPair:
-    """A chunk of the cloud before and after its correction.
+    """Chunk of the cloud before and after its correction.
 
-    By correction, a point is as far off before as it will be moved, and after as the corrected
-    trajectory's sigma says; where there is none, its size is shown on both sides.
+    For the color correction, the value before is the size of the correction, and after the sigma of
+    the corrected trajectory; without one, the size is shown on both sides.
 
     Parameters
     ----------
     before, after : PointCloud
     sigmas : pair of PointSigma
-        None where it isn't known.
+        None if unknown.
     """
 
     before: PointCloud
@@ -76,9 +76,10 @@ class CloudPair:
     sigmas: tuple[PointSigma | None, PointSigma | None]
 
     def values(self, colour: str, splits: tuple[float, ...] = ()) -> tuple[np.ndarray, np.ndarray]:
-        """Values (n,) of a colour before and after.
+        """Return values (n,) of a color before and after.
 
-        Besides COLOURS, ``visit`` counts splits before a time, ``state`` tells before from after.
+        Besides COLOURS, ``visit`` counts splits before a time, ``state`` separates before and
+        after.
         """
         if colour == "state":
             return np.zeros(len(self.before)), np.ones(len(self.after))
@@ -96,7 +97,7 @@ class CloudPair:
         return size, size if self.sigmas[1] is None else self._sigma(1)
 
     def _sigma(self, side):
-        """One sigma in 3D, NaN where it isn't known."""
+        """One sigma in 3D, NaN if unknown."""
         cloud = (self.before, self.after)[side]
         sigma = self.sigmas[side]
         if sigma is None:
@@ -105,20 +106,20 @@ class CloudPair:
 
 
 def point_sigma(trajectory: Trajectory | None) -> PointSigma | None:
-    """Sigma of points by a trajectory's own sigmas alone; None where it states none."""
+    """Make the sigma of points from a trajectory's sigmas only; None without any."""
     if trajectory is None or trajectory.position_sigma is None or trajectory.attitude_sigma is None:
         return None
     return PointSigma.of(Correction(trajectory, trajectory), Scanner(range_noise=0, angle_noise=0))
 
 
 def swatches(colour: str, visits: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
-    """Pairs (colour, words) of what a picture tells apart; none where it has a scale.
+    """Pairs (color, words) of the categories of a picture; empty if it has a scale.
 
     Parameters
     ----------
     colour : str
     visits : tuple of str
-        What each visit is called.
+        Name of each visit.
     """
     if colour == "state":
         return tuple(zip((*PAIRS[colour], GHOST), STATES, strict=True))
@@ -127,22 +128,22 @@ def swatches(colour: str, visits: tuple[str, ...]) -> tuple[tuple[str, str], ...
 
 
 def percentiles(values: np.ndarray) -> np.ndarray:
-    """Ends of a colour scale: single bright points don't darken all others."""
+    """Ends of a color scale, so that single bright points do not darken the rest."""
     return np.percentile(values, [1.0, 99.0])
 
 
 def colour_scale(colour: str, *values: np.ndarray) -> ColourScale:
-    """One scale for all pictures of a view, by which the darkest of them shows structure, too.
+    """Make one scale for all pictures of a view that shows structure in the darkest one, too.
 
-    Its exponent lifts the median of the darkest picture to ``SETTINGS.darkest_median``. Without it
-    a cloud of a few centimeters beside one of decimeters, or a road beside a bright target, is one
-    dark mass.
+    Its exponent raises the median of the darkest picture to ``SETTINGS.darkest_median``. Without
+    it, a cloud with a few centimeters compared with decimeters, or a road near a bright target,
+    would be uniformly dark.
 
     Parameters
     ----------
     colour : str
     *values : (h, w) arrays
-        NaN where there is nothing.
+        NaN for empty pixels.
     """
     sides = [side for side in (v[np.isfinite(v)] for v in values) if len(side)]
     if colour in PAIRS or not sides:
@@ -150,7 +151,7 @@ def colour_scale(colour: str, *values: np.ndarray) -> ColourScale:
     low, high = percentiles(np.concatenate(sides)).tolist()
     if colour == "height":
         return ColourScale(low, max(high, low + 1e-3))
-    linear = ColourScale(0.0, max(high, 1e-3))  # from its low, noise would fill the whole scale
+    linear = ColourScale(0.0, max(high, 1e-3))  # with its own low, noise would fill the whole scale
     darkest = min(float(np.median(linear.share(side))) for side in sides)
     darkest = max(darkest, SETTINGS.darkest_median**SETTINGS.strongest_power)
     exponent = min(1.0, np.log(SETTINGS.darkest_median) / np.log(min(darkest, 0.999)))
@@ -175,12 +176,12 @@ def paint(colour: str, value: np.ndarray, scale: ColourScale) -> np.ndarray:
 
 @cache
 def colour_table(colour: str) -> np.ndarray:
-    """The colours of a scale from its low to its high end: (256, 3) uint8."""
+    """Colors of a scale from its low to its high end: (256, 3) uint8."""
     highest = 1.0 if colour == "intensity" else 0.85  # beyond it is too pale on white
     table = matplotlib.colormaps[MAPS[colour]](np.linspace(0.0, highest, 256))
     return (table[:, :3] * 255).round().astype(np.uint8)
 
 
 def rgb(*names: str) -> np.ndarray:
-    """Colours by name as RGB (n, 3) uint8."""
+    """Colors by name as RGB (n, 3) uint8."""
     return (np.array([matplotlib.colors.to_rgb(name) for name in names]) * 255).round().astype("u1")

@@ -1,4 +1,4 @@
-"""Where a cross-section shows the most: the wall that the correction moves the farthest."""
+"""Position of the most instructive cross-section: the wall with the largest correction."""
 
 from dataclasses import dataclass, replace
 
@@ -13,27 +13,27 @@ from mlscorr.ties import SETTINGS as TIES
 
 @dataclass(frozen=True)
 class Place:
-    """A wall to cut through.
+    """Wall to cut through.
 
     Parameters
     ----------
     focus : (3,) array
-        A point on the wall, after the correction. Units: m.
+        Point on the wall, after the correction. Units: m.
     normal : (3,) array
         Horizontal unit vector across the wall.
     shift : (3,) array
-        The correction of its points. Units: m.
+        Correction of its points. Units: m.
     ground, foot : float
-        Heights of the lowest point there, and of the wall's lower end. Units: m.
+        Heights of the lowest point nearby, and of the wall's lower end. Units: m.
     moved : float
-        How far it moves across itself and upwards; of a wall visited again, how much the faces
-        that were scanned approach or part. Units: m.
+        Motion across itself and upward; for a wall with several visits, the change of distance
+        between the scanned faces. Units: m.
     splits : tuple of float
-        Times between visits; none where it was scanned once. Units: s.
+        Times between visits; empty for a single scan. Units: s.
     before, after : float
-        Where it was scanned again, how far apart its faces lie. Units: m.
+        Distance of its faces if it was scanned again. Units: m.
     passes : tuple of int
-        Of each visit, where ties tell it.
+        Pass of each visit, if known from ties.
     """
 
     focus: np.ndarray
@@ -49,10 +49,10 @@ class Place:
 
 
 def find_place(scouted: Scouted, ties: TieResiduals | None = None) -> Place | None:
-    """The wall at which the misfit shows best in a cross-section, or None without any wall.
+    """Wall with the most visible misclosure in a cross-section, or None without any wall.
 
-    A facade that ties hold comes first, then a wall that was visited twice and that the correction
-    moves by different amounts; else the one that it moves the farthest.
+    A facade with ties has priority, then a wall with two visits and different corrections, then the
+    one with the largest correction.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def find_place(scouted: Scouted, ties: TieResiduals | None = None) -> Place | No
 
 
 def worst_facades(residuals: TieResiduals) -> Ties:
-    """The facades at which ties show that passes lay the farthest apart, of those used.
+    """Facades with the largest misclosures of used ties between passes.
 
     Parameters
     ----------
@@ -83,12 +83,12 @@ def worst_facades(residuals: TieResiduals) -> Ties:
 
 
 def _places(scouted, cells):
-    """The Place of each cell (rows of the sample) that is a wall, after how well it shows."""
+    """Place of each cell (rows of the sample) that is a wall, after its visibility."""
     places = []
-    clear = 10 * SETTINGS.normal_points  # more points don't make a wall clearer
+    clear = 10 * SETTINGS.normal_points  # more points do not make a wall clearer
     for rows in cells:
         if (place := _wall(scouted, rows)) is not None:
-            # where wall and ground meet there is more to see
+            # the junction of wall and ground is more instructive
             floats = place.foot - place.ground > SETTINGS.wall_height / 2
             places.append((place.moved * min(len(rows) / clear, 1.0) / (1 + 9 * floats), place))
     return places
@@ -113,7 +113,7 @@ def _about(xyz, middle):
 
 
 def _cells(scouted):
-    """Rows of the sample in each cell that is high enough to hold a wall."""
+    """Rows of the sample in each cell that is high enough for a wall."""
     xyz = scouted.after.xyz
     plan = np.floor((xyz[:, :2] - xyz[:, :2].min(axis=0)) / SETTINGS.plan_cell).astype(np.int64)
     key = plan[:, 0] * (plan[:, 1].max() + 1) + plan[:, 1]
@@ -127,7 +127,7 @@ def _cells(scouted):
 
 
 def _wall(scouted, rows):
-    """The Place of a cell, or None when its points are no wall."""
+    """Place of a cell, or None if its points are not a wall."""
     xyz = scouted.after.xyz[rows]
     ground = float(xyz[:, 2].min())
     rows = rows[xyz[:, 2] > ground + SETTINGS.wall_height / 3]
@@ -166,7 +166,7 @@ def _visits(time):
 
 
 def _passes(place, ties):
-    """Pass of each visit by the nearest tie of its time; () where two visits are of one pass."""
+    """Pass of each visit from the nearest tie in time; () if two visits are of one pass."""
     time = ties.gps_time.ravel()
     number = ties.pass_number.ravel()
     away = np.linalg.norm(ties.place.reshape(-1, 3) - place.focus, axis=1)

@@ -1,4 +1,4 @@
-"""What stands beside the points: scale bar, compass and legend."""
+"""Symbols of a picture: scale bar, compass and legend."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -110,7 +110,7 @@ def _paper(pen, left, top, right, bottom):
 
 
 def free_corner(*pictures: np.ndarray) -> tuple[int, int]:
-    """The corner (column, row; 0 or 1) other than the scale bar's with the least points."""
+    """Corner (column, row; 0 or 1) with the least points, except the scale bar's."""
     height, width = pictures[0].shape[:2]
     side = round(4 * _unit((width, height)))
 
@@ -176,7 +176,7 @@ def compass(pen: Pen, camera: Camera, corner: tuple[int, int], size: float) -> N
 
 
 def legend(figure: Figure, view: Any, scale: ColourScale, margins: tuple[float, float]) -> None:
-    """What colours and marks mean, in the foot of the page.
+    """Explain colors and marks at the bottom of the page.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def legend(figure: Figure, view: Any, scale: ColourScale, margins: tuple[float, 
     view : View
     scale : ColourScale
     margins : (float, float)
-        Beside the panels and below them, over width and height of the page.
+        Margins next to and below the panels, relative to width and height of the page.
     """
     gap, foot = margins
     place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (gap, 0.01)}
@@ -213,7 +213,7 @@ def _colour_bar(figure, colour, scale, place):
     axes.tick_params(labelsize=size, length=3)
     values = MaxNLocator(6).tick_values(scale.low, scale.high)
     values = values[(values >= scale.low) & (values <= scale.high)]
-    if scale.exponent < 1:  # where even steps would crowd at the end
+    if scale.exponent < 1:  # even steps would crowd at the end
         values = np.array([scale.low, *_quarters(scale), scale.high])
     axes.set_xticks(scale.share(values), [f"{value:.2g}" for value in values])
     if unit:
@@ -222,14 +222,14 @@ def _colour_bar(figure, colour, scale, place):
 
 
 def _quarters(scale):
-    """Values at a quarter, the half and three quarters of a scale."""
+    """Values at one quarter, one half and three quarters of a scale."""
     return scale.low + (scale.high - scale.low) * np.array([0.25, 0.5, 0.75]) ** (
         1 / scale.exponent
     )
 
 
 def _handles(view) -> Iterator[Line2D]:
-    """Legend entries of what is drawn in a view."""
+    """Yield legend entries of items drawn in a view."""
     marks = [mark for side in view.marks for mark in side]
     kinds = {mark.kind for mark in marks}
     arrow = r"$\rightarrow$"

@@ -1,4 +1,4 @@
-"""What a pair of pictures shows: from where, with which marks, and what the user asked of it."""
+"""Contents of a pair of pictures: camera, marks, and the user's options."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Camera:
-    """A camera that looks at a focus, in parallel projection or from a finite distance.
+    """Camera aimed at a focus, in parallel projection or from a finite distance.
 
     Parameters
     ----------
     focus : (3,) array
-        The point in the middle of the picture. Units: m.
+        Point in the middle of the picture. Units: m.
     axes : (3, 3) array
         Unit vectors to the picture's right, up, and away from the eye, as rows.
     scale : float
-        Pixels per metre at the focus.
+        Pixels per meter at the focus.
     size : (int, int)
         Width and height in pixels.
     distance : float
-        From the eye to the focus; infinite for parallel projection. Units: m.
+        Distance from eye to focus; infinite for parallel projection. Units: m.
 
     >>> camera = Camera.towards([500000.0, 3e6, 20.0], 0.0, 90.0, 10.0, (800, 600))
     >>> pixel, depth = camera.project(np.array([[500002.0, 3e6 + 1.0, 23.0]]))
@@ -46,18 +46,18 @@ class Camera:
         size: tuple[int, int],
         view_angle: float = 0.0,
     ) -> Camera:
-        """A camera that looks towards an azimuth from an elevation above the horizon.
+        """Make a camera facing an azimuth from an elevation above the horizon.
 
         Parameters
         ----------
         focus, scale, size
-            As in Camera.
+            See Camera.
         azimuth : float
-            Clockwise from grid north; seen from straight above it is what is up. Units: deg.
+            Clockwise from grid north; from straight above it is the direction up. Units: deg.
         elevation : float
-            90 looks straight down. Units: deg.
+            90 is straight down. Units: deg.
         view_angle : float
-            The picture's whole width seen from the eye, 0 for parallel projection. Units: deg.
+            Angle of the picture's whole width, 0 for parallel projection. Units: deg.
         """
         a, e = np.radians([azimuth, elevation])
         right = np.array([np.cos(a), -np.sin(a), 0.0])
@@ -71,10 +71,10 @@ class Camera:
         )
 
     def project(self, xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Pixel coordinates (n, 2), column and row, and depth (n,) behind the focus in m.
+        """Return pixel coordinates (n, 2), column and row, and depth (n,) behind the focus in m.
 
-        Column 0 begins at the left edge, row 0 at the upper one: a point whose coordinates lie
-        in [k, k + 1) lands on pixel k.
+        Column 0 begins at the left edge, row 0 at the upper one: a point with coordinates in [k, k
+        + 1) is on pixel k.
         """
         x, y, depth = self.axes @ (np.asarray(xyz, float) - self.focus).T
         scale = self.scale
@@ -86,7 +86,7 @@ class Camera:
 
 @dataclass(frozen=True)
 class Mark:
-    """A line, an arrow, a symbol or a name over the points.
+    """Line, arrow, symbol or name over the points.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ class Mark:
 
 @dataclass(frozen=True)
 class View:
-    """One pair of pictures: what it shows, from where, and its marks before and after.
+    """One pair of pictures: camera, color, and marks before and after.
 
     Parameters
     ----------
@@ -114,13 +114,13 @@ class View:
     colour : str
         One of COLOURS, ``visit`` or ``state``.
     half_depth : float
-        Points farther before or behind the focus are left out. Units: m.
+        Points farther in front of or behind the focus are omitted. Units: m.
     is_cut : bool
-        Whether that is decided after the correction, so that both sides show the same points.
+        True if that is decided after the correction, so that both sides show the same points.
     splits : tuple of float
         Times between visits. Units: s.
     visits : tuple of str
-        What each visit is called.
+        Name of each visit.
     marks : pair of tuples of Mark
     """
 
@@ -138,7 +138,7 @@ class View:
 
 @dataclass(frozen=True)
 class PictureOptions:
-    """What the user asked of pictures; None and 0 leave it to the view.
+    """User's options for pictures; None and 0 leave the choice to the view.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ class PictureOptions:
         Width and height of each picture, and of the overview of a long street. Units: pixels.
     colour : str, optional
     azimuth, elevation, view_angle : float, optional
-        As in Camera.towards. Units: deg.
+        See Camera.towards. Units: deg.
     """
 
     size: tuple[int, int]
@@ -164,7 +164,7 @@ class PictureOptions:
         scale: float,
         size: tuple[int, int] | None = None,
     ) -> Camera:
-        """The camera of a view that would look this way by itself."""
+        """Return the camera of a view with this default direction."""
         size = self.size if size is None else size
         azimuth = azimuth if self.azimuth is None else self.azimuth
         if self.elevation is not None:

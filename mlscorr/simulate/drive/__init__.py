@@ -1,3 +1,3 @@
-"""How the vehicle moves."""
+"""Motion of the vehicle."""
 
 from mlscorr.simulate.drive.passes import drive

@@ -1,4 +1,4 @@
-"""How fast a vehicle goes: cruising with slow variation, stops, and slower through a U-turn."""
+"""Speed of a vehicle: slow variation, stops, and slowing down in a U-turn."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from mlscorr.simulate.settings import SETTINGS
 
 @dataclass(frozen=True)
 class Pace:
-    """The speed of one pass over its time.
+    """Speed of one pass over time.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class Pace:
     slow_for: float = 4.0
 
     def speed(self, elapsed: np.ndarray) -> np.ndarray:
-        """Speed (n,) at times (n,) since the start of the pass; exactly 0 in stops. m/s.
+        """Return the speed (n,) at times (n,) since the start of the pass; exactly 0 in stops. m/s.
 
         Parameters
         ----------
@@ -63,7 +63,7 @@ class Pace:
         return speed
 
     def distance(self, elapsed: np.ndarray) -> np.ndarray:
-        """Distance (n,) travelled at even times (n,) from 0. Units: m.
+        """Return the distance (n,) traveled at regular times (n,) from 0. Units: m.
 
         Parameters
         ----------
@@ -74,7 +74,7 @@ class Pace:
 
 
 def smooth_step(x: np.ndarray) -> np.ndarray:
-    """0 below 0, 1 above 1, smooth in between.
+    """Smooth transition from 0 below 0 to 1 above 1.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The path of a pass: along a way, with a U-turn at its end if asked; or as a file gives it."""
+"""Path of a pass: along a way, with an optional U-turn at its end, or from a file."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from mlscorr.survey import GAP_FACTOR
 
 @dataclass(frozen=True)
 class Path:
-    """A path by its own length (m): position (3,) of what drives, and its cross fall.
+    """Path by its own length (m): position (3,) of the vehicle, and its cross fall.
 
     curve: CubicSpline of E, N, H (m, local) and of the fall to the right along the path (rad).
     """
@@ -28,7 +28,7 @@ class Path:
 
     @property
     def length(self) -> float:
-        """Units: m."""
+        """Length of the path. Units: m."""
         return float(self.curve.x[-1])
 
 
@@ -42,7 +42,7 @@ def draw(
     phase: float,
     u_turn: bool = False,
 ) -> Path:
-    """Path of a PassScenario along a centre line.
+    """Make the path of a PassScenario along a center line.
 
     Parameters
     ----------
@@ -58,13 +58,13 @@ def draw(
     phase : float
         Of the weaving. Units: rad.
     u_turn : bool
-        Whether it turns at the end of the way and comes back.
+        True to turn at the end of the way and come back.
     """
     back = leg.direction == "back"
     lateral = -leg.lateral if back else leg.lateral  # to the vehicle's own right
     q = np.linspace(0.0, length, max(6, round(length / 1.5) + 1))
     wave = max(vehicle.weave_length, vehicle.weave_time * speed)
-    fade = smooth_step((length - q) / 20.0) if u_turn else 1.0  # m before a turn without weaving
+    fade = smooth_step((length - q) / 20.0) if u_turn else 1.0  # m before a turn, without weaving
     x = lateral + vehicle.weave * fade * np.sin(q / wave + phase)
     if u_turn:
         turn_q, turn_x = u_turn_path(lateral, vehicle.turning_radius)
@@ -84,20 +84,20 @@ def draw(
 def u_turn_path(
     lateral: float, radius: float, steering: float = 1.5
 ) -> tuple[np.ndarray, np.ndarray]:
-    """A turn from a lane to the lane that mirrors it: (n,) along the way and to the right. m.
+    """Path (n,) of a U-turn to the opposite lane, along the way and to the right. Units: m.
 
-    A little out of the way first, then round, as a vehicle must whose circle is wider than the
-    road; right-hand traffic turns left and left-hand traffic right. The steering goes from one side
-    to the other over 1.5 m.
+    It first swings out, as a vehicle with a turning circle wider than the road must. Right-hand
+    traffic turns left, left-hand traffic right. The steering goes from one side to the other over
+    1.5 m.
 
     Parameters
     ----------
     lateral : float
-        Of the lane. Units: m.
+        Lateral position of the lane. Units: m.
     radius : float
         Units: m.
     steering : float
-        Over which it goes from one side to the other. Units: m.
+        Length over which it changes from one side to the other. Units: m.
 
     Examples
     --------
@@ -116,13 +116,13 @@ def u_turn_path(
     right = np.append(0.0, np.cumsum(np.sin(heading[:-1]) * step))
     along = np.append(0.0, np.cumsum(np.cos(heading[:-1]) * step))
     share = length / length[-1]
-    right += lane - share * (right[-1] + 2 * lane)  # the smoothing leaves some centimetres
+    right += lane - share * (right[-1] + 2 * lane)  # the smoothing leaves some centimeters
     along -= share * along[-1]
     return along[::40], (1.0 if lateral >= 0 else -1.0) * right[::40]
 
 
 def read_path(scenario: Scenario) -> list[tuple]:
-    """What a scenario's drive file gives, as a list of (elapsed, position, attitude), one a pass.
+    """Read a scenario's drive file as a list of (elapsed, position, attitude), one for each pass.
 
     elapsed (n,) at the pose rate, in s from the file's start; position (n, 3) in m from its first
     position; attitude Rotation, or None where the file has none.
@@ -166,7 +166,7 @@ def _piece(poses, piece, start_time, start, pose_rate):
 
 
 def _smooth(time: np.ndarray, position: np.ndarray, elapsed: np.ndarray) -> np.ndarray:
-    """Positions (m, 3) at times (m,) by smoothing splines through positions (n, 3).
+    """Positions (m, 3) at times (m,) from smoothing splines through positions (n, 3).
 
     Parameters
     ----------
@@ -176,8 +176,8 @@ def _smooth(time: np.ndarray, position: np.ndarray, elapsed: np.ndarray) -> np.n
         Units: m.
     """
     share = 0.38  # of the step between sparse positions: smooths 1 cm of a car's path at 1 Hz
-    height = 3.0  # times slower in height, in which roads change less and GNSS is worse
-    rate = 20.0  # Hz, beyond which positions tell nothing more of a vehicle's path
+    height = 3.0  # times slower in height, where roads change less and GNSS is worse
+    rate = 20.0  # Hz, beyond which positions give no more information on the path
     step = np.median(np.diff(time))
     stride = max(1, int(1.0 / (rate * step)))
     rows = np.unique(np.append(np.arange(0, len(time), stride), len(time) - 1))
@@ -194,7 +194,7 @@ def _smooth(time: np.ndarray, position: np.ndarray, elapsed: np.ndarray) -> np.n
 
 
 def course(elapsed: np.ndarray, position: np.ndarray) -> list[np.ndarray]:
-    """Heading and pitch (n,) along a path (n, 3), kept through standstill. Units: rad.
+    """Heading and pitch (n,) along a path (n, 3), kept constant at standstill. Units: rad.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ def course(elapsed: np.ndarray, position: np.ndarray) -> list[np.ndarray]:
     Raises
     ------
     ValueError
-        A path that stands still.
+        If the path does not move.
     """
     step = elapsed[1] - elapsed[0]
     east, north, up = np.gradient(position, elapsed, axis=0).T

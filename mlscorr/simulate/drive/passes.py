@@ -1,4 +1,4 @@
-"""The true trajectories of a vehicle along a way: one for each pass, in the order of time."""
+"""True trajectories of a vehicle along a way, one for each pass, in order of time."""
 
 from dataclasses import replace
 from functools import partial
@@ -18,7 +18,7 @@ from mlscorr.survey import GAP_FACTOR, Trajectory
 
 
 def drive(scenario: Scenario, rng: Generator) -> tuple[CentreLine, float, tuple[Trajectory, ...]]:
-    """Centre line, its length (m) along the drive, and the true trajectories, one for each pass.
+    """Make center line, its length (m) along the drive, and the true trajectory of each pass.
 
     Trajectories are in map coordinates, in the order of time, with epochs at the pose rate.
 
@@ -30,7 +30,7 @@ def drive(scenario: Scenario, rng: Generator) -> tuple[CentreLine, float, tuple[
     Raises
     ------
     ValueError
-        A drive that contradicts itself, or that leaves its mesh.
+        If the drive is inconsistent, or leaves its mesh.
     """
     line_rng, pace_rng, motion_rng = rng.spawn(3)
     if scenario.drive.file is not None:
@@ -61,7 +61,7 @@ def _epochs(drive):
 
 
 def _check(drive):
-    """Refuse what contradicts itself."""
+    """Refuse inconsistent settings."""
     if len(_epochs(drive)) < 3:
         raise ValueError(
             f"A drive of {drive.duration} s has less than 3 epochs at {drive.pose_rate} Hz."
@@ -104,7 +104,7 @@ def _paces(drive, rng):
 
 
 def _ground(scenario, length, s, lateral):
-    """Height of the POS above the centre line (m) and cross fall (rad), each (n,)."""
+    """Height of the POS above the center line (m) and cross fall (rad), each (n,)."""
     pos_height = VEHICLES[scenario.scene.kind].pos_height
     if scenario.scene.kind != "street":
         return np.full(len(s), pos_height), np.zeros(len(s))
@@ -121,7 +121,7 @@ def _path(scenario, line, length, leg, phase):
 
 
 def _length(scenario, line, pace, phase):
-    """Length of the way (m) that the first pass needs to drive as long as it should."""
+    """Length of the way (m) for the first pass to have its intended duration."""
     drive = scenario.drive
     first = drive.passes[0]
     shortest = 10.0
@@ -145,7 +145,7 @@ def _length(scenario, line, pace, phase):
 
 
 def _with_turn(scenario, pace, elapsed, half=None):
-    """The pace that is slow in the U-turn, half way (m) or where the pace itself is half way."""
+    """Pace that slows down in the U-turn, half way (m) or where the pace itself is half way."""
     if not scenario.drive.u_turn:
         return pace
     vehicle = VEHICLES[scenario.scene.kind]
@@ -177,7 +177,7 @@ def _timing(scenario, pace, path, is_first):
 
 
 def _trajectory(scenario, path, gps_time, distance, rng):
-    """Trajectory along a path, looking where it goes, leaning with the road, shaken a little."""
+    """Trajectory along a path, with heading along it, roll from the road, and small vibrations."""
     vehicle = VEHICLES[scenario.scene.kind]
     place = path.curve(distance)
     east, north, up, _ = path.curve(distance, 1).T
@@ -200,7 +200,7 @@ def _trajectory(scenario, path, gps_time, distance, rng):
 
 
 def _follow(scenario, rng):
-    """The drive of a given file: its path, its timing, its attitude where it has leg."""
+    """Drive from a file: its path, its timing, and its attitude if available."""
     kind = scenario.scene.kind
     origin = np.array(scenario.origin)
     vehicle = VEHICLES[kind]

@@ -1,7 +1,7 @@
-"""GNSS fixes from satellites: noise, reflections, and a sky that walls hide.
+"""GNSS fixes from satellites: noise, reflections, and a sky hidden by walls.
 
-Position errors are not drawn but solved for: every satellite's range has an error, and the least
-squares of those in view turns them into a fix, with its dilution of precision.
+Position errors are not drawn but computed: every satellite's range has an error, and least squares
+with the visible satellites gives a fix with its dilution of precision.
 """
 
 from dataclasses import dataclass
@@ -14,12 +14,12 @@ WAVELENGTH = 0.1903  # m, L1
 
 @dataclass(frozen=True)
 class Receiver:
-    """A geodetic GNSS receiver on the road, its sky, and the software that makes fixes of it.
+    """Geodetic GNSS receiver on the road, its sky, and its processing software.
 
     Parameters
     ----------
     satellites : int
-        Above the horizon, so that more than 9 are used, as in Mao et al. 2015, 3.1.
+        Number above the horizon, so that more than 9 are used, as in Mao et al. 2015, 3.1.
     mask : float
         Elevation below which satellites are not used, usual in surveying. Units: rad.
     canyon : float
@@ -31,19 +31,20 @@ class Receiver:
         at rest; on the road the errors of real_pos_error between its outages (1.4, 1.4, 2.0 cm)
         show more. Units: m.
     reflected : float
-        Of carrier phases in open sky, by roof and ground: the errors of the same series hang
-        together by no more than a quarter after 5 s. Units: m.
+        Error of carrier phases in open sky, from roof and ground: errors of the same series
+        correlate by at most a quarter after 5 s. Units: m.
     reflection_periods : tuple
         WAVELENGTH / (2 d cos(elevation) motion) for d = 16 to 2 m. Units: s.
     worst_dilution : float
-        Of position, beyond which software gives no fix.
+        Dilution of position beyond which software gives no fix.
     suspect : float
         Ratio of residuals to expected noise that a test at 1 % of 6 redundancies rejects.
     caution : float
-        Of the software's sigmas, as errors of successive fixes are not independent.
+        Factor of the software's sigmas, because errors of successive fixes are not independent.
     fixing, doubt : int, float
-        With less satellites than this ambiguities stay unsure, and software states sigmas so many
-        times larger: GrafNav's quality 2 against quality 1 is 0.05-0.40 m against 0-0.15 m.
+        With fewer satellites than this, ambiguities are uncertain, and software states sigmas
+        larger by this factor: GrafNav's quality 2 against quality 1 is 0.05-0.40 m against 0-0.15
+        m.
     """
 
     satellites: int = 13
@@ -72,11 +73,11 @@ class Fixes:
     error : (n, 3) array
         Fix minus truth, E, N, H; zero where there is none. Units: m.
     covariance : (n, 3, 3) array
-        As the software states it. Units: m^2.
+        Covariance stated by the software. Units: m^2.
     satellites : (n,) int array
         Satellites in view.
     valid : (n,) bool array
-        Whether there is a fix.
+        True if there is a fix.
     """
 
     error: np.ndarray
@@ -88,30 +89,30 @@ class Fixes:
 def gnss_fixes(
     gps_time: np.ndarray, heading: np.ndarray, walls: np.ndarray, rng: Generator
 ) -> Fixes:
-    """Fixes at the times (n,) of a vehicle, in s.
+    """Simulate fixes at the times (n,) of a vehicle, in s.
 
     Parameters
     ----------
     gps_time, heading : (n,) array
         Units: s, rad.
     walls : (n, 2) array
-        Elevation below which the sky is hidden square to the left and right. Units: rad.
+        Elevation below which the sky is hidden, perpendicular to the left and right. Units: rad.
     rng : Generator
     """
     sky_rng, noise_rng, path_rng = rng.spawn(3)
     azimuth, elevation = _constellation(gps_time, sky_rng)
     visible = elevation > np.maximum(wall_elevation(azimuth, heading, walls), RECEIVER.mask)
     oblique = np.hypot(1.0, 1 / np.sin(np.maximum(elevation, RECEIVER.mask)))
-    sigma = np.sqrt(2) * RECEIVER.phase_noise * oblique  # against a base station as good
+    sigma = np.sqrt(2) * RECEIVER.phase_noise * oblique  # against an equally good base station
     error = sigma * noise_rng.standard_normal(sigma.shape)
     error += _reflections(gps_time, walls, path_rng)
     return _solve(azimuth, elevation, visible, sigma, error)
 
 
 def wall_elevation(azimuth: np.ndarray, heading: np.ndarray, walls: np.ndarray) -> np.ndarray:
-    """Elevation (n, m) of endless walls along the way towards azimuths (n, m). Units: rad.
+    """Elevation (n, m) of endless walls along the path toward azimuths (n, m). Units: rad.
 
-    tan(elevation) = tan(elevation square to the way) |sin(azimuth - heading)|.
+    tan(elevation) = tan(elevation perpendicular to the way) |sin(azimuth - heading)|.
 
     Parameters
     ----------
@@ -120,7 +121,7 @@ def wall_elevation(azimuth: np.ndarray, heading: np.ndarray, walls: np.ndarray) 
     heading : (n,) array
         Of the way. Units: rad.
     walls : (n, 2) array
-        Elevation square to the way, left and right. Units: rad.
+        Elevation perpendicular to the way, left and right. Units: rad.
 
     Examples
     --------
@@ -135,7 +136,7 @@ def wall_elevation(azimuth: np.ndarray, heading: np.ndarray, walls: np.ndarray) 
 
 
 def _constellation(gps_time, rng):
-    """Azimuths and elevations (n, m) of satellites, even over the sky and moving. Units: rad."""
+    """Azimuths and elevations (n, m) of satellites, evenly over the sky and moving. Units: rad."""
     azimuth = rng.uniform(0, 2 * np.pi, RECEIVER.satellites)
     elevation = np.arcsin(rng.uniform(0, 1, RECEIVER.satellites))
     course = rng.uniform(0, 2 * np.pi, RECEIVER.satellites)
@@ -147,10 +148,10 @@ def _constellation(gps_time, rng):
 
 
 def _reflections(gps_time, walls, rng):
-    """Error (n, m) of carrier phases by reflected signals, slow as satellites move. Units: m.
+    """Error (n, m) of carrier phases by reflected signals, slow like satellites. Units: m.
 
-    At most a quarter of the wave, where a reflection is as strong as the direct signal; by the
-    share of the sky that the walls hide.
+    It is at most a quarter of the wavelength, for a reflection as strong as the direct signal,
+    scaled by the share of the sky that walls hide.
     """
     shape = 2, RECEIVER.satellites
     logarithm = np.log(RECEIVER.reflection_periods)
@@ -174,7 +175,7 @@ def _solve(azimuth, elevation, visible, sigma, error):
     dilution = np.full(len(count), np.inf)
     solvable = count >= 4
     plain = np.einsum("kmi,km,kmj->kij", design, visible.astype(float), design)[solvable]
-    inverse = np.linalg.inv(plain + 1e-9 * np.eye(4))  # huge along a direction that is left open
+    inverse = np.linalg.inv(plain + 1e-9 * np.eye(4))  # huge along an undetermined direction
     dilution[solvable] = np.sqrt(np.trace(inverse[:, :3, :3], axis1=1, axis2=2))
     valid = dilution < RECEIVER.worst_dilution
 

@@ -1,10 +1,10 @@
-"""Inertial navigation: sensors with errors, how these grow, and the Kalman filter that fights them.
+"""Inertial navigation: sensor errors, their propagation, and data for the Kalman filter.
 
 The error state x (15,) is position, velocity, attitude (about the map axes), bias of the gyros and
 bias of the accelerometers (in the body), each recorded minus true; phi-angle model in the local
-level frame. Earth rate, transport rate and the gradient of gravity are left out: with attitude
-errors of 0.1 deg and position errors of metres they add less than 0.03 deg/h and 1e-5 m/s^2, which
-the biases of the best grade here exceed ten times.
+level frame. Earth rate, transport rate and the gradient of gravity are neglected: with attitude
+errors of 0.1 deg and position errors of meters they add less than 0.03 deg/h and 1e-5 m/s^2, a
+tenth of the biases of the best grade used here.
 """
 
 from dataclasses import dataclass
@@ -31,15 +31,15 @@ class Imu:
     gyro_noise, accelerometer_noise : float
         Angular and velocity random walk. Units: rad/sqrt(s), m/s/sqrt(s).
     gyro_bias, accelerometer_bias : float
-        What a turn-on leaves. Units: rad/s, m/s^2.
+        Turn-on bias. Units: rad/s, m/s^2.
     gyro_wander, accelerometer_wander : float
-        How far a bias wanders in bias_time. Units: rad/s, m/s^2.
+        Drift of a bias in bias_time. Units: rad/s, m/s^2.
     bias_time : float
         Correlation time of the biases. Units: s.
     gyro_scale, accelerometer_scale : float
         Error of the scale factor. Units: ratio.
     misalignment : float
-        Of each axis towards each other. Units: rad.
+        Of each axis toward each other. Units: rad.
     """
 
     gyro_noise: float
@@ -55,9 +55,9 @@ class Imu:
 
     @property
     def densities(self) -> np.ndarray:
-        """White noise that drives each state (15,), units of the state per sqrt(s).
+        """White noise that drives each state (15,), in units of the state per sqrt(s).
 
-        A bias of correlation time bias_time, seen for much less, is a random walk.
+        A bias with correlation time bias_time is a random walk over much shorter times.
         """
         wander = np.sqrt(2 / self.bias_time)
         parts = (
@@ -104,7 +104,7 @@ GRADES = {"tactical": TACTICAL, "mems": MEMS}
 
 @dataclass(frozen=True)
 class Motion:
-    """What truly happens in each of n equal steps of time.
+    """True motion in each of n equal time steps.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ class Motion:
 
 
 def motion(step: float, position: np.ndarray, attitude: Rotation) -> Motion:
-    """Motion between n + 1 equidistant poses: position (n + 1, 3) in m, attitude R_P^G.
+    """Compute the motion between n + 1 equidistant poses: position (n + 1, 3) in m, attitude R_P^G.
 
     Parameters
     ----------
@@ -164,9 +164,9 @@ def transitions(motion: Motion) -> np.ndarray:
 
 
 def sensor_errors(imu: Imu, motion: Motion, rng: Generator) -> tuple[np.ndarray, np.ndarray]:
-    """What the sensors add to the error state in each step (n, 15), and its start (15,).
+    """Errors of the sensors added to the error state in each step (n, 15), and its start (15,).
 
-    White noise, wandering biases, and scale factors and misalignments times what truly happens.
+    White noise, drifting biases, and scale factors and misalignments times the true motion.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def sensor_errors(imu: Imu, motion: Motion, rng: Generator) -> tuple[np.ndarray,
 
 
 def start_sigma(imu: Imu) -> np.ndarray:
-    """One sigma (15,) of the error state when the alignment starts.
+    """One sigma (15,) of the error state at the start of the alignment.
 
     Parameters
     ----------
@@ -201,14 +201,14 @@ def start_sigma(imu: Imu) -> np.ndarray:
 
 
 def propagate(transition: np.ndarray, added: np.ndarray, start: np.ndarray) -> np.ndarray:
-    """True error state (n + 1, 15) of free inertial navigation from a start (15,).
+    """Propagate the true error state (n + 1, 15) of free inertial navigation from a start (15,).
 
     Parameters
     ----------
     transition : (n, 15, 15) array
         Over each step.
     added : (n, 15) array
-        By the sensors in each step.
+        Errors of the sensors in each step.
     start : (15,) array
     """
     state = np.empty((len(added) + 1, STATES))

@@ -1,4 +1,4 @@
-"""The Kalman filter and smoother of an error state."""
+"""Kalman filter and smoother of an error state."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ from mlscorr.simulate.pos._inertial import STATES
 
 @dataclass(frozen=True)
 class StateEstimate:
-    """Error state (n, 15) as a filter or smoother knows it, and its covariance (n, 15, 15)."""
+    """Estimated error state (n, 15) of a filter or smoother, and its covariance (n, 15, 15)."""
 
     state: np.ndarray
     covariance: np.ndarray
@@ -17,7 +17,9 @@ class StateEstimate:
 
 @dataclass(frozen=True)
 class Measurement:
-    """measured (m,) = design (m, 15) x + noise of a covariance (m, m), as the filter has it."""
+    """Measurement (m,) = design (m, 15) x + noise with covariance (m, m), as assumed by the
+    filter.
+    """
 
     design: np.ndarray
     measured: np.ndarray
@@ -27,13 +29,13 @@ class Measurement:
 def kalman_filter(
     transition: np.ndarray, noise: np.ndarray, start: np.ndarray, measurements: dict
 ) -> tuple[StateEstimate, StateEstimate]:
-    """Forward pass of the error-state Kalman filter.
+    """Run the forward pass of the error-state Kalman filter.
 
     Parameters
     ----------
     transition : (n, 15, 15) array
     noise : (15,) array
-        Variances that a step adds.
+        Variances added by a step.
     start : (15,) array
         Variances at the first epoch.
     measurements : dict
@@ -61,7 +63,7 @@ def kalman_filter(
 
 
 def _update(state, covariance, measurement):
-    """State and covariance after a Measurement; Joseph's form keeps it symmetric, positive."""
+    """State and covariance after a Measurement; Joseph's form keeps it symmetric and positive."""
     design = measurement.design
     noise = measurement.covariance
     cross = design @ covariance
@@ -74,7 +76,7 @@ def _update(state, covariance, measurement):
 def smooth(
     transition: np.ndarray, filtered: StateEstimate, predicted: StateEstimate
 ) -> StateEstimate:
-    """Smoothed StateEstimate: backward pass of Rauch, Tung and Striebel (1965).
+    """Smooth states in the backward pass of Rauch, Tung and Striebel (1965).
 
     Parameters
     ----------

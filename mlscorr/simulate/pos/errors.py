@@ -1,9 +1,9 @@
-"""The error of a position and orientation system, from its causes.
+"""Error of a position and orientation system, from its causes.
 
-Satellites and reflections make the errors of GNSS fixes; noise, biases, scale factors and
-misalignments those of the sensors. Free inertial navigation integrates the latter, and a Kalman
-filter and smoother, with beliefs of their own on all this, make of both what is recorded. Nothing
-is drawn from a covariance function: the estimator must not be tested on its own model.
+Satellites and reflections cause the errors of GNSS fixes; noise, biases, scale factors and
+misalignments those of the sensors. Free inertial navigation integrates the latter. A Kalman filter
+and smoother, with their own assumptions, combine both to the recorded data. Nothing is drawn from a
+covariance function, because the estimator must not be tested on its own model.
 """
 
 import numpy as np
@@ -25,19 +25,19 @@ def pos_error(
     sky: np.ndarray | None = None,
     start: float | None = None,
 ) -> PosError:
-    """PosError at the epochs of one pass.
+    """Simulate the PosError at the epochs of one pass.
 
     Parameters
     ----------
     trajectory : Trajectory
-        The true one, without gaps.
+        True trajectory, without gaps.
     scenario : PosScenario
     rng : Generator
     sky : (n, 2) array, optional
         Elevation below which the sky is hidden to the left and right; needed for sky_view.
         Units: rad.
     start : float, optional
-        gps_time from which outages and canyons count; the pass' first epoch when not given.
+        gps_time from which outages and canyons count; by default the first epoch of the pass.
 
     Raises ValueError for a trajectory with gaps, a missing sky, or a file that is too short.
     """
@@ -56,7 +56,7 @@ def pos_error(
 
 
 def given_error(trajectory: Trajectory, series: PosErrorSeries, rng: Generator) -> PosError:
-    """PosError from a window of a PosErrorSeries, chosen at random.
+    """Make the PosError from a random section of a PosErrorSeries.
 
     The sigmas are the RMS of the series within 15 s, of E and N, and of roll and pitch, together.
 
@@ -69,7 +69,7 @@ def given_error(trajectory: Trajectory, series: PosErrorSeries, rng: Generator) 
     Raises
     ------
     ValueError
-        A series that is shorter than the pass.
+        If the series is shorter than the pass.
     """
     duration = trajectory.gps_time[-1] - trajectory.gps_time[0]
     spare = series.gps_time[-1] - series.gps_time[0] - duration
@@ -91,12 +91,12 @@ def given_error(trajectory: Trajectory, series: PosErrorSeries, rng: Generator) 
 
 
 def record(trajectory: Trajectory, error: PosError) -> Trajectory:
-    """Trajectory that the POS records of a true one.
+    """Make the trajectory that the POS records from a true one.
 
     Parameters
     ----------
     trajectory : Trajectory
-        The true one.
+        True trajectory.
     error : PosError
     """
     angles = np.column_stack(angles_from_attitude(trajectory.attitude)) + error.attitude
@@ -110,7 +110,7 @@ def record(trajectory: Trajectory, error: PosError) -> Trajectory:
 
 
 def _local_rms(gps_time, values):
-    """RMS (n, 3) of values (n, 3) in a window about each time, the first two axes together."""
+    """RMS (n, 3) of values (n, 3) within a time window, the first two axes together."""
     first = np.searchsorted(gps_time, gps_time - SETTINGS.error_window / 2)
     last = np.searchsorted(gps_time, gps_time + SETTINGS.error_window / 2, side="right")
     total = np.vstack([np.zeros(3), np.cumsum(values**2, axis=0)])

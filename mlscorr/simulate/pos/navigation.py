@@ -1,13 +1,12 @@
-"""Free inertial navigation, its aid by GNSS and odometer, and what filter and smoother leave.
+"""Free inertial navigation, aided by GNSS and odometer, and the residual error after filtering.
 
-A wheel odometer and the software's belief that a car neither slips sideways nor flies together are
-a velocity in the body, (0, v, 0). It bounds the drift without GNSS: positions then go wrong in
-proportion to the distance, by what the wheel's radius and the direction in which the car rolls are
-wrong.
+A wheel odometer and the assumption that a car does not slip sideways or leave the ground together
+give a velocity in the body, (0, v, 0). It limits the drift without GNSS: position errors are then
+proportional to distance, from errors of the wheel's radius and of the rolling direction.
 
-Heading shows in a GNSS/INS only where the vehicle accelerates, so crews drive curves and vary the
-speed before and after a survey. The alignment that is added to a pass does that: speed and heading
-swing smoothly, and meet those of the pass at its ends.
+Heading is observable in a GNSS/INS only under acceleration, so crews drive curves and vary the
+speed before and after a survey. The alignment added to a pass does the same: speed and heading vary
+smoothly, and match those of the pass at its ends.
 """
 
 from collections.abc import Iterator
@@ -55,12 +54,12 @@ class PosError:
 
 @dataclass(frozen=True)
 class Navigation:
-    """Free inertial navigation, its estimates, and what they had to work with.
+    """Free inertial navigation, its estimates, and their inputs.
 
     Parameters
     ----------
     gps_time : (n,) array
-        Epochs of the filter, alignment before and after the pass included. Units: s.
+        Epochs of the filter, including alignment before and after the pass. Units: s.
     attitude : Rotation
         True R_P^G.
     error : (n, 15) array
@@ -68,7 +67,7 @@ class Navigation:
     transition : (n - 1, 15, 15) array
         Of the error state from epoch to epoch.
     filtered, predicted : StateEstimate
-        Of that error state.
+        Estimates of that error state.
     fixes : Fixes
     """
 
@@ -82,18 +81,18 @@ class Navigation:
 
     @cached_property
     def smoothed(self) -> StateEstimate:
-        """The error state after smoothing, which takes as long as the filter."""
+        """Error state after smoothing, which takes as long as the filter."""
         return smooth(self.transition, self.filtered, self.predicted)
 
     def at(self, gps_time: np.ndarray, smoothed: bool = True) -> PosError:
-        """PosError that is left at times (m,), after smoothing or after the filter alone.
+        """Return the residual PosError at times (m,), after smoothing or after the filter only.
 
         Parameters
         ----------
         gps_time : (m,) array
             Units: s.
         smoothed : bool
-            After smoothing, or after the filter alone.
+            True for after smoothing, False for after the filter only.
         """
         estimate = self.smoothed if smoothed else self.filtered
         left = self.error - estimate.state
@@ -113,7 +112,7 @@ def navigate(
     sky: np.ndarray | None = None,
     start: float | None = None,
 ) -> Navigation:
-    """Navigation of a pass with an Imu; for the parameters see pos_error.
+    """Navigate a pass with an Imu; for the parameters see pos_error.
 
     Parameters
     ----------
@@ -134,7 +133,7 @@ def navigate(
     transition = transitions(moved)
     error = propagate(transition, *sensor_errors(imu, moved, sensor_rng))
 
-    # GNSS fixes, as far as the sky can be seen, and the odometer.
+    # GNSS fixes, with the visible sky, and the odometer.
     fix_time = gps_time[::every]
     walls = _walls(fix_time, trajectory, scenario, sky, start)
     heading = angles_from_attitude(attitude[::every])[2]
@@ -146,7 +145,7 @@ def navigate(
     if scenario.odometer:
         wheels = odometer(error[::every], velocity, attitude[::every], odometer_rng)
 
-    # What the software makes of them, believing its own figures.
+    # Processing by the software, with its own assumptions.
     process, fix_scale = SETTINGS.mistuning ** belief_rng.uniform(-1.0, 1.0, 2)
     process *= SETTINGS.unmodelled
     noise = process**2 * imu.densities**2 * moved.step
@@ -157,7 +156,7 @@ def navigate(
 
 
 def _measurements(position_error, fixes, fix_scale, wheels) -> Iterator[list[Measurement]]:
-    """What the filter gets at each epoch of GNSS: a list of Measurement."""
+    """Yield the measurements of the filter at each epoch of GNSS as a list."""
     for i in range(len(position_error)):
         at_epoch = [] if wheels is None else [wheels[i]]
         if fixes.valid[i]:
@@ -168,9 +167,9 @@ def _measurements(position_error, fixes, fix_scale, wheels) -> Iterator[list[Mea
 
 
 def filter_epochs(trajectory: Trajectory, gnss_rate: float) -> tuple[np.ndarray, int]:
-    """Epochs of the filter around a pass, in s, and how many there are from fix to fix.
+    """Epochs of the filter around a pass, in s, and their number between fixes.
 
-    Fixes fall on whole multiples of their period, as receivers give them.
+    Fixes are at integer multiples of their period, as from receivers.
 
     Parameters
     ----------
@@ -188,7 +187,7 @@ def filter_epochs(trajectory: Trajectory, gnss_rate: float) -> tuple[np.ndarray,
 def angle_errors(
     attitude: Rotation, turn: np.ndarray, covariance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Errors and sigmas (n, 3) of roll, pitch, heading by small turns (n, 3) about map axes. rad.
+    """Errors and sigmas (n, 3) of roll, pitch, heading from small turns (n, 3) about map axes. rad.
 
     d(turn) = u_roll d(roll) + u_pitch d(pitch) + u_heading d(heading), with
     R_P^G = Rz(-heading) Rx(pitch) Ry(roll).
@@ -212,7 +211,7 @@ def angle_errors(
 
 
 def _inside(gps_time, trajectory, spans, start):
-    """Which times (n,) of the pass lie in spans (start, duration): bool."""
+    """Flag (n,) of times of the pass within intervals (start, duration)."""
     inside = np.zeros(len(gps_time), dtype=bool)
     for begin, duration in spans:
         elapsed = gps_time - start - begin
@@ -221,7 +220,7 @@ def _inside(gps_time, trajectory, spans, start):
 
 
 def _walls(gps_time, trajectory, scenario, sky, start):
-    """Elevation (n, 2) of what hides the sky left and right; nothing during alignment. rad."""
+    """Elevation (n, 2) of sky obstruction left and right; zero during alignment. rad."""
     walls = np.zeros((len(gps_time), 2))
     if sky is not None:
         inside = _inside(gps_time, trajectory, ((0.0, np.inf),), trajectory.gps_time[0])
@@ -232,7 +231,7 @@ def _walls(gps_time, trajectory, scenario, sky, start):
 
 
 def interpolate(gps_time: np.ndarray, epochs: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Values (m, k) of columns (n, k), linear in time.
+    """Interpolate columns (n, k) linearly in time to values (m, k).
 
     Parameters
     ----------
@@ -253,11 +252,11 @@ class Odometer:
     Parameters
     ----------
     noise : float
-        Each component once a second: i2Nav-WHU/OB_GINS dataset/ob_gins.yaml. Units: m/s.
+        Noise of each component once per second: i2Nav-WHU/OB_GINS dataset/ob_gins.yaml. Units: m/s.
     wheel : float
-        0.6 mm of a radius of 0.3 m by load, pressure, temperature. Units: ratio.
+        0.6 mm of a radius of 0.3 m, from load, pressure, temperature. Units: ratio.
     direction : float
-        How IMU and axle are mounted, by load and side slip. Units: rad.
+        Direction error from mounting, load and side slip. Units: rad.
     """
 
     noise: float = 0.05
@@ -271,7 +270,7 @@ SENSOR = Odometer()
 def odometer(
     error: np.ndarray, velocity: np.ndarray, attitude: Rotation, rng: Generator
 ) -> list[Measurement]:
-    """Measurements of the error state, one at each of n epochs: a list.
+    """Simulate measurements of the error state, one at each of n epochs.
 
     Parameters
     ----------
@@ -302,9 +301,9 @@ def odometer(
 
 
 def aligned_poses(trajectory: Trajectory, gps_time: np.ndarray) -> tuple[np.ndarray, Rotation]:
-    """Position (n, 3) about the pass' first epoch and attitude at rising times (n,) in s.
+    """Position (n, 3) from the pass's first epoch, and attitude, at increasing times (n,) in s.
 
-    Within the trajectory's time its own poses, before and after it the way of an alignment.
+    Within the trajectory's time these are its own poses, before and after it those of an alignment.
 
     Parameters
     ----------
@@ -327,7 +326,7 @@ def aligned_poses(trajectory: Trajectory, gps_time: np.ndarray) -> tuple[np.ndar
 
 
 def _way(elapsed, velocity, nose):
-    """Displacement (n, 3) from the edge of a pass with a velocity (3,) there. Units: m."""
+    """Displacement (n, 3) from the edge of a pass, given the velocity (3,) there. Units: m."""
     speed = np.linalg.norm(velocity)
     course = nose
     if speed > 0.5:  # a standing vehicle has no course

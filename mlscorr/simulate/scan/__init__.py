@@ -1,4 +1,4 @@
-"""Beams, echoes and their noise; and recorded pulses that are fired again."""
+"""Beams, echoes and their noise, and replay of recorded pulses."""
 
 from mlscorr.simulate.scan.echoes import Surfaces
 from mlscorr.simulate.scan.rays import Platform

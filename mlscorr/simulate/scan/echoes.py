@@ -1,7 +1,7 @@
-"""What comes back of each pulse: one echo of a thin beam, or several of a beam with a footprint.
+"""Echoes of each pulse: one for a thin beam, or several for a beam with a footprint.
 
-Rays are cast in float32 about a local origin (Open3D); all that is measured is computed in
-float64 on the plane of the triangle that was hit.
+Rays are cast in float32 about a local origin (Open3D); all measurements are computed in float64 on
+the plane of the triangle that was hit.
 """
 
 from dataclasses import dataclass
@@ -19,8 +19,8 @@ from mlscorr.simulate.settings import SETTINGS
 NO_TRIANGLE = np.uint32(0xFFFFFFFF)  # Open3D's triangle of a ray that hits nothing
 
 # Sub-rays of a beam and their shares of its power: the rule of Radon for a Gaussian, exact to
-# degree 5 with a centre of 1/2 and a hexagon of 1/12 each at two sigma, where the power has fallen
-# to 1/e^2, which is how divergence is stated.
+# degree 5 with a center of 1/2 and a hexagon of 1/12 each at two sigma, where the power is 1/e^2,
+# as in the definition of divergence.
 ANGLES = np.arange(6) * np.pi / 3
 SUB_RAYS = np.vstack([[0.0, 0.0], np.column_stack([np.cos(ANGLES), np.sin(ANGLES)])])
 POWER = np.array([1 / 2] + [1 / 12] * 6)
@@ -28,22 +28,22 @@ POWER = np.array([1 / 2] + [1 / 12] * 6)
 
 @dataclass(frozen=True)
 class Hits:
-    """Echoes of n pulses: one row for the first echo of each, seen or not, then the later ones.
+    """Echoes of n pulses: one row for the first echo of each, received or not, then later ones.
 
     Parameters
     ----------
     range : (n + m,) array
-        0 where nothing returns. Units: m.
+        0 without a return. Units: m.
     incidence : (n + m,) array
         Cosine of the angle between beam and normal.
     strength : (n + m,) array
-        1 for white, square on, near.
+        1 for a white, perpendicular, near surface.
     triangle : (n + m,) int array
-        Of the strongest part.
+        Triangle of the strongest part.
     point : (n + m, 3) array
-        Where the middle of the beam has this range, in map coordinates. Units: m.
+        Point of the beam's axis at this range, in map coordinates. Units: m.
     pulse : (m,) int array
-        Which of the n each later echo belongs to.
+        Pulse of each later echo.
     """
 
     range: np.ndarray
@@ -56,7 +56,7 @@ class Hits:
 
 @dataclass(frozen=True)
 class Surfaces:
-    """A mesh that rays can hit."""
+    """Mesh that rays can hit."""
 
     mesh: Mesh
 
@@ -66,19 +66,19 @@ class Surfaces:
         return np.column_stack([self.mesh.normal, self.mesh.offset, self.mesh.reflectance])
 
     def cast(self, rays: np.ndarray) -> np.ndarray:
-        """Triangle (n,) that each float32 ray (n, 6) hits first, NO_TRIANGLE for none.
+        """Return the triangle (n,) that each float32 ray (n, 6) hits first, NO_TRIANGLE for none.
 
         Parameters
         ----------
         rays : (n, 6) float32 array
-            Start about the local origin (m), and direction.
+            Start relative to the local origin (m), and direction.
         """
         return self.mesh.caster.cast_rays(rays)["primitive_ids"].numpy()
 
     def hits(
         self, rays: Rays, origin: np.ndarray, divergence: float, max_range: float, room: Workspace
     ) -> Hits:
-        """Hits of Rays.
+        """Compute the Hits of Rays.
 
         Parameters
         ----------
@@ -90,7 +90,7 @@ class Surfaces:
         max_range : float
             Units: m.
         room : Workspace
-            In which the Hits stay until the next ones.
+            Memory of the Hits until the next ones.
         """
         n = len(rays)
         limits = (SETTINGS.no_return_cosine, SETTINGS.fading)
@@ -116,7 +116,7 @@ class Surfaces:
 
 @loop(inline="always")
 def _meet(rays, p, x, y, z, planes, t, grazing, fading, max_range):
-    """Range, cosine of incidence and strength where a direction from a ray's start meets a plane.
+    """Range, cosine of incidence and strength where a ray meets a plane.
 
     Strength falls with the cosine (Lambert) and with the square of the range, beyond a near field.
     """
@@ -199,7 +199,7 @@ def _wide(
     max_range,
     pulse_length,
 ):
-    """Fill the rows of the first echoes; returns pulse, met and hit of the later ones."""
+    """Fill the rows of the first echoes; return pulse, met and hit of the later ones."""
     parts = np.empty((len(offsets), 4))
     pulse = np.empty(64, np.int64)
     later = np.empty((64, 3))
@@ -240,7 +240,7 @@ def _wide(
 
 @loop(inline="always")
 def _parts(rays, p, triangle, offsets, power, planes, grazing, fading, max_range, parts):
-    """What each sub-ray meets, nearest first: rows range, incidence, strength, triangle."""
+    """Results of each sub-ray, nearest first: rows range, incidence, strength, triangle."""
     filled = 0
     for k in range(len(offsets)):
         t = triangle[p, k]
@@ -267,10 +267,10 @@ def _parts(rays, p, triangle, offsets, power, planes, grazing, fading, max_range
 
 @loop(inline="always")
 def _echo(parts, start, filled, pulse_length):
-    """The echo that starts with a part: the row after it, range, incidence, strength, triangle.
+    """Echo that starts with a part: the row after it, range, incidence, strength, triangle.
 
-    Parts within a pulse length of the echo so far merge into it, at their mean by strength; so
-    that echoes lie at least that far apart.
+    Parts within a pulse length of the current echo are merged into it, at the mean weighted by
+    strength, so echoes are at least that far apart.
     """
     first = parts[start, 0]
     end = start
@@ -283,7 +283,7 @@ def _echo(parts, start, filled, pulse_length):
         away = parts[end, 0] - first
         if total > 0.0 and away - mixed / total >= pulse_length:
             break
-        strength = max(parts[end, 2], 1e-12)  # what reflects nothing has a weight too
+        strength = max(parts[end, 2], 1e-12)  # a surface without reflection also needs a weight
         total += strength
         mixed += strength * away
         slant += strength * parts[end, 1]

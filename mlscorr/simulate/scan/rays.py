@@ -1,8 +1,9 @@
-"""Where each pulse starts and points, and where each measurement lies on the map: Eq. 1, fast.
+"""Start and direction of each pulse, and map position of each measurement: Eq. 1, fast.
 
-The same as georeference(), which a test compares, in compiled loops: poses by walking along the
-epochs instead of searching, rotations by Rodrigues' formula instead of Slerp objects. The loops
-name every element, as a row taken from an array would be counted by all threads in turn.
+Same result as georeference(), which a test compares, but in compiled loops: poses are found by
+advancing along the epochs instead of searching, rotations use Rodrigues' formula instead of Slerp
+objects. The loops name every element, because reference counts of array rows would serialize the
+threads.
 """
 
 from dataclasses import dataclass
@@ -18,12 +19,12 @@ from mlscorr.survey import Columns, Mounting, Trajectory
 
 @dataclass(frozen=True, repr=False)
 class Turn(Columns):
-    """The pulses that one turn of a scanner fires.
+    """Pulses fired in one turn of a scanner.
 
     Parameters
     ----------
     turned : (m,) array
-        When, from 0 to 1.
+        Fraction of the turn, from 0 to 1.
     angle, elevation : (m,) array
         From the zero beam, and out of the scan plane. Units: rad.
     rate : float
@@ -37,7 +38,7 @@ class Turn(Columns):
 
     @cached_property
     def beams(self) -> np.ndarray:
-        """Unit directions, and the directions in which they sweep (m, 2, 3), in its frame."""
+        """Unit directions, and the directions in which they sweep, (m, 2, 3) in its frame."""
         flat = np.cos(self.elevation)
         zero = np.zeros(len(self))
         x = np.cos(self.angle)
@@ -48,14 +49,14 @@ class Turn(Columns):
 
 @dataclass(frozen=True, repr=False)
 class Rays(Columns):
-    """Pulses as they are fired.
+    """Pulses as fired.
 
     Parameters
     ----------
     gps_time, angle, elevation : (n,) array
         Units: s, rad, rad.
     ray : (n, 9) array
-        Start about the local origin (m), unit direction, and the direction in which it sweeps.
+        Start relative to the local origin (m), unit direction, and sweep direction.
     single : (n, 6) float32 array
         Start and direction.
     """
@@ -69,15 +70,15 @@ class Rays(Columns):
 
 @dataclass(frozen=True)
 class Platform:
-    """A mounting on a trajectory without gaps, ready for compiled loops.
+    """Mounting on a gap-free trajectory, prepared for compiled loops.
 
     Parameters
     ----------
     epochs : (n,) array
         Units: s.
     table : (n, 16) array
-        Per epoch: position about the origin (m), rotation matrix row by row, unit axis and angle
-        (rad) of the turn to the next epoch.
+        For each epoch: position relative to the origin (m), rotation matrix row by row, unit axis
+        and angle (rad) of the turn to the next epoch.
     boresight : (3, 3) array
     lever_arm : (3,) array
         Units: m.
@@ -90,7 +91,7 @@ class Platform:
 
     @classmethod
     def of(cls, trajectory: Trajectory, mounting: Mounting, origin: np.ndarray) -> "Platform":
-        """Platform with positions about an origin (3,) in m.
+        """Make the Platform with positions relative to an origin (3,) in m.
 
         Parameters
         ----------
@@ -112,7 +113,7 @@ class Platform:
         )
 
     def outside(self, gps_time: np.ndarray) -> np.ndarray:
-        """Which times (n,) lie before the first or after the last epoch.
+        """Flag (n,) of times before the first or after the last epoch.
 
         Parameters
         ----------
@@ -124,22 +125,22 @@ class Platform:
     def aim(
         self, number: np.ndarray, turn: Turn, start: float, room: Workspace, wide: bool = True
     ) -> Rays:
-        """Rays of the pulses of a number (n,) since a start (s), by the scanner's Turn.
+        """Compute the Rays of pulses (n,) since a start (s), by the scanner's Turn.
 
-        The direction of the sweep is left open where beams are not wide.
+        The sweep direction is not computed for thin beams.
 
         Parameters
         ----------
         number : (n,) int array
-            Of each pulse since the start.
+            Index of each pulse since the start.
         turn : Turn
-            The scanner's.
+            Turn of the scanner.
         start : float
             Units: s.
         room : Workspace
-            In which the Rays stay until the next ones.
+            Memory of the Rays until the next ones.
         wide : bool
-            Whether beams need the direction of their sweep.
+            True if beams need their sweep direction.
         """
         n = len(number)
         rays = Rays(
@@ -155,7 +156,7 @@ class Platform:
         return rays
 
     def scanner(self, gps_time: np.ndarray) -> np.ndarray:
-        """Where the scanner is (n, 3), about the origin. Units: m.
+        """Return positions (n, 3) of the scanner, relative to the origin. Units: m.
 
         Parameters
         ----------
@@ -172,7 +173,7 @@ class Platform:
         distance: np.ndarray,
         origin: np.ndarray,
     ) -> np.ndarray:
-        """Map coordinates (n, 3) of measurements, Eq. 1; all times must lie within the epochs.
+        """Return map coordinates (n, 3) of measurements, Eq. 1; times must be within the epochs.
 
         Parameters
         ----------
@@ -206,8 +207,8 @@ def _times(m, x, y, z):
 
 @loop(inline="always")
 def _sine(angle):
-    """Sine, and 1 - cosine: by their series for the small turns from one epoch to the next."""
-    if abs(angle) > 0.02:  # rad, where the first term that is left out is 1e-16 of the result
+    """Sine, and 1 - cosine, by their series for the small rotations between epochs."""
+    if abs(angle) > 0.02:  # rad, where the first neglected term is 1e-16 of the result
         return sin(angle), 1.0 - cos(angle)
     square = angle * angle
     return (
@@ -218,7 +219,9 @@ def _sine(angle):
 
 @loop(inline="always")
 def _turn(table, i, s, c, x, y, z):
-    """R Exp(angle axis) times a vector, with s, c the angle's sine and 1 - cosine (Rodrigues)."""
+    """Product R Exp(angle axis) with a vector, given the angle's sine s and 1 - cosine c
+    (Rodrigues).
+    """
     kx = table[i, 12]
     ky = table[i, 13]
     kz = table[i, 14]
@@ -246,7 +249,7 @@ def _position(table, i, weight, axis):
 
 @loop(inline="always")
 def _walk(epochs, time, i):
-    """Index of the step that holds a time, from that of the time before."""
+    """Index of the step that contains a time, starting from that of the previous time."""
     while i < epochs.size - 2 and time > epochs[i + 1]:
         i += 1
     while i > 0 and time < epochs[i]:

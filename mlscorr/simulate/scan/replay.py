@@ -1,11 +1,11 @@
-"""The simulator run again on the pulses that a survey recorded.
+"""Replay of the recorded pulses of a survey in the simulator.
 
-Effects turn truth into record, so here they are taken off what was recorded: the true time, angle,
-pose and mounting. From there each pulse is cast into a world (see worlds.py); what it meets goes
-through the effects on range and return, and lies on the map by what was recorded.
+Effects turn the truth into the record, so here they are removed from the recorded time, angle, pose
+and mounting. Each pulse is then cast into a world (see worlds.py), the effects on range and return
+are applied to the result, and it is georeferenced with the recorded data.
 
-Random effects on the pose are not realised: what the POS errs by is in the record already, and
-its variance is for who compares to know. The beam is thin, whatever its divergence.
+Random effects on the pose are not simulated, because the record already contains the POS error,
+whose variance the comparison must include. The beam is thin, regardless of its divergence.
 """
 
 from collections.abc import Callable
@@ -50,7 +50,7 @@ class RecordedPulses(Columns):
 def aim(
     platform: Platform, gps_time: np.ndarray, angle: np.ndarray, elevation: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Start (n, 3) about the platform's origin, in m, and unit direction (n, 3) of pulses.
+    """Start (n, 3) relative to the platform's origin, in m, and unit direction (n, 3) of pulses.
 
     Parameters
     ----------
@@ -67,12 +67,12 @@ def aim(
 
 
 def _towards(platform, gps_time, angle, elevation):
-    """Where pulses are (n, 3), about the platform's origin, a metre after their start."""
+    """Positions (n, 3) of pulses one meter after their start, relative to the platform's origin."""
     return platform.place(gps_time, angle, elevation, np.ones(len(gps_time)), np.zeros(3))
 
 
 def recorded_platform(survey: Survey, origin: np.ndarray) -> Platform:
-    """Platform of the trajectory and mounting as they were recorded, about an origin (3,) in m.
+    """Make the Platform of the recorded trajectory and mounting, relative to an origin (3,) in m.
 
     Parameters
     ----------
@@ -86,17 +86,17 @@ def recorded_platform(survey: Survey, origin: np.ndarray) -> Platform:
 def recorded_pulses(
     platform: Platform, cloud: PointCloud, origin: np.ndarray, normal: np.ndarray
 ) -> RecordedPulses:
-    """RecordedPulses of points within the trajectory.
+    """Reconstruct the RecordedPulses of points within the trajectory.
 
     Parameters
     ----------
     platform : Platform
-        As recorded_platform gives it, about the origin.
+        From recorded_platform, relative to the origin.
     cloud : PointCloud
     origin : (3,) array
         Units: m.
     normal : (n, 3) array, or (3,) of all
-        Unit normals of the surfaces they lie on.
+        Unit normals of the surfaces of the points.
     """
     time = cloud.gps_time
     level = np.zeros(len(cloud))
@@ -120,7 +120,7 @@ def recorded_pulses(
 
 @dataclass(frozen=True, repr=False)
 class Met(Columns):
-    """What each pulse meets: range (n,) in m, NaN for nothing; cosine of incidence (n,); intensity
+    """Result of each pulse: range (n,) in m, NaN for none; cosine of incidence (n,); intensity
     (n,) in counts of 16 bits.
     """
 
@@ -131,8 +131,8 @@ class Met(Columns):
 
 @dataclass(frozen=True)
 class Draws:
-    """Random numbers of one run, drawn before anything depends on the effects: unit noise (n,) of
-    range and angle, and the streams of random effects by their names.
+    """Random numbers of one run, drawn before anything depends on the effects: unit noise (n,)
+    of range and angle, and the streams of random effects by name.
     """
 
     range: np.ndarray
@@ -141,7 +141,7 @@ class Draws:
 
     @classmethod
     def of(cls, n: int, rng: Generator) -> "Draws":
-        """Draws for n pulses; the same seed gives the same, whatever the effects are.
+        """Draw the numbers for n pulses; the same seed gives the same ones for any effects.
 
         Parameters
         ----------
@@ -155,12 +155,12 @@ class Draws:
 
 @dataclass(frozen=True)
 class Replay:
-    """Recorded pulses that a simulator with some effects fires again.
+    """Recorded pulses, fired again by a simulator with some effects.
 
     Parameters
     ----------
     survey : Survey
-        As recorded; its Scanner says what noise the simulator makes.
+        Recorded survey; its Scanner gives the noise of the simulator.
     pulses : RecordedPulses
     effects : iterable of Effect
     reference : Reference
@@ -179,14 +179,15 @@ class Replay:
 
     @cached_property
     def beams(self) -> tuple[np.ndarray, np.ndarray]:
-        """Where each pulse truly starts (n, 3), about the origin, and its unit direction (n, 3)."""
+        """True start (n, 3) of each pulse, relative to the origin, and its unit direction (n,
+        3).
+        """
         platform = Platform.of(self._trajectory, self._mounting, self.origin)
         noise = self.survey.scanner.angle_noise * self.draws.angle
         return aim(platform, self._time, self._angle - noise, self.pulses.elevation)
 
     def measure(self, met: Met) -> tuple[np.ndarray, np.ndarray]:
-        """Points (n, 3) on the map where the recorded ones would lie, NaN where nothing is met,
-        and whether they are kept (n,).
+        """Simulate map positions (n, 3), NaN without a return, and flags (n,) of kept points.
 
         Parameters
         ----------
@@ -211,7 +212,7 @@ class Replay:
         return recorded_platform(self.survey, self.origin)
 
     def _changed(self, stage, value):
-        """The value after the effects of a stage, with the same random numbers each time."""
+        """Value after the effects of a stage, with the same random numbers each time."""
         streams = self.draws.streams
         used = {effect.name for effect in self.effects if effect.stage == stage}
         streams = {name: deepcopy(streams[name]) for name in used}
@@ -219,7 +220,7 @@ class Replay:
 
     @cached_property
     def _time(self):
-        """True times (n,), held within the pass."""
+        """True times (n,), limited to the pass."""
         trajectory = self.survey.trajectory
         recorded = self.pulses.gps_time
         starts, ends = trajectory.passes.T
@@ -232,19 +233,19 @@ class Replay:
         return self._undone("angle", "angle")
 
     def _undone(self, stage, name):
-        """A field of the pulses without the effects of a stage."""
+        """Field of the pulses without the effects of a stage."""
         recorded = getattr(self.pulses, name)
         values = {field.name: getattr(self.pulses, field.name) for field in fields(RecordedPulses)}
         del values["elevation"]
         true = Returns(**values, kept=np.ones(len(self.pulses), dtype=bool))
-        for _ in range(2):  # true = recorded - effect(true): of 1e-2, 1e-6 is left
+        for _ in range(2):  # true = recorded - effect(true): two iterations leave 1e-6 of 1e-2
             error = getattr(self._changed(stage, true), name) - getattr(true, name)
             true = replace(true, **{name: recorded - error})
         return getattr(true, name)
 
     @cached_property
     def _trajectory(self):
-        """The true trajectory, as far as systematic effects tell."""
+        """True trajectory, except for random effects."""
         effects = [e for e in self.effects if e.stage == "pos" and not e.random]
         return without(self.survey.trajectory, effects, "pos", self.reference, _without_pose)
 
@@ -257,21 +258,22 @@ class Replay:
 def without(
     recorded: Any, effects: tuple, stage: str, reference: Reference, take_off: Callable
 ) -> Any:
-    """What is true, of a value (Trajectory, Mounting, ControlPoints) as it was recorded.
+    """Remove effects from a recorded value (Trajectory, Mounting, ControlPoints).
 
-    ``take_off(recorded, true, changed)`` is what `recorded` is without the way from `true` to
-    `changed`; random effects must not be among these.
+    ``take_off(recorded, true, changed)`` removes the difference between `true` and `changed` from
+    `recorded`; random effects are not allowed.
 
     Parameters
     ----------
     recorded : Trajectory, Mounting or ControlPoints
     effects : tuple of Effect
     stage : str
-        At which effects act.
+        Stage of the effects.
     reference : Reference
         Of the effects.
     take_off : function
-        Of recorded, true, changed: what recorded is without the way from true to changed.
+        Function of recorded, true, changed that removes the difference between true and changed
+        from recorded.
     """
     effects = [effect for effect in effects if effect.stage == stage]
     true = recorded
@@ -297,7 +299,7 @@ def _without_mount(recorded, true, changed):
 
 
 def true_targets(targets: ControlPoints, effects: tuple, reference: Reference) -> ControlPoints:
-    """ControlPoints where they truly are, of those that were surveyed.
+    """True positions of surveyed targets, as ControlPoints.
 
     Parameters
     ----------

@@ -1,11 +1,11 @@
-"""Scanners on a moving vehicle: pulses one by one, cast into the scene and measured with noise.
+"""Scanners on a moving vehicle: individual pulses, cast into the scene and measured with noise.
 
 A line scanner turns one beam about its Z axis; a spinning one turns a fan of beams (rings), each
 at its elevation out of the scan plane, and fires them in turn while it turns on.
 
-Each source of noise draws from a stream of its own, for every pulse that is fired. So a source that
-is switched off leaves all others as they are, and so does a pulse that nothing returns. Later
-echoes of a pulse, which a wide beam has, draw from streams of their own.
+Each source of noise draws from its own stream, for every fired pulse. Switching off one source, or
+a pulse without a return, thus does not change the others. Later echoes of a pulse, which a wide
+beam has, draw from separate streams.
 """
 
 from collections.abc import Iterator
@@ -27,22 +27,21 @@ from mlscorr.simulate.scenario import ScannerScenario
 from mlscorr.simulate.settings import SETTINGS
 from mlscorr.survey import Mounting, Trajectory
 
-FULL_SCALE = np.iinfo(np.uint16).max  # of intensity, as LAS holds it
+FULL_SCALE = np.iinfo(np.uint16).max  # of intensity, as in LAS
 
 
 @dataclass(frozen=True, repr=False)
 class MeasuredPulses(RecordedPulses):
-    """Measured returns in scan order, and what they truly hit: RecordedPulses by the mounting of
-    this scanner, and more.
+    """Measured returns in scan order, and their true hits: RecordedPulses with more fields.
 
     Parameters
     ----------
     return_number, number_of_returns : (n,) uint8 array
         Of the pulse, from 1.
     point : (n, 3) array
-        True point in map coordinates: where no noise would have put it. Units: m.
+        True point in map coordinates, without noise. Units: m.
     triangle : (n,) int array
-        Triangle of the scene that was hit; of a mixed return, the strongest.
+        Triangle of the scene that was hit; for a mixed return, the strongest.
     """
 
     return_number: np.ndarray
@@ -65,9 +64,9 @@ class MeasuredPulses(RecordedPulses):
 class Shots:
     """One block of n fired pulses: a row for the first echo of each of them, then m later echoes.
 
-    ``kept`` (n + m,) tells which rows are returns: so that rows, and with them random draws, don't
-    depend on what is lost. ``pulse`` (m,) is which of the n each later echo belongs to. Other
-    fields (n + m, ...) as in MeasuredPulses.
+    ``kept`` (n + m,) flags the rows that are returns, so that rows and random draws do not depend
+    on lost returns. ``pulse`` (m,) is the pulse of each later echo. Other fields (n + m, ...) as in
+    MeasuredPulses.
     """
 
     gps_time: np.ndarray
@@ -87,7 +86,7 @@ class Shots:
         return len(self.kept) - len(self.pulse)
 
     def pulses(self) -> MeasuredPulses:
-        """MeasuredPulses of the returns, in scan order, the echoes of a pulse numbered by range."""
+        """Return the MeasuredPulses in scan order, with echoes of a pulse numbered by range."""
         rows = np.flatnonzero(self.kept)
         number = count = np.ones(len(rows), np.uint8)
         if len(self.pulse):
@@ -104,9 +103,9 @@ class Shots:
 
 
 def turn_of(scanner: ScannerScenario) -> Turn:
-    """Turn of a scanner: points_per_line steps, each of which fires all rings, one after another.
+    """Make the Turn of a scanner: points_per_line steps, each of which fires all rings in sequence.
 
-    What lies outside the field of view is not fired.
+    Pulses outside the field of view are not fired.
 
     Parameters
     ----------
@@ -126,7 +125,7 @@ def turn_of(scanner: ScannerScenario) -> Turn:
 
 
 def turns_of_a_pass(trajectory: Trajectory, scanner: ScannerScenario) -> int:
-    """Whole turns of a scanner between the leads of a trajectory.
+    """Number of whole turns of a scanner within a trajectory, without lead-in and lead-out.
 
     Parameters
     ----------
@@ -134,7 +133,7 @@ def turns_of_a_pass(trajectory: Trajectory, scanner: ScannerScenario) -> int:
     scanner : ScannerScenario
     """
     duration = trajectory.gps_time[-1] - trajectory.gps_time[0] - 2 * SETTINGS.lead
-    return int(duration * scanner.lines_per_second + 1e-6)  # times are known to 1e-10 s
+    return int(duration * scanner.lines_per_second + 1e-6)  # times are accurate to 1e-10 s
 
 
 def pulses_of_a_pass(trajectory: Trajectory, scanner: ScannerScenario) -> int:
@@ -163,7 +162,7 @@ DRAWS = {"range": _normal, "angle": _normal, "speckle": _coarse, "loss": _chance
 
 
 def noise_streams(rng: Generator) -> tuple[dict, ...]:
-    """Random streams of a scanner on one pass by source: for first echoes, and for later ones.
+    """Make random streams of a scanner on one pass by source: for first and for later echoes.
 
     Parameters
     ----------
@@ -173,11 +172,11 @@ def noise_streams(rng: Generator) -> tuple[dict, ...]:
 
 
 class ScannerNoise:
-    """The random numbers of one block of n pulses, drawn in the background."""
+    """Random numbers of one block of n pulses, drawn in the background."""
 
     def __init__(self, scanner, streams, n):
         self._later = streams[1]
-        size = {  # nothing is drawn where it is zero
+        size = {  # nothing is drawn for zeros
             "range": scanner.range_noise,
             "angle": np.radians(scanner.angle_noise),
             "speckle": SETTINGS.speckle,
@@ -190,7 +189,7 @@ class ScannerNoise:
         }
 
     def wait(self) -> None:
-        """Wait until all are drawn: streams of another block begin where these end."""
+        """Wait until all are drawn, because the streams of the next block continue from here."""
         wait(self._first.values())
 
     def _of(self, source, more=0):
@@ -199,7 +198,7 @@ class ScannerNoise:
         return np.append(self._first[source].result(), later)
 
     def angle(self, angle: np.ndarray) -> np.ndarray:
-        """Angles (n,) as measured. Units: rad.
+        """Return measured angles (n,). Units: rad.
 
         Parameters
         ----------
@@ -211,7 +210,7 @@ class ScannerNoise:
         return angle
 
     def range(self, hits: Hits) -> np.ndarray:
-        """Ranges (n + m,) as measured. Units: m.
+        """Return measured ranges (n + m,). Units: m.
 
         Parameters
         ----------
@@ -222,7 +221,7 @@ class ScannerNoise:
         return hits.range + self._of("range", len(hits.pulse))
 
     def kept(self, hits: Hits) -> np.ndarray:
-        """Which echoes (n + m,) are received: the share that is lost grows as strength falls.
+        """Flag (n + m,) of received echoes: the share lost increases as strength decreases.
 
         Parameters
         ----------
@@ -235,7 +234,7 @@ class ScannerNoise:
         return kept
 
     def intensity(self, hits: Hits) -> np.ndarray:
-        """Received intensities (n + m,) uint16, with speckle.
+        """Return received intensities (n + m,) uint16, with speckle.
 
         Parameters
         ----------
@@ -264,30 +263,30 @@ def shoot(
     divergence: float | None = None,
     block: int | None = None,
 ) -> Iterator[Shots]:
-    """Blocks of Shots of one pass, in time order, with the scanner's noise.
+    """Yield blocks of Shots of one pass, in order of time, with the scanner's noise.
 
     Parameters
     ----------
     surfaces : Surfaces
-        The scene, about its local origin.
+        Surfaces of the scene, relative to its local origin.
     origin : (3,) array
         Map coordinates of the local origin. Units: m.
     trajectory : Trajectory
-        Where the vehicle truly is, without gaps.
+        True trajectory, without gaps.
     mounting : Mounting
-        Of this scanner, as it truly is.
+        True mounting of this scanner.
     scanner : ScannerScenario
     streams : tuple of dict
-        As noise_streams gives them; drawn from copies, so that it can be done again.
+        From noise_streams; copies are used, so that the call can be repeated.
     divergence : float, optional
-        Full angle of the beam, the scanner's when not given. Units: rad.
+        Full angle of the beam; by default the scanner's. Units: rad.
     block : int, optional
-        Rays in memory at a time; leaves no trace in the result.
+        Rays in memory at a time; does not affect the result.
 
     Yields
     ------
     Shots
-        Each lasts until the next one.
+        Valid until the next one.
     """
     block = block or SETTINGS.block_rays
     if divergence is None:
@@ -318,7 +317,7 @@ def shoot(
 
 
 def _measure(rays, hits, noise):
-    """Shots: what was hit, with noise. All echoes of a pulse share its measured angle."""
+    """Measure hits with noise as Shots. All echoes of a pulse share its measured angle."""
 
     def all_rows(values):
         if len(hits.pulse):

@@ -1,4 +1,4 @@
-"""Blocks on all cores: slices of rows to threads, and arrays that serve again."""
+"""Parallel blocks on all cores: slices of rows for threads, and reused arrays."""
 
 import os
 from collections.abc import Callable
@@ -8,17 +8,17 @@ from itertools import pairwise
 
 import numpy as np
 
-WORKERS = min(os.cpu_count() or 1, 8)  # threads; beyond, memory is what they wait for
+WORKERS = min(os.cpu_count() or 1, 8)  # threads; more would only wait for memory
 
 
 class Workspace:
-    """Arrays that serve again from block to block: fresh memory costs more than what fills it."""
+    """Arrays reused from block to block, because new memory costs more than filling it."""
 
     def __init__(self):
         self._flat = {}
 
     def array(self, name: str, *shape: int, dtype: type = float) -> np.ndarray:
-        """An array of a name, whose content, and that of the one before it, is lost.
+        """Return an array by name, whose previous contents are lost.
 
         Parameters
         ----------
@@ -31,10 +31,10 @@ class Workspace:
 
 
 def in_slices(n: int, kernel: Callable, rows: tuple, constants: tuple) -> list:
-    """Call a compiled kernel(*rows, *constants) for slices of n rows, on all cores at once.
+    """Call a compiled kernel(*rows, *constants) for slices of n rows, on all cores in parallel.
 
-    What it returns is listed in the order of the slices, with the first row of each. Every row
-    must be computed by itself, so that the number of slices leaves no trace.
+    Results are listed in the order of the slices, with the first row of each. Every row must be
+    computed independently, so that the number of slices does not affect the result.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def in_slices(n: int, kernel: Callable, rows: tuple, constants: tuple) -> list:
         Columns.
     kernel : compiled function
     rows : tuple of (n, ...) array
-        First arguments of the kernel, of which each slice takes its part.
+        First arguments of the kernel, sliced.
     constants : tuple
         Its other arguments.
     """
@@ -59,8 +59,8 @@ def in_slices(n: int, kernel: Callable, rows: tuple, constants: tuple) -> list:
 
 @cache
 def pool() -> ThreadPoolExecutor:
-    """Threads that stay, as starting them for every block costs more than the work."""
+    """Return persistent threads, because starting them for every block costs more than the work."""
     return ThreadPoolExecutor(WORKERS, thread_name_prefix="mlscorr")
 
 
-os.register_at_fork(after_in_child=pool.cache_clear)  # a forked process has no threads of these
+os.register_at_fork(after_in_child=pool.cache_clear)  # a forked process has none of these threads

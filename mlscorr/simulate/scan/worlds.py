@@ -1,6 +1,7 @@
-"""What recorded pulses may meet when they are fired again: planes, a reference mesh, targets.
+"""Worlds for replayed pulses: planes, a reference mesh, targets.
 
-All about one local origin; ``meet(start, direction)`` takes (n, 3) of each pulse and gives Met.
+All are relative to one local origin; ``meet(start, direction)`` takes arrays (n, 3) of the pulses
+and returns Met.
 """
 
 from collections.abc import Iterable
@@ -36,7 +37,7 @@ class Planes:
     intensity: np.ndarray
 
     def meet(self, start: np.ndarray, direction: np.ndarray) -> Met:
-        """Met where beams meet their planes.
+        """Compute Met of beams on their planes.
 
         Parameters
         ----------
@@ -52,8 +53,7 @@ class Planes:
 def crossing(
     start: np.ndarray, direction: np.ndarray, normal: np.ndarray, offset: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Distance (n,) along beams to planes (NaN where they never meet them) in m, and the cosine
-    (n,) of incidence.
+    """Distance (n,) in m along beams to planes, NaN without one, and cosine (n,) of incidence.
 
     Parameters
     ----------
@@ -75,12 +75,12 @@ def crossing(
 
 @dataclass(frozen=True)
 class MeshWorld:
-    """The triangles of a mesh about the origin."""
+    """Triangles of a mesh relative to the origin."""
 
     mesh: Mesh
 
     def cast(self, start: np.ndarray, direction: np.ndarray) -> np.ndarray:
-        """Triangle (n,) that each beam meets first; -1 for none.
+        """Return the triangle (n,) that each beam meets first; -1 for none.
 
         Parameters
         ----------
@@ -96,7 +96,7 @@ class MeshWorld:
     def meet(
         self, start: np.ndarray, direction: np.ndarray, intensity: np.ndarray
     ) -> tuple[Met, np.ndarray]:
-        """Met of beams that return with intensities (n,), and the triangle (n,) of each.
+        """Compute Met of beams that return with intensities (n,), and the triangle (n,) of each.
 
         Triangles are found in float32, distances on their planes in float64.
 
@@ -107,7 +107,7 @@ class MeshWorld:
         direction : (n, 3) array
             Unit vectors.
         intensity : (n,) array
-            That the beams return with.
+            Intensity of the returns.
         """
         triangle = self.cast(start, direction)
         distance, slant = crossing(
@@ -118,13 +118,12 @@ class MeshWorld:
 
 @dataclass(frozen=True, repr=False)
 class Boards(Columns):
-    """Targets as the simulator builds them: a bright disc on a darker board, a bright plate, a
-    hole in a board, a checkerboard; and beside them what was recorded there.
+    """Targets as built by the simulator: discs on boards, plates, holes in boards, checkerboards.
 
     Parameters
     ----------
     centre : (t, 3) array
-        About the origin. Units: m.
+        Relative to the origin. Units: m.
     axes : (t, 3, 3) array
         Columns: the directions of the edges, and the normal.
     form : (t,) int array
@@ -134,7 +133,7 @@ class Boards(Columns):
     inner : (t,) array
         Diameter of a ring's dark inner disc over the outer one's, 0 for none.
     bright, dark, speckle : (t,) array
-        Intensity of its paints, and their relative noise.
+        Intensity of the paints, and their relative noise.
     """
 
     centre: np.ndarray
@@ -148,7 +147,7 @@ class Boards(Columns):
 
     @classmethod
     def concatenate(cls, parts: Iterable[Self]) -> Self:
-        """All boards of some records, in their order; none of none."""
+        """Concatenate the boards of several records in order; empty without any."""
         shapes = (0, 3), (0, 3, 3), 0, 0, 0, 0, 0, 0
         none = cls(*(np.empty(shape, int if i == 2 else float) for i, shape in enumerate(shapes)))
         return super().concatenate([none, *parts])
@@ -156,13 +155,12 @@ class Boards(Columns):
     def crossings(
         self, number: np.ndarray, start: np.ndarray, direction: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Where the beams of pulses meet the plane of their target, `number` (n,): distance (n,)
-        in m, cosine of incidence (n,), place along the edges from the centre (n, 2) in m.
+        """Cross beams with their target's plane: distance, cosine (n,), place (n, 2) along edges.
 
         Parameters
         ----------
         number : (n,) int array
-            Of the target of each pulse.
+            Index of the target of each pulse.
         start : (n, 3) array
             Of the beams. Units: m.
         direction : (n, 3) array
@@ -176,14 +174,14 @@ class Boards(Columns):
         return distance, slant, np.einsum("nij,nj->ni", self.axes[number, :2], away)
 
     def paint(self, number: np.ndarray, place: np.ndarray) -> np.ndarray:
-        """Intensity (n,) at places (n, 2) of their targets' planes; NaN off the target.
+        """Return the intensity (n,) at positions (n, 2) in the targets' planes; NaN off the target.
 
         Parameters
         ----------
         number : (n,) int array
             Of targets.
         place : (n, 2) array
-            Along their edges from the centre. Units: m.
+            Along their edges from the center. Units: m.
         """
         x, y = place.T
         form = self.form[number]
@@ -206,18 +204,18 @@ class Boards(Columns):
 
 @dataclass(frozen=True)
 class TargetWorld:
-    """Boards, each for the pulses about it, before what was recorded behind them.
+    """Boards, each for nearby pulses, in front of the recorded background.
 
     Parameters
     ----------
     boards : Boards
     number : (n,) int array
-        The board that each pulse is about.
+        Board of each pulse.
     beyond : (n,) array
-        Range of what a pulse meets without the target, over that of the target's plane; NaN where
-        it meets nothing. Units: m.
+        Range of the background minus that of the target's plane; NaN without a background. Units:
+        m.
     intensity : (n,) array
-        Of that.
+        Intensity of the background.
     noise : (n,) array
         Unit noise, of the paints' speckle.
     """
@@ -229,7 +227,7 @@ class TargetWorld:
     noise: np.ndarray
 
     def meet(self, start: np.ndarray, direction: np.ndarray) -> Met:
-        """Met of what comes first: something before the target, the target, or what is behind.
+        """Compute Met of the first surface: foreground, target or background.
 
         Parameters
         ----------
@@ -251,8 +249,7 @@ class TargetWorld:
 
 
 def paints(kind: str, intensity: np.ndarray) -> tuple[float, float, float]:
-    """Bright and dark paint and the relative noise of both, of a target of a kind on which these
-    intensities (n,) were recorded, with the simulator's ratio of reflectances.
+    """Bright and dark paint, and their relative noise, from recorded intensities (n,).
 
     Parameters
     ----------

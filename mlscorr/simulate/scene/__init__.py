@@ -1,4 +1,4 @@
-"""What stands along the way: ground, houses, banks or the user's mesh, and the targets."""
+"""Objects along the way: ground, houses, banks or the user's mesh, and the targets."""
 
 from mlscorr.simulate.scene._street import section
 from mlscorr.simulate.scene.build import Scene, build_scene, sky_elevation, static_scan

@@ -1,18 +1,18 @@
-"""Dimensions and reflectances of what stands along a way, a dataclass for each kind of thing.
+"""Dimensions and reflectances of objects along a way, with a dataclass for each kind.
 
 Lengths are in m; reflectances are ratios at the wavelengths of scanners, 905 to 1550 nm. Pairs are
-the ends of a range from which each thing draws its own value. Where no source is named, values are
-those usual in towns: they make a scene look like one, and no estimate knows them.
+ranges from which each object draws its own value. Values without a source are usual in towns; they
+make a scene realistic, and no estimate uses them.
 """
 
 from dataclasses import dataclass
 
 from numpy.random import Generator
 
-ROOT = 0.3  # m, by which posts, trunks and lamps reach into the ground, which may slope
-ON_WALL = 0.02  # m, of a target before the wall that carries it
-ON_GROUND = 0.01  # m, of a target above the road or slope that carries it
-WALL_ENDS = 0.4  # m, between a target and the ends of the front that carries it
+ROOT = 0.3  # m, depth of posts, trunks and lamps in the ground, which may slope
+ON_WALL = 0.02  # m, from a target to the wall behind it
+ON_GROUND = 0.01  # m, from a target to the road or slope below it
+WALL_ENDS = 0.4  # m, between a target and the ends of its front
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ class BushSize:
     leaves : float
         Number of leaves of a bush of size 1.
     scatter : float
-        By which bushes lie off their row, to each side. Units: m.
+        Distance of bushes from their row, to each side. Units: m.
     """
 
     size: tuple[float, float] = (0.5, 1.0)
@@ -140,13 +140,13 @@ class HouseSize:
     ridge : float
         Of the roof above the eaves. Units: m.
     base : float
-        By which it reaches below the lower corner of its front. Units: m.
+        Depth below the lower corner of its front. Units: m.
     ground_floor : float
         Height without windows, above the higher corner. Units: m.
     storey, bay : float
-        Height and width of what holds a window. Units: m.
+        Height and width of the wall around a window. Units: m.
     frame, window : float
-        Share of a bay and storey to each side of a window, and of the window itself.
+        Share of a bay and story to each side of a window, and of the window itself.
     recess : float
         Of a window behind the front. Units: m.
     reflectance : tuple of float
@@ -192,14 +192,14 @@ class HouseRow:
 
 @dataclass(frozen=True)
 class Furniture:
-    """Where things of one kind stand.
+    """Positions of objects of one kind.
 
     Parameters
     ----------
     across : float
-        From the kerb away from the road, or from the water's edge inland. Units: m.
+        From the curb away from the road, or from the water's edge inland. Units: m.
     extent : float
-        Half, along the way, that stays free of other things. Units: m.
+        Half length along the way that remains free of other objects. Units: m.
     """
 
     across: float
@@ -213,11 +213,11 @@ class TargetHeight:
     Parameters
     ----------
     least : float
-        Of the centre. Units: m.
+        Of the center. Units: m.
     below : float
-        That stays free below the target at least. Units: m.
+        Smallest clearance below the target. Units: m.
     span : float
-        Over which the heights spread. Units: m.
+        Range of the heights. Units: m.
     """
 
     least: float
@@ -225,15 +225,15 @@ class TargetHeight:
     span: float
 
     def draw(self, half: float, rng: Generator, raised: float = 0.0) -> float:
-        """Height of a target's centre above its foot. Units: m.
+        """Draw the height of a target's center above its foot. Units: m.
 
         Parameters
         ----------
         half : float
-            From the centre to the edge of the target. Units: m.
+            From the center to the edge of the target. Units: m.
         rng : Generator
         raised : float
-            By which it hangs higher. Units: m.
+            Additional height. Units: m.
         """
         low = max(self.least, half + self.below) + raised
         return rng.uniform(low, low + self.span)
@@ -241,7 +241,7 @@ class TargetHeight:
 
 @dataclass(frozen=True)
 class TargetPostSize:
-    """A target's own post, and the slat that hides a part of some targets.
+    """Post of a target, and the slat that hides a part of some targets.
 
     Parameters
     ----------

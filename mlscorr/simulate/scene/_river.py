@@ -1,7 +1,7 @@
-"""A river's right bank as a boat sees it: quay walls, grass slopes, steps, a promenade, houses.
+"""Right bank of a river seen from a boat: quay walls, grass slopes, steps, a promenade, houses.
 
-Its cross-section comes first. Water returns nothing at these wavelengths but straight below, so it
-has no triangles.
+The cross-section is defined first. Water gives no returns at these wavelengths except straight
+below, so it has no triangles.
 """
 
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ from mlscorr.simulate.settings import SETTINGS
 
 @dataclass(frozen=True)
 class Bank:
-    """The cross-section of a bank.
+    """Cross-section of a bank.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ class Bank:
     stairways: tuple[float, float] = (8.0, 14.0)
 
     def profile(self, kind: str) -> list[tuple[float, float, float]]:
-        """Columns inland of the shore and above the water (m), with the reflectance to the next.
+        """Return columns inland and above the water (m), with the reflectance to the next.
 
         Parameters
         ----------
@@ -110,7 +110,7 @@ class Bank:
         return stairs + inland
 
     def height(self, kind: str, inland: float | np.ndarray) -> np.ndarray:
-        """Height (...) of a profile above the water, inland of its steepest parts. Units: m.
+        """Return the height (...) of a profile, inland of its steepest parts. Units: m.
 
         Parameters
         ----------
@@ -128,13 +128,13 @@ WIDE_GAP = 25.0  # m, added to some gaps between houses
 LAMPS = Furniture(across=1.2, extent=0.2)  # m
 TREES = Furniture(across=5.0, extent=0.3)  # m
 CARS = Furniture(across=10.5, extent=2.3)  # m
-BUSHES = Furniture(across=4.0, extent=1.0)  # m; on slopes alone
+BUSHES = Furniture(across=4.0, extent=1.0)  # m; only on slopes
 BUSH_DENSITY = 6.0  # per 100 m
 CROWN = (2.4, 2.4, 2.2)  # m, half axes of a tree's crown
 SLOPE_TREE = 1.0  # m, of a tree behind the upper edge of a slope
 FREE_ENDS = 3.0  # m, without furniture at the ends of the scene
 KIND_ENDS = 0.3  # m, between furniture and the end of its reach
-ABOVE_STEPS = 8.0  # m inland, from which on steps leave room for furniture
+ABOVE_STEPS = 8.0  # m inland, from which steps have room for furniture
 ON_FRONTS = TargetHeight(least=1.4, below=0.4, span=0.8)  # m
 ON_POSTS = TargetHeight(least=1.0, below=0.2, span=1.0)  # m
 POSTS = {"quay": (0.4, 1.0), "slope": (2.0, 6.0), "steps": (8.2, 8.8)}  # m inland
@@ -147,7 +147,7 @@ TARGET_ENDS = 0.6  # m, between a target and the end of its reach
 
 @dataclass(frozen=True)
 class _Stretch:
-    """A stretch of the shore of one kind, from start to end (m along the boat's line)."""
+    """Interval of the shore of one kind, from start to end (m along the boat's line)."""
 
     kind: str
     start: float
@@ -155,7 +155,7 @@ class _Stretch:
 
 
 class River:
-    """What stands along a bank; `spot` finds places for targets, `furniture` the rest."""
+    """Objects along a bank; `spot` finds positions for targets, `furniture` makes the rest."""
 
     bank = Bank()
 
@@ -170,7 +170,7 @@ class River:
         return self._shore_rng.uniform(0.0, 2 * np.pi)
 
     def shore(self, s: float | np.ndarray) -> np.ndarray:
-        """Distance (...) of the water's edge to the right of the boat's line. Units: m.
+        """Return the distance (...) of the water's edge to the right of the boat's line. Units: m.
 
         Parameters
         ----------
@@ -184,7 +184,7 @@ class River:
     def place(
         self, s: float | np.ndarray, inland: float | np.ndarray, height: float | np.ndarray
     ) -> np.ndarray:
-        """Points (..., 3) by their distance inland of the shore and height above the water.
+        """Return points (..., 3) by distance inland of the shore and height above the water.
 
         Parameters
         ----------
@@ -199,7 +199,7 @@ class River:
 
     @cached_property
     def stretches(self) -> list:
-        """Quay walls and slopes in turn, with steps between some of them."""
+        """Alternating quay walls and slopes, with steps between some of them."""
         stretches = []
         s = -SETTINGS.margin
         i = int(self._phase > np.pi)
@@ -250,7 +250,7 @@ class River:
         return Mesh.concatenate(pieces)
 
     def _bank(self, stretch):
-        """A reach's profile drawn along the shore, in strips of 2 m at most."""
+        """Profile of an interval along the shore, in strips of at most 2 m."""
         s = np.linspace(stretch.start, stretch.end, 2 + int((stretch.end - stretch.start) / 2.0))
         strips = []
         for (x, z, reflectance), (next_x, next_z, _) in pairwise(self.bank.profile(stretch.kind)):
@@ -260,7 +260,7 @@ class River:
         return Mesh.concatenate(strips)
 
     def _cross_wall(self, s):
-        """A wall with a parapet, from the water up to the promenade."""
+        """Wall with a parapet, from the water up to the promenade."""
         bank = self.bank
         half = bank.wall_width / 2
         corner = self.place(s - half, -bank.wall_front, -bank.depth)
@@ -270,16 +270,17 @@ class River:
         return box(corner, inland, along, height * UP, bank.wall)
 
     def _kind_at(self, s, margin):
-        """Kind of the reach that holds s with a margin (m) to both sides, or None."""
+        """Kind of the interval that contains s with a margin (m) on both sides, or None."""
         holding = (r.kind for r in self.stretches if r.start + margin < s < r.end - margin)
         return next(holding, None)
 
     def spot(
         self, s: float, side: int, support: str, half: float, rng: Generator
     ) -> TargetSpot | None:
-        """TargetSpot for a target of a half extent (m), or None where none is free.
+        """Find a TargetSpot for a target of a half extent (m), or None if there is none.
 
-        Always on the right bank; `road` lies on the slope; what has no place stands on a post.
+        It is always on the right bank; `road` means on the slope; a post is used if there is no
+        other position.
 
         Parameters
         ----------
@@ -288,9 +289,9 @@ class River:
         side : int
             -1 left, 1 right.
         support : str
-            What should carry the target: post, wall or road.
+            Support of the target: post, wall or road.
         half : float
-            From the centre to the edge of the target. Units: m.
+            From the center to the edge of the target. Units: m.
         rng : Generator
         """
         margin = half + TARGET_ENDS
@@ -308,12 +309,12 @@ class River:
         return self._on_post(s, kind, half, rng)
 
     def _facing(self, s):
-        """Horizontal unit vector (3,) along the shore, with minus it x UP towards the water."""
+        """Horizontal unit vector (3,) along the shore, with minus it x UP toward the water."""
         ends = self.place(np.array([s - 0.2, s + 0.2]), 0.0, 0.0)
         return unit(ends[1] - ends[0])
 
     def _on_house(self, s, half, rng):
-        """On a house front."""
+        """Find a position on a house front."""
         margin = half + WALL_ENDS
         row = next((row for row in self.houses if row[0] + margin < s < row[1] - margin), None)
         if row is None:
@@ -327,7 +328,7 @@ class River:
         )
 
     def _on_quay(self, s, half, rng):
-        """On the quay wall."""
+        """Find a position on the quay wall."""
         u = -self._facing(s)
         low = half + ON_QUAY[0]
         high = self.bank.top - half - ON_QUAY[1]
@@ -335,7 +336,7 @@ class River:
         return TargetSpot("wall", s, float(self.shore(s)), centre, u, UP, -0.5)
 
     def _on_post(self, s, kind, half, rng):
-        """On a post behind the quay's edge, on the slope, or above the steps."""
+        """Find a position on a post behind the quay's edge, on the slope, or above the steps."""
         inland = rng.uniform(*POSTS[kind])
         foot = self.place(s, inland, self.bank.height(kind, inland))
         raised = STEPS_RAISE if kind == "steps" else 0.0
@@ -344,7 +345,7 @@ class River:
         return TargetSpot("post", s, lateral, centre, -self._facing(s), UP, foot[2])
 
     def _on_slope(self, s, half, rng):
-        """Just above the slope, in its plane."""
+        """Find a position just above the slope, in its plane."""
         margin = half + SLOPE_EDGE
         inland = rng.uniform(margin + SHORE_EDGE, self.bank.slope - margin)
         steps = np.array([-0.2, 0.2])
@@ -357,7 +358,7 @@ class River:
         return TargetSpot("road", s, lateral, centre, u, np.cross(normal, u), centre[2])
 
     def furniture(self, placed: Placed) -> Mesh:
-        """Mesh of lamps, trees, parked cars and bushes that stand before no target.
+        """Make the mesh of lamps, trees, parked cars and bushes that do not hide targets.
 
         Parameters
         ----------

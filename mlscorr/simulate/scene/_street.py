@@ -1,4 +1,4 @@
-"""A street: its cross-section, with crown and kerbs; houses with gaps, lamps, trees, cars."""
+"""Street: its cross-section, with crown and curbs; houses with gaps, lamps, trees, cars."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -29,7 +29,7 @@ from mlscorr.simulate.vehicle import VEHICLES
 
 @dataclass(frozen=True)
 class StreetSection:
-    """The cross-section of a street along its length.
+    """Cross-section of a street along its length.
 
     Parameters
     ----------
@@ -42,20 +42,20 @@ class StreetSection:
     turn_reach, turn_taper : float
         From the middle of a U-turn to where the widening ends, and over which it narrows. Units: m.
     pavement, garden : float
-        Width from the kerb to the house fronts, and of the ground behind them. Units: m.
+        Width from the curb to the house fronts, and of the ground behind them. Units: m.
     kerb : float
         Height. Units: m.
     cross_fall : float
         Of the carriageway, usual for drainage. Units: ratio.
     clearance : float
-        By which other parts of the way may come nearer than a thing's own. Units: m.
+        Tolerance for other parts of the way to be closer than an object's own. Units: m.
     line, line_from_kerb, paint : float
-        Width of a painted line, way from its middle to the kerb beside it, thickness of
+        Width of a painted line, distance from its middle to the adjacent curb, thickness of
         thermoplastic paint. Units: m.
     dash : tuple of float
         Length of a dash of the middle line, and of the gap after it, usual in towns. Units: m.
     asphalt, kerbstone, paving, lawn, white_line : float
-        Reflectance of the carriageway, of the kerb, of the pavement, of the gardens, of paint.
+        Reflectance of the carriageway, of the curb, of the pavement, of the gardens, of paint.
     """
 
     road: float = 3.0
@@ -79,7 +79,7 @@ class StreetSection:
     white_line: float = 0.6
 
     def half_width(self, s: float | np.ndarray) -> np.ndarray:
-        """Half width (...) at lengths s (...). Units: m.
+        """Return the half width (...) at lengths s (...). Units: m.
 
         Parameters
         ----------
@@ -95,7 +95,7 @@ class StreetSection:
         return width
 
     def height(self, s: float | np.ndarray, lateral: float | np.ndarray) -> np.ndarray:
-        """Height (...) of the carriageway above its edge. Units: m.
+        """Return the height (...) of the carriageway above its edge. Units: m.
 
         Parameters
         ----------
@@ -109,9 +109,9 @@ class StreetSection:
     def under_wheels(
         self, s: float | np.ndarray, lateral: float | np.ndarray, wheels: float = 0.5
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Height of a vehicle's middle over the edge (m) and its fall to the right (rad), (...).
+        """Return height of a vehicle's middle over the edge (m) and fall to the right (rad).
 
-        Its wheels (m) smooth the crown.
+        The track (m) of its wheels smooths the crown.
 
         Parameters
         ----------
@@ -127,12 +127,12 @@ class StreetSection:
         return self.cross_fall * self.road - fall * smooth, fall * np.asarray(lateral) / smooth
 
 
-LANE_EDGE = 2.4  # m, from the middle of a lane to the kerb, as cars are parked half on it
+LANE_EDGE = 2.4  # m, from the middle of a lane to the curb, as cars park half on it
 TURN_PLACE = 6.0  # m, from the end of the drive to the middle of a U-turn
 
 
 def section(scenario: DriveScenario, length: float) -> StreetSection:
-    """StreetSection of a street wide enough for the lanes of a DriveScenario's passes.
+    """Make the StreetSection of a street wide enough for the lanes of a DriveScenario's passes.
 
     Parameters
     ----------
@@ -153,11 +153,11 @@ FRONTS = HouseRow(width=(8.0, 14.0), gap=(2.0, 5.0), setback=(0.0, 0.4))  # m
 CARS = Furniture(across=-0.05, extent=2.3)  # m; half on the pavement
 LAMPS = Furniture(across=0.3, extent=0.2)  # m
 TREES = Furniture(across=0.7, extent=0.3)  # m
-CROWN = (1.7, 1.1, 1.6)  # m, half axes of a crown: cut back on the side of the houses
+CROWN = (1.7, 1.1, 1.6)  # m, half axes of a crown: trimmed toward the houses
 CAR_LIFT = 0.05  # m, of a car that is parked with two wheels on the pavement
 FREE_ENDS = 4.0  # m, without furniture at the ends of the scene
-POST_PLACES = (0.6, 1.1)  # m, from the kerb to a target's post
-ROAD_PLACES = (0.5, 0.73)  # of half the road: where targets lie, in the tracks of no wheel
+POST_PLACES = (0.6, 1.1)  # m, from the curb to a target's post
+ROAD_PLACES = (0.5, 0.73)  # share of half the road: targets between the wheel tracks
 ROAD_EDGE = 0.05  # m, between a target and the middle or the edge of the road
 ON_FRONTS = TargetHeight(least=1.2, below=0.3, span=1.0)  # m
 ON_POSTS = TargetHeight(least=1.0, below=0.2, span=1.2)  # m
@@ -166,15 +166,15 @@ ON_POSTS = TargetHeight(least=1.0, below=0.2, span=1.2)  # m
 @dataclass(frozen=True)
 class _House:
     side: int  # -1 left, 1 right
-    start: float  # m along the centre line
+    start: float  # m along the center line
     end: float
     near: np.ndarray  # (3,) lower corners of the front, at the pavement's level
     far: np.ndarray
-    lateral: float  # m of the front's nearest part from the centre line
+    lateral: float  # m of the front's nearest part from the center line
 
 
 class Street:
-    """What stands along a street; `spot` finds places for targets, `furniture` the rest."""
+    """Objects along a street; `spot` finds positions for targets, `furniture` makes the rest."""
 
     def __init__(self, scenario: Scenario, line: CentreLine, length, rng):
         self.scenario = scenario.scene
@@ -203,7 +203,7 @@ class Street:
         return houses
 
     def _front(self, side, start, end, setback):
-        """A front whose middle keeps off the pavement too where the street bends."""
+        """Front whose middle is off the pavement even where the street bends."""
         s = np.linspace(start, end, 5)
         lateral = side * (self.section.half_width(s).max() + self.section.pavement + setback)
         corners = self.line.place(s, lateral, self.section.kerb)
@@ -215,7 +215,7 @@ class Street:
         return _House(side, start, end, near, far, abs(lateral))
 
     def _is_clear(self, front):
-        """Whether no other part of the way runs through a house."""
+        """True if no other part of the way passes through a house."""
         steps = np.linspace(0.0, 1.0, 5)[:, None]
         points = front.near + steps * (front.far - front.near)
         inward = unit(front.side * np.cross(front.far - front.near, UP))
@@ -240,14 +240,14 @@ class Street:
         return Mesh.concatenate(pieces)
 
     def _ground(self):
-        """Carriageway with crown, kerbs, pavements and gardens, as strips of 1 m."""
+        """Carriageway with crown, curbs, pavements and gardens, as strips of 1 m."""
         s = np.arange(-SETTINGS.margin, self.length + SETTINGS.margin)
         edge = self.section.half_width(s)
         fence = edge + self.section.pavement
         garden = fence + self.section.garden
         kerb = np.full_like(s, self.section.kerb)
         flat = np.zeros_like(s)
-        rows = [  # from left to right: place, height, reflectance of the surface to the next
+        rows = [  # from left to right: position, height, reflectance up to the next
             (-garden, kerb, self.section.lawn),
             (-fence, kerb, self.section.paving),
             (-edge, kerb, self.section.kerbstone),
@@ -268,7 +268,7 @@ class Street:
         return Mesh.concatenate(strips)
 
     def _markings(self):
-        """Paint on the carriageway: a dashed middle line, and a line along each kerb."""
+        """Paint on the carriageway: a dashed middle line, and a line along each curb."""
         s = np.arange(-SETTINGS.margin, self.length + SETTINGS.margin)
         edge = self.section.half_width(s) - self.section.line_from_kerb
         half = self.section.line / 2
@@ -285,9 +285,9 @@ class Street:
             yield four_corners(*(corner[painted] for corner in quad), self.section.white_line)
 
     def _owns(self, s, middle, lateral):
-        """Which ground quads belong to their part of the way, where it crosses or repeats itself.
+        """Flag of ground quads that belong to their part of the way, where it crosses itself.
 
-        Of two carriageways the earlier one stays; pavements and gardens give way to any.
+        Of two carriageways, the earlier one is kept; both replace pavements and gardens.
         """
         on_road = np.abs(lateral) < self.section.half_width(s)
         earlier = self.line.distance_to_other_parts(middle, s, earlier=True)
@@ -298,7 +298,7 @@ class Street:
     def spot(
         self, s: float, side: int, support: str, half: float, rng: Generator
     ) -> TargetSpot | None:
-        """TargetSpot for a target of a half extent (m), or None where none is free.
+        """Find a TargetSpot for a target of a half extent (m), or None if there is none.
 
         Parameters
         ----------
@@ -307,9 +307,9 @@ class Street:
         side : int
             -1 left, 1 right.
         support : str
-            What should carry the target: post, wall or road.
+            Support of the target: post, wall or road.
         half : float
-            From the centre to the edge of the target. Units: m.
+            From the center to the edge of the target. Units: m.
         rng : Generator
         """
         spot: Any = None
@@ -327,12 +327,12 @@ class Street:
         return None
 
     def _is_seen(self, spot):
-        """Whether no house of another part of the way stands between the drive and a target."""
+        """True if no house of another part of the way is between the drive and a target."""
         eye = eyes(self.line, spot.s)
         return sees(self.mesh.caster, eye, np.broadcast_to(spot.centre, eye.shape)).all()
 
     def _on_wall(self, s, side, half, rng):
-        """On a house front; None where no front reaches far enough."""
+        """Find a position on a house front; None if no front is long enough."""
         margin = half + WALL_ENDS
         fronts = (front for front in self.houses if front.side == side)
         front = next((f for f in fronts if f.start + margin < s < f.end - margin), None)
@@ -346,7 +346,7 @@ class Street:
         return TargetSpot("wall", s, side * front.lateral, centre, u, UP, foot[2])
 
     def _on_post(self, s, side, half, rng):
-        """On a post on the pavement, facing the street."""
+        """Find a position on a post on the pavement, facing the street."""
         _, forward, _ = self.line.frame(s)
         u = -side * (forward - forward[2] * UP) / np.linalg.norm(forward[:2])
         edge = float(self.section.half_width(s))
@@ -356,7 +356,7 @@ class Street:
         return TargetSpot("post", s, lateral, centre, u, UP, foot[2])
 
     def _on_road(self, s, side, half, rng):
-        """Just above the carriageway, turned in its plane."""
+        """Find a position just above the carriageway, in its plane."""
         edge = float(self.section.half_width(s))
         margin = np.sqrt(2) * half + ROAD_EDGE
         low = max(ROAD_PLACES[0] * edge, margin)
@@ -374,7 +374,7 @@ class Street:
         return TargetSpot("road", s, lateral, centre, u, np.cross(normal, u), centre[2])
 
     def furniture(self, placed: Placed) -> Mesh:
-        """Mesh of parked cars, lamps and trees that stand before no target and in no way.
+        """Make the mesh of parked cars, lamps and trees that do not hide targets or block the way.
 
         Parameters
         ----------
@@ -405,7 +405,9 @@ class Street:
         return Mesh.concatenate(pieces)
 
     def _has_room(self, s, lateral, extent, placed):
-        """Whether a thing may stand there: before no target, in no other way, in no U-turn."""
+        """True if an object may be placed there: not in front of a target, on another way or in
+        a U-turn.
+        """
         place = self.line.place(s, lateral, 0.0)
         in_a_way = self.line.distance(place) < abs(lateral) - self.section.clearance
         in_a_turn = extent > 1.0 and self.section.half_width(s) > self.section.road
@@ -422,7 +424,7 @@ class Street:
         return tree(foot, forward, np.array(CROWN), rng)
 
     def _car(self, s, side, lateral, rng):
-        """Half on the pavement."""
+        """Car parked half on the pavement."""
         _, forward, right = self.line.frame(s)
         place = self.line.place(s, lateral, CAR_LIFT)
         return car(place, forward, right, rng.uniform(*CAR.reflectance))

@@ -1,4 +1,4 @@
-"""What stands along a way, as triangles: targets, houses, trees, lamps, cars."""
+"""Objects along a way, as triangles: targets, houses, trees, lamps, cars."""
 
 import numpy as np
 from numpy.random import Generator
@@ -9,7 +9,7 @@ from mlscorr.simulate.settings import SETTINGS
 
 
 def target(kind: str, centre: np.ndarray, u: np.ndarray, v: np.ndarray, size: float) -> Mesh:
-    """Mesh of a target about its centre (3,), in the plane of the unit vectors u, v (3,).
+    """Make the mesh of a target about its center (3,), in the plane of the unit vectors u, v (3,).
 
     A circle is a bright disc of diameter `size` within a darker square board of the same plane;
     a square is a bright plate of edge `size`. Units: m. With 64 segments the edge of a disc departs
@@ -49,7 +49,7 @@ def facade(
     reflectance: float,
     ground: float,
 ) -> Mesh:
-    """Mesh of a house front with a plain ground floor and rows of recessed windows above.
+    """Make the mesh of a house front with a plain ground floor and rows of recessed windows above.
 
     Parameters
     ----------
@@ -103,11 +103,11 @@ def _windows(cell, u, v, depth, reflectance):
 def house(
     near: np.ndarray, far: np.ndarray, inward: np.ndarray, height: float, reflectance: float
 ) -> Mesh:
-    """Mesh of a house, or of a plain wall where it is low.
+    """Make the mesh of a house, or of a plain wall if it is low.
 
-    near, far (3,): the lower corners of its front on the ground; inward (3,): unit normal into
-    it; height (m) of the eaves above the lower of the corners. End walls stand across the street,
-    so that they show in gaps.
+    near, far (3,): the lower corners of its front on the ground; inward (3,): unit normal into it;
+    height (m) of the eaves above the lower of the corners. End walls are perpendicular to the
+    street and thus visible in gaps.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def house(
 def leaves(
     centre: np.ndarray, radii: np.ndarray, forward: np.ndarray, count: int, rng: Generator
 ) -> Mesh:
-    """Mesh of leaves scattered in a crown, so that a beam returns from any depth of it.
+    """Make the mesh of leaves scattered in a crown, so that beams return from any depth of it.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def leaves(
 
 
 def tree(foot: np.ndarray, forward: np.ndarray, crown: np.ndarray, rng: Generator) -> Mesh:
-    """Mesh of a tree from its foot (3,): a trunk, and leaves above the height of a vehicle.
+    """Make the mesh of a tree from its foot (3,): a trunk, and leaves above vehicle height.
 
     crown (3,): half axes of the crown along the unit vector `forward`, across it, upright. m.
 
@@ -200,7 +200,7 @@ def tree(foot: np.ndarray, forward: np.ndarray, crown: np.ndarray, rng: Generato
 
 
 def lamp(foot: np.ndarray, towards: np.ndarray) -> Mesh:
-    """Mesh of a street lamp on its foot (3,), its arm along the unit vector `towards`.
+    """Make the mesh of a street lamp on its foot (3,), its arm along the unit vector `towards`.
 
     Parameters
     ----------
@@ -222,7 +222,7 @@ def lamp(foot: np.ndarray, towards: np.ndarray) -> Mesh:
 
 
 def car(place: np.ndarray, forward: np.ndarray, right: np.ndarray, reflectance: float) -> Mesh:
-    """Mesh of a parked car about the place (3,) on the ground under its middle.
+    """Make the mesh of a parked car at the position (3,) on the ground under its middle.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""All that a scanner can hit: a street, a river bank or the user's mesh, and surveyed targets."""
+"""Everything that a scanner can hit: street, river bank or user's mesh, and surveyed targets."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -23,17 +23,17 @@ SITES: dict[str, Any] = {"street": Street, "river": River, "mesh": MeshSite}
 
 @dataclass(frozen=True)
 class Scene:
-    """All that a scanner can hit.
+    """Everything that a scanner can hit.
 
     Parameters
     ----------
     mesh : Mesh
     target : (n,) int array
-        Which target each triangle belongs to, -1 for none.
+        Target of each triangle, -1 for none.
     targets : Targets
     centre_line : CentreLine
     fixed : int
-        The first so many triangles are ground and walls.
+        Number of leading triangles that are ground and walls.
     """
 
     mesh: Mesh
@@ -44,7 +44,7 @@ class Scene:
 
 
 def build_scene(scenario: Scenario, line: CentreLine, length: float, rng: Generator) -> Scene:
-    """Scene of a Scenario along a centre line, on which the drive is `length` (m) long.
+    """Build the Scene of a Scenario along a center line, on which the drive is `length` (m) long.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def build_scene(scenario: Scenario, line: CentreLine, length: float, rng: Genera
     Raises
     ------
     ValueError
-        Targets that find no place, or a mesh that cannot be used.
+        If targets cannot be placed, or a mesh is unusable.
     """
     site_rng, target_rng = rng.spawn(2)
     site = SITES[scenario.scene.kind](scenario, line, length, site_rng)
@@ -74,7 +74,7 @@ def build_scene(scenario: Scenario, line: CentreLine, length: float, rng: Genera
 
 
 def _yaw(scanners):
-    """Mean turn of the scan planes against the vehicle's cross-section, 0 for level ones. rad."""
+    """Mean yaw of the scan planes against the vehicle's cross-section, 0 for level ones. rad."""
     turns = []
     for scanner in scanners:
         across = Rotation.from_euler("xyz", scanner.boresight, degrees=True).apply(UP)
@@ -86,17 +86,17 @@ def _yaw(scanners):
 
 
 def sky_elevation(scene: Scene, trajectory: Trajectory, origin: np.ndarray) -> np.ndarray:
-    """Elevation (n, 2) below which the sky is hidden to the left and the right. Units: rad.
+    """Elevation (n, 2) below which the sky is hidden on the left and right. Units: rad.
 
     Parameters
     ----------
     scene : Scene
     trajectory : Trajectory
-        A true one, in map coordinates.
+        True trajectory, in map coordinates.
     origin : (3,) array
         Map coordinates of the scene's local origin. Units: m.
     """
-    rate = 2.0  # Hz, at which it is looked at, to be interpolated
+    rate = 2.0  # Hz, sampling rate before interpolation
     fan = np.radians([-40.0, -20.0, 0.0, 20.0, 40.0])  # about right and left; the median counts
     elevation = np.radians(np.arange(0.5, 90.0))
     start, end = trajectory.gps_time[[0, -1]]
@@ -115,9 +115,9 @@ def sky_elevation(scene: Scene, trajectory: Trajectory, origin: np.ndarray) -> n
 
 
 def static_scan(scene: Scene, rng: Generator) -> Mesh:
-    """Mesh of a Scene's ground and walls; cars, trees, posts and targets are not in it.
+    """Make the mesh of a Scene's ground and walls, without cars, trees, posts and targets.
 
-    Corners are off by a millimetre, those at one place alike.
+    Corners have errors of one millimeter, equal for coincident corners.
 
     Parameters
     ----------

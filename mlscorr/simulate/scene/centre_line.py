@@ -1,4 +1,4 @@
-"""The centre line of a way: a smooth curve by its own length."""
+"""Center line of a way: a smooth curve by its own length."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,7 +14,7 @@ from mlscorr.simulate.scene.shapes import UP
 from mlscorr.simulate.settings import SETTINGS
 from mlscorr.simulate.vehicle import VEHICLES
 
-# A winding line
+# Winding line
 BENDS = ((0.85, 1.0), (0.15, 2.2))  # share of the swing, and waves along the line, of two waves
 LEAST_BEND = 24.0  # m along the line for a radian of the longer wave
 STEEPEST_WAVE = 1.3  # largest slope of the two waves together: 0.85 + 0.15 * 2.2, and some more
@@ -25,12 +25,12 @@ LEAST_HILL, HILL_TIME = 40.0, 5.0  # m and s, for a radian of the hills: at most
 
 @dataclass(frozen=True)
 class CentreLine:
-    """A smooth curve by its length s (m): position (3,) at the ground's level, and heading."""
+    """Smooth curve by its length s (m): position (3,) at ground level, and heading."""
 
     curve: CubicSpline
 
     def frame(self, s: float | np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Position, unit forward and horizontal unit right vector, each (..., 3), at s (...).
+        """Return position, unit forward and horizontal unit right vector, (..., 3), at s (...).
 
         Parameters
         ----------
@@ -45,7 +45,7 @@ class CentreLine:
     def place(
         self, s: float | np.ndarray, lateral: float | np.ndarray, height: float | np.ndarray
     ) -> np.ndarray:
-        """Points (..., 3) at a distance to the right of the line and a height above it. m.
+        """Return points (..., 3) at a distance to the right of the line and a height above it. m.
 
         Parameters
         ----------
@@ -62,12 +62,12 @@ class CentreLine:
 
     @cached_property
     def _samples(self):
-        """Lengths (k,) of samples every metre, and a tree of their plan positions."""
+        """Lengths (k,) of samples every meter, and a tree of their plan positions."""
         s = np.arange(self.curve.x[0], self.curve.x[-1], 1.0)
         return s, cKDTree(self.curve(s)[:, :2])
 
     def height(self, points: np.ndarray) -> np.ndarray:
-        """Height (n,) of the line at its nearest place to points (n, 2+). Units: m.
+        """Return the height (n,) of the line at its position nearest to points (n, 2+). Units: m.
 
         Parameters
         ----------
@@ -81,7 +81,7 @@ class CentreLine:
         return self.curve(s + along)[:, 2]
 
     def distance(self, points: np.ndarray) -> np.ndarray:
-        """Horizontal distance (...) of points (..., 3) from the whole line, good to 0.1 m. m.
+        """Return the horizontal distance (...) of points (..., 3) from the whole line, to 0.1 m. m.
 
         Parameters
         ----------
@@ -93,21 +93,21 @@ class CentreLine:
     def distance_to_other_parts(
         self, points: np.ndarray, s: np.ndarray, earlier: bool = False, apart: float = 30.0
     ) -> np.ndarray:
-        """Horizontal distance (n,) of points (n, 3) at s (n,) from parts of the line that far on.
+        """Return the horizontal distance (n,) of points (n, 3) at s (n,) from other parts.
 
-        Infinite beyond about 10 m, and for a line that nowhere comes near itself. With `earlier`,
-        from parts before s alone.
+        Infinite beyond about 10 m, and for a line that does not approach itself. With `earlier`,
+        only parts before s count.
 
         Parameters
         ----------
         points : (n, 3) array
             Units: m.
         s : (n,) array
-            Of the parts that they belong to. Units: m.
+            Length at their own part. Units: m.
         earlier : bool
-            Whether parts before s alone count.
+            True if only parts before s count.
         apart : float
-            Along the line, from which on a place is of another part. Units: m.
+            Distance along the line beyond which a position belongs to another part. Units: m.
         """
         lengths, tree = self._samples
         # three parts within
@@ -120,7 +120,7 @@ class CentreLine:
 def winding_line(
     length: float, turns: float, rng: Generator, kind: str = "street", speed: float = 8.0
 ) -> CentreLine:
-    """A winding line of a length (m), starting at the local origin.
+    """Draw a winding line of a length (m), starting at the local origin.
 
     Its heading swings to each side up to `turns` (deg), in bends wide enough for the speed (m/s).
     A street goes up and down by up to 6 %; a river is level.
@@ -130,7 +130,7 @@ def winding_line(
     length : float
         Units: m.
     turns : float
-        How far the heading swings to each side. Units: deg.
+        Largest change of heading to each side. Units: deg.
     rng : Generator
     kind : str
         Of scene.
@@ -157,10 +157,10 @@ def winding_line(
 
 
 def line_along(position: np.ndarray, smoothing: float = 3.0) -> tuple[CentreLine, float]:
-    """CentreLine and length (m) of the way along positions (n, 3), from the first to the last.
+    """Make the CentreLine along positions (n, 3), and its length (m) from the first to the last.
 
-    Standing still adds no length: places less than a metre from the one before are dropped. The
-    ends go on straight, with the slope they have there.
+    Standstill adds no length, because positions less than a meter from the previous one are
+    dropped. The ends are extended straight, with their slope.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def line_along(position: np.ndarray, smoothing: float = 3.0) -> tuple[CentreLine
     Raises
     ------
     ValueError
-        A path that is too short for a scene.
+        If the path is too short for a scene.
     """
     kept = [0]
     for i, place in enumerate(position[:, :2]):
@@ -189,7 +189,7 @@ def line_along(position: np.ndarray, smoothing: float = 3.0) -> tuple[CentreLine
     lengths = np.linspace(0.0, s[-1], round(s[-1]) + 1)
     path = np.column_stack([np.interp(lengths, s, column) for column in path.T])
     path = _extend(gaussian_filter1d(_extend(path), smoothing, axis=0, mode="nearest"))
-    # of two extensions; the outer keeps the filter's own ends away
+    # of two extensions; the outer one keeps the filter's end effects away
     ends = 2 * round(SETTINGS.margin)
     s = plan_lengths(path)
     return CentreLine(CubicSpline(s - s[ends], path)), s[-1 - ends] - s[ends]
@@ -207,7 +207,7 @@ def plan_lengths(path: np.ndarray) -> np.ndarray:
 
 
 def _extend(path):
-    """A path of steps of a metre, longer by the margin at both ends."""
+    """Path with steps of a meter, extended by the margin at both ends."""
     steps = np.arange(1.0, SETTINGS.margin + 1.0)[:, None]
     before = path[0] - steps[::-1] * (path[5] - path[0]) / 5
     return np.vstack([before, path, path[-1] + steps * (path[-1] - path[-6]) / 5])

@@ -1,4 +1,4 @@
-"""The user's own mesh as a scene: read, checked, its ground hits; targets on posts beside."""
+"""User's own mesh as a scene: reading, checks, ground heights; targets on posts beside the way."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -17,11 +17,11 @@ from mlscorr.simulate.scene.placing import Placed, TargetSpot, eyes
 from mlscorr.simulate.scene.shapes import UP, Mesh, sees
 
 ON_POSTS = TargetHeight(least=1.0, below=0.3, span=1.0)  # m
-STEEPEST = 1.5  # m, by which a post's foot may be above or below the way
+STEEPEST = 1.5  # m, height of a post's foot above or below the way, at most
 
 
 def read_mesh(scene: SceneScenario, origin: ArrayLike) -> Mesh:
-    """Mesh of a scene's PLY or OBJ, about an origin, without triangles of no area.
+    """Read the mesh of a scene's PLY or OBJ, relative to an origin, without degenerate triangles.
 
     Parameters
     ----------
@@ -84,7 +84,9 @@ def _read_ply(path):
 
 
 def _read_obj(path):
-    """The same of an OBJ. Open3D's reader is float32, half a metre off at map coordinates."""
+    """Read the same from an OBJ. Open3D's float32 reader errs by half a meter at map
+    coordinates.
+    """
     vertices = []
     corners = []
     with path.open(encoding="utf-8", errors="replace") as file:
@@ -110,14 +112,14 @@ def _read_obj(path):
 
 
 class Ground:
-    """Heights of a mesh's surfaces below and above places."""
+    """Heights of a mesh's surfaces below and above positions."""
 
     def __init__(self, mesh):
         self._mesh = mesh
         self._floor = mesh.triangles[..., 2].min() - 1.0
 
     def levels(self, points: np.ndarray) -> list[np.ndarray]:
-        """For each place (n, 2+): the heights of all surfaces there, a list of n arrays. m.
+        """Return the heights of all surfaces at each position (n, 2+), as a list of n arrays. m.
 
         Parameters
         ----------
@@ -132,7 +134,7 @@ class Ground:
         return [height[a:b] for a, b in pairwise(splits)]
 
     def nearest(self, points: np.ndarray) -> np.ndarray:
-        """Height (n,) of the surface nearest to each point (n, 3); NaN where there is none. m.
+        """Return the height (n,) of the surface nearest to each point (n, 3); NaN without one.
 
         Parameters
         ----------
@@ -150,9 +152,9 @@ def _nearest(heights, height):
 
 
 def line_on_mesh(scenario: Scenario, line: CentreLine, length: float) -> CentreLine:
-    """CentreLine with the heights of the mesh's ground below it, which starts nearest the origin's.
+    """Make a CentreLine with the heights of the mesh's ground, starting nearest to the origin.
 
-    Raises ValueError where the way leaves the mesh.
+    Raises ValueError if the way leaves the mesh.
 
     Parameters
     ----------
@@ -164,7 +166,7 @@ def line_on_mesh(scenario: Scenario, line: CentreLine, length: float) -> CentreL
     Raises
     ------
     ValueError
-        A way that leaves the mesh.
+        If the way leaves the mesh.
     """
     mesh = read_mesh(scenario.scene, scenario.origin)
     s = np.arange(line.curve.x[0], line.curve.x[-1] + 1e-9, 1.0)
@@ -174,7 +176,7 @@ def line_on_mesh(scenario: Scenario, line: CentreLine, length: float) -> CentreL
     start = int(np.argmin(np.abs(s)))
     for way in (range(start, len(s)), range(start, -1, -1)):
         last = 0.0
-        for i in way:  # the surface that goes on from the one before, not a roof or a cellar
+        for i in way:  # the surface that continues the previous one, not a roof or a cellar
             height[i] = _nearest(levels[i], last)
             last = height[i] if len(levels[i]) else last
     _check_ground(scenario, mesh, s, place, height, length)
@@ -184,7 +186,7 @@ def line_on_mesh(scenario: Scenario, line: CentreLine, length: float) -> CentreL
 
 
 def _check_ground(scenario, mesh, s, place, height, length, hole=5.0):
-    """Refuse a drive that leaves the mesh by more than a hole (m), as cars leave in scans."""
+    """Refuse a drive that leaves the mesh by more than a hole (m), as cars cause in scans."""
     inside = (s >= 0) & (s <= length)
     lost = inside & ~np.isfinite(height)
     known = np.append(s[np.isfinite(height)], [-np.inf, np.inf])
@@ -203,7 +205,7 @@ def _check_ground(scenario, mesh, s, place, height, length, hole=5.0):
 
 
 class MeshSite:
-    """The user's mesh; `spot` finds places for targets on posts, `furniture` is these posts."""
+    """User's mesh; `spot` finds positions for targets on posts, `furniture` makes these posts."""
 
     beside = (2.5, 6.0)  # m from the drive to a target's post
 
@@ -216,7 +218,7 @@ class MeshSite:
     def spot(
         self, s: float, side: int, support: str, half: float, rng: Generator
     ) -> TargetSpot | None:
-        """TargetSpot on a post whose target is seen from the drive and cuts no surface, or None.
+        """Find a TargetSpot on a post, visible from the drive and without intersections, or None.
 
         Parameters
         ----------
@@ -225,9 +227,9 @@ class MeshSite:
         side : int
             -1 left, 1 right.
         support : str
-            What should carry the target: post, wall or road.
+            Support of the target: post, wall or road.
         half : float
-            From the centre to the edge of the target. Units: m.
+            From the center to the edge of the target. Units: m.
         rng : Generator
         """
         _, forward, _ = self.line.frame(s)
@@ -246,7 +248,9 @@ class MeshSite:
         return None
 
     def _is_free(self, centre, s, half, u):
-        """Whether the drive sees a target, and its board, turned by any angle, touches nothing."""
+        """True if a target is visible from the drive, and its board, at any angle, touches
+        nothing.
+        """
         eye = eyes(self.line, s)
         if not sees(self.mesh.caster, eye, np.broadcast_to(centre, eye.shape)).all():
             return False
@@ -256,7 +260,7 @@ class MeshSite:
         return sees(self.mesh.caster, np.broadcast_to(centre, ends.shape), ends).all()
 
     def furniture(self, placed: Placed) -> Mesh:
-        """Mesh of the targets' posts.
+        """Make the mesh of the targets' posts.
 
         Parameters
         ----------

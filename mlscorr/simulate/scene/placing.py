@@ -1,4 +1,4 @@
-"""Where targets stand along a way, what hides them, and where other things keep clear of them."""
+"""Placement of targets along a way, partial obstruction, and clearance from other objects."""
 
 import warnings
 from collections.abc import Callable
@@ -19,9 +19,9 @@ from mlscorr.survey import Columns
 
 @dataclass(frozen=True)
 class TargetSpot:
-    """A place for one target: the plane (unit vectors u, v) and the ground below its centre.
+    """Position of one target: the plane (unit vectors u, v) and the ground below its center.
 
-    s and lateral (m) place it along the way; ground (m) is the height of what a post stands on.
+    s and lateral (m) place it along the way; ground (m) is the height at the foot of a post.
     """
 
     support: str
@@ -40,10 +40,10 @@ class TargetSpot:
 
 @dataclass(frozen=True, repr=False)
 class Targets(Columns):
-    """What the surveyor would find without noise: n targets in local coordinates.
+    """Targets without survey noise: n targets in local coordinates.
 
-    kind (tuple of n), centre (n, 3) in m, normal (n, 3) out of the visible side, the road or wall
-    or post that carries each (tuple of n), and whether a narrow post stands in front (n,).
+    kind (tuple of n), centre (n, 3) in m, normal (n, 3) out of the visible side, its support (road,
+    wall or post; tuple of n), and flags (n,) of a narrow post in front.
     """
 
     kind: tuple[str, ...]
@@ -63,10 +63,10 @@ class Placed:
     spots: tuple[TargetSpot, ...]
 
     def in_the_way(self, s: float, lateral: float, extent: float, wedge: float = 1.2) -> bool:
-        """Whether a thing at s, of a half extent along the way (m), would stand before a target.
+        """True if an object at s, of a half extent along the way (m), would hide a target.
 
-        It would where it lies in the wedge of 50 deg to each side (its tangent) from which a target
-        on its side is seen, or beside it.
+        This holds within the wedge of 50 deg to each side (its tangent) from which a target on the
+        same side is visible, or next to it.
 
         Parameters
         ----------
@@ -90,19 +90,19 @@ class Placed:
 def place_targets(
     scenario: TargetScenario, length: float, site: Any, yaw: float, rng: Generator
 ) -> Placed:
-    """Placed targets, evenly along a way of a length (m) and on alternating sides.
+    """Place targets, evenly along a way of a length (m) and on alternating sides.
 
     Parameters
     ----------
     scenario : TargetScenario
     site : object
-        Its ``spot(s, side, support, half, rng)`` gives a TargetSpot, or None where there is no room
-        for a target that reaches `half` (m) from its centre.
+        Its ``spot(s, side, support, half, rng)`` returns a TargetSpot, or None without room for a
+        target that extends `half` (m) from its center.
     yaw : float
         Turn of the scan plane against the cross-section, which posts' targets face. Units: rad.
 
-    Those that find no place are left out with a warning. Raises ValueError for targets that are too
-    large or too many, or of which none finds a place.
+    Targets without a position are omitted with a warning. Raises ValueError if targets are too
+    large or too many, or if none can be placed.
     """
     count = scenario.control + scenario.check
     s = _along(scenario, count, length, rng)
@@ -134,7 +134,7 @@ def place_targets(
 
 
 def _placed(kinds, spots, size, hidden, posts):
-    """Placed targets of some kinds on their spots, with the meshes of posts."""
+    """Placed targets of some kinds at their spots, with the meshes of posts."""
     nothing = Mesh(np.empty((0, 3, 3)), np.empty(0))
     targets = Targets(
         kinds,
@@ -158,7 +158,7 @@ def _half(kind, size):
 
 
 def _along(scenario, count, length, rng):
-    """Even places (count,) along the way, each moved a little at random. Units: m."""
+    """Even positions (count,) along the way, each moved slightly at random. Units: m."""
     if scenario.size > SETTINGS.largest_target:
         raise ValueError(
             f"Targets of {scenario.size} m are too large: boards of {SETTINGS.board_edge} times "
@@ -181,8 +181,8 @@ def _along(scenario, count, length, rng):
 
 
 def _find_spot(site, near, side, support, half, others, rng):
-    """The first TargetSpot at lengths near (k,) in m with room, apart from others; or a post; or
-    None.
+    """First TargetSpot near lengths (k,) in m with room, at a distance from others; or a post;
+    or None.
     """
     apart = 2 * np.sqrt(2) * half + SETTINGS.target_clearance
     for kind in dict.fromkeys([support, "post"]):
@@ -197,7 +197,7 @@ def _find_spot(site, near, side, support, half, others, rng):
 
 
 def _tell_unplaced(places, count):
-    """Warn of targets that found no place, by where they should stand (m); refuse if none did."""
+    """Warn of targets without a position, by their intended lengths (m); refuse if all are."""
     if not places:
         return
     sentence = (
@@ -210,7 +210,7 @@ def _tell_unplaced(places, count):
 
 
 def _faced(spot, yaw, rng):
-    """A post's TargetSpot turned about the vertical towards the oblique beams of a scan plane."""
+    """TargetSpot of a post turned about the vertical toward the oblique beams of a scan plane."""
     turn = rng.uniform(0.0, 1.0) * np.clip(yaw, -np.radians(35.0), np.radians(35.0))
     cos = np.cos(turn)
     sin = np.sin(turn)
@@ -219,7 +219,7 @@ def _faced(spot, yaw, rng):
 
 
 def _choose_hidden(spots, share, rng):
-    """Which targets are partly hidden: a share of all, none of those that lie flat. (n,) bool."""
+    """Flag (n,) of partly hidden targets: a share of all, except horizontal ones."""
     upright = [i for i, spot in enumerate(spots) if abs(spot.normal[2]) < 0.2]
     hidden = np.zeros(len(spots), dtype=bool)
     hidden[rng.permutation(upright)[: round(share * len(spots))].astype(int)] = True
@@ -227,7 +227,7 @@ def _choose_hidden(spots, share, rng):
 
 
 def _own_post(spot, size):
-    """The post behind a target, from the ground to its upper edge."""
+    """Post behind a target, from the ground to its upper edge."""
     foot = spot.centre - TARGET_POST.width * spot.normal
     foot[2] = spot.ground - ROOT
     height = spot.centre[2] + size / 2 - foot[2]
@@ -235,7 +235,7 @@ def _own_post(spot, size):
 
 
 def _slat(spot, kind, size, rng):
-    """An upright slat close in front of a target, flat: it hides a part of it."""
+    """Upright flat slat close in front of a target, which hides a part of it."""
     shares = TARGET_POST.slat_circle if kind == "circle" else TARGET_POST.slat_square
     width = size * rng.uniform(*shares)
     offset = TARGET_POST.slat_offset
@@ -249,7 +249,7 @@ def _slat(spot, kind, size, rng):
 
 
 def eyes(line: CentreLine, s: float) -> np.ndarray:
-    """Places (3, 3) on a CentreLine from which a target at s (m) must be seen.
+    """Positions (3, 3) on a CentreLine from which a target at s (m) must be visible.
 
     Parameters
     ----------
@@ -263,10 +263,10 @@ def eyes(line: CentreLine, s: float) -> np.ndarray:
 def scatter(
     density: float, start: float, end: float, is_free: Callable, rng: Generator, places: int = 12
 ) -> list[tuple[float, int]]:
-    """Places (s, side) of things, so many per 100 m of way between two lengths (m), evenly.
+    """Positions (s, side) of objects, evenly spread at a density between two lengths (m).
 
-    Each stretch of the way takes one thing, at a random place of it where is_free(s, side);
-    after so many random places it goes without.
+    Each interval of the way gets one object, at a random position with is_free(s, side), or none
+    after the given number of attempts.
 
     Parameters
     ----------
@@ -278,7 +278,7 @@ def scatter(
         Of s and side.
     rng : Generator
     places : int
-        Random places for a thing before its stretch goes without.
+        Attempts at a random position for each object.
     """
     count = round(density * (end - start) / 100.0)
     stretch = (end - start) / max(count, 1)

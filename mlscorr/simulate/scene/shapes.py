@@ -13,7 +13,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True, repr=False)
 class Mesh(Columns):
-    """Triangles (n, 3, 3) in m about a local origin, with the reflectance (n,) of each."""
+    """Triangles (n, 3, 3) in m relative to a local origin, with the reflectance (n,) of each."""
 
     triangles: np.ndarray
     reflectance: np.ndarray
@@ -40,7 +40,7 @@ class Mesh(Columns):
 def four_corners(
     a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray, reflectance: float
 ) -> Mesh:
-    """Mesh of quads with corners a, b, c, d (..., 3) in turn, as two triangles each.
+    """Make a mesh of quads with corners a, b, c, d (..., 3) in sequence, as two triangles each.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def four_corners(
 
 
 def quads(corner: np.ndarray, u: np.ndarray, v: np.ndarray, reflectance: float) -> Mesh:
-    """Mesh of parallelograms from a corner along two edges, each (..., 3) in m.
+    """Make a mesh of parallelograms from a corner along two edges, each (..., 3) in m.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def quads(corner: np.ndarray, u: np.ndarray, v: np.ndarray, reflectance: float) 
 def box(
     corner: np.ndarray, u: np.ndarray, v: np.ndarray, w: np.ndarray, reflectance: float
 ) -> Mesh:
-    """Mesh of the six faces of a box from a corner along three edges (3,) in m.
+    """Make a mesh of the six faces of a box from a corner along three edges (3,) in m.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def box(
 
 
 def post(foot: np.ndarray, height: float, width: float, reflectance: float) -> Mesh:
-    """Mesh of an upright square post, its foot (3,) in the middle of its base. Units: m.
+    """Make a mesh of an upright square post, its foot (3,) in the middle of its base. Units: m.
 
     Parameters
     ----------
@@ -114,12 +114,12 @@ def post(foot: np.ndarray, height: float, width: float, reflectance: float) -> M
 
 
 def unit(vector: np.ndarray) -> np.ndarray:
-    """The vector (3,) of length one in the same direction."""
+    """Return the unit vector (3,) in the same direction."""
     return vector / np.linalg.norm(vector)
 
 
 def ray_caster(triangles: np.ndarray) -> Any:
-    """Open3D's ray caster of triangles (n, 3, 3) about a local origin, in their order.
+    """Make Open3D's ray caster of triangles (n, 3, 3) about a local origin, in their order.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def ray_caster(triangles: np.ndarray) -> Any:
 
 
 def sees(caster: Any, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Whether no triangle stands between points (n, 3) and (n, 3), to 5 cm: (n,) bool.
+    """Flag (n,) of pairs of points (n, 3) without a triangle between them, to 5 cm.
 
     Parameters
     ----------
