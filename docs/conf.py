@@ -58,6 +58,7 @@ PROFILE.mkdir(parents=True, exist_ok=True)
 (PROFILE / "ipython_kernel_config.py").write_text("c.IPKernelApp.log_level = 40\n")
 os.environ["IPYTHONDIR"] = str(PROFILE.parent)
 logging.getLogger("traitlets").setLevel(logging.ERROR)  # dash, which open3d loads, is not there
+logging.getLogger("mlscorr").propagate = False  # the log of an example goes into its log.txt alone
 
 ROOT = Path(__file__).resolve().parents[1]
 

@@ -23,13 +23,14 @@ ORANGE = "#d55e00"
 GREEN = "#009e73"
 GREY = "#7a8794"
 INK = "#1b2733"
+UNITS = 2.75  # of a sheet in an inch
 PALE = "#e8f0f7"
 WARM = "#fbeee6"
 
 
 def sheet(width, height):
     """A figure without axes, in units of a text line."""
-    figure, axes = plt.subplots(figsize=(width / 2.2, height / 2.2))
+    figure, axes = plt.subplots(figsize=(width / UNITS, height / UNITS))
     axes.set_xlim(0, width)
     axes.set_ylim(0, height)
     axes.set_aspect("equal")
@@ -164,7 +165,7 @@ def folder():
 
 
 def install():
-    figure, axes = sheet(22, 6.4)
+    figure, axes = sheet(22, 6.9)
     for y, words in (
         (5.2, "pip install ."),
         (3.8, "uv tool install ."),
@@ -182,7 +183,7 @@ def install():
     ):
         box(axes, 18.5, y, words, 5.0, 1.1, "#ffffff", GREY)
         arrow(axes, (16.0, y), (13.3, 3.2 + (y - 3.1) * 0.25), dashed=True)
-    note(axes, 14.9, 5.9, "extras, if a file needs them", color=GREY)
+    note(axes, 18.5, 6.4, "extras, if a file needs them", color=GREY)
     return figure
 
 
@@ -288,7 +289,7 @@ def frames():
 
 
 def north():
-    figure, axes = sheet(20, 8.4)
+    figure, axes = sheet(24, 8.4)
     origin = np.array([6.0, 1.2])
 
     def ray(degrees, length, color, dashed=False):
@@ -400,7 +401,7 @@ def city():
                 )
             )
     lines = (
-        (BLUE, [(1, 1.2), (8, 1.2), (8, 6.8), (14, 6.8)], "monday"),
+        (BLUE, [(1, 1.2), (8, 1.2), (8, 6.8), (11.6, 6.8)], "monday"),
         (ORANGE, [(5, 7.4), (5, 3.2), (15.5, 3.2), (15.5, 7.6)], "tuesday"),
         (GREEN, [(12, 0.8), (12, 4.6), (18.4, 4.6)], "wednesday"),
     )
@@ -603,7 +604,7 @@ DIAGRAMS = {
 def main():
     picture = parse().picture
     figure = DIAGRAMS[picture.stem]()
-    figure.savefig(picture, dpi=110)
+    figure.savefig(picture, dpi=130)
     print(f"Picture: {picture}")
 
 
