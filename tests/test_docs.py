@@ -23,6 +23,7 @@ from mlscorr.simulate.simulator_file import SimulatorFile
 from tests.beds.places import ROOT
 
 NAMES = [page.name for page in PAGES]
+FIVE_MINUTES = 1000  # words of prose
 CONTRIBUTING = ROOT / "CONTRIBUTING.md"
 BENCHMARK_OPTIONS = {"--seeds", "--passes", "--without-paint", "--words"}
 PRINTED_PATH = re.compile(r"`((?:mlscorr|tests|benchmarks|docs)/[\w/.-]*)`")
@@ -110,6 +111,13 @@ def test_a_page_reads_well(path):
     found = readability.reading(readability.text_of(path))
     assert len(readability.words_of(found.longest)) <= readability.LONGEST, found.longest
     assert found.ease >= readability.EASE
+    assert found.words <= FIVE_MINUTES
+
+
+@pytest.mark.parametrize("path", PAGES, ids=NAMES)
+def test_a_page_opens_with_a_picture(path):
+    "Above the first heading below the title"
+    assert "![" in path.read_text().split("\n## ")[0]
 
 
 def test_the_reading_ease_is_that_of_flesch():
