@@ -288,7 +288,7 @@ def register_file(path: Path | str) -> tuple[type[Effect], ...]:
     if not effects:
         raise ValueError(
             f"{path} registers no effect: call mlscorr.effects.register with a class of yours, as "
-            "docs/own-simulator.md shows."
+            "docs/own-effect.md shows."
         )
     return effects
 

@@ -243,7 +243,7 @@ def _checked_change(effect: Any, change: Callable, value: Any, *given: Any) -> A
         raise ValueError(
             f"The effect {effect.name} ({''.join(lines[-1:])}{file}) can't be applied to the "
             f"{type(value).__name__} of its stage, {effect.stage}: {type(error).__name__}: "
-            f"{str(error).rstrip('.')}. Mend its code, or leave it out; docs/own-simulator.md says "
+            f"{str(error).rstrip('.')}. Mend its code, or leave it out; docs/own-effect.md says "
             "what it is given and gives."
         ) from error
     return changed
