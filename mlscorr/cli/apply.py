@@ -60,7 +60,7 @@ def apply(
         sizes = ", ".join(f"{size:.4g}" for size in np.atleast_1d(effect.magnitude))
         unit = effect.quantities()["magnitude"].unit
         results.append(("Taken out", f"{effect.name} {sizes} {unit}"))
-    results.append(("Survey", f"{out / 'survey.toml'}, with the clouds beside it"))
+    results.append(("Survey", f"{out / 'survey.toml'} and its clouds"))
     say_results(results)
     if any(file["untouched"] for file in content["files"]):
         raise typer.Exit(Exit.IN_PART)

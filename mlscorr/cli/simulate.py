@@ -29,9 +29,11 @@ EXAMPLES = (
 
 
 def simulate(
-    scenario: Annotated[Path, typer.Argument(help="TOML file, as those in examples/scenarios.")],
+    scenario: Annotated[
+        Path, typer.Argument(help="Scenario as a TOML file, such as those in examples/scenarios.")
+    ],
     out: Out = None,
-    seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same bytes.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="The same seed gives identical files.")] = 1,
     effects: Effects = None,
     overwrite: Overwrite = False,
     as_json: Json = False,
