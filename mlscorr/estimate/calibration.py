@@ -391,7 +391,7 @@ class Calibration(Summary):
 def sigma_note(determined: np.ndarray) -> str:
     """On what sigmas of a mounting rest, of its components (6,) that are determined or not."""
     parts = ", ".join(compress(MOUNTING_COMPONENTS, ~determined))
-    note = f"not determined: {parts}; its sigma holds only as far as the POS's own do"
+    note = f"not determined: {parts}; its sigma depends on the sigmas stated by the POS"
     if parts:
         return note
     return ""

@@ -148,7 +148,9 @@ def _intensity(
     """The ratio of intensities beside the median one, which units make."""
     for name, cloud in (("survey's", real), ("simulated", simulated)):
         if not cloud.has_intensity:
-            return Contrast("intensity", f"The {name} cloud has no intensity: all are the same.")
+            return Contrast(
+                "intensity", f"The {name} cloud has no intensity: all values are equal."
+            )
     known = pairs[np.isfinite(pairs.brightness).all(axis=1)]
     if len(known) == 0:
         return Contrast("intensity", SILENT["apart"])
