@@ -273,7 +273,7 @@ def _check_answered(path: Path, document: Mapping[str, Any]) -> None:
         number = counted(len(keys), "open place")
         raise SurveyFileError(
             f'{path} has {number}: {", ".join(keys)}. Replace each "{MARK}" with the value; the '
-            "comment behind it names what is possible."
+            "comment after it lists the choices."
         )
 
 

@@ -82,7 +82,7 @@ class DriveSection(TomlSection):
             )
         if self.survey is None and (self.files is None or self.trajectory is None):
             raise ValueError(
-                "give a drive its survey (a survey.toml), or files and [drive.trajectory]"
+                "a drive needs survey (a survey.toml), or files and [drive.trajectory]"
             )
         return self
 
