@@ -19,11 +19,11 @@ from mlscorr.survey import Severity, Statement
 
 PARTS = ("lever_arm", "boresight")
 SECTIONS = {
-    "mounting": "What it lacks",
-    "misclosures": "How far off",
+    "Corrections": "What it lacks",
+    "Misclosures": "How far off",
     "targets": "Every target",
-    "correlation": "What looks alike",
-    "notes": "What was used",
+    "Correlation": "What looks alike",
+    "Input": "What was used",
 }
 
 

@@ -17,7 +17,7 @@ SECTIONS = {  # in their order; one without anything to show is left out
     "scores": "RMSE",
     "targets": "Every target",
     "model": "Model and coverage",
-    "only": "Warnings of one",
+    "only": "Warnings",
     "files": "Files",
 }
 AXES = ("Easting", "Northing", "Height")

@@ -24,7 +24,7 @@ def numbers(values: Iterable[float | None]) -> np.ndarray:
 
 COVARIATES = {
     "time": "Time since the start",
-    "location": "Way along the road",
+    "Chainage": "Way along the road",
     "range": "Distance from the scanner",
     "incidence": "Angle of incidence",
     "scan_angle": "Scan angle",
@@ -33,7 +33,7 @@ COVARIATES = {
     "turn_rate": "Turn rate, to the right",
     "pass": "Pass",
     "axis": "Axis",
-    "channel": "What was compared",
+    "channel": "Residuals compared",
 }
 
 
@@ -244,7 +244,7 @@ def _visibility(small, ratio):
         return "no"
     if ratio <= 1:
         return "yes"
-    return f"only if {ratio:.{int(ratio < 10)}f} times the usual"
+    return f"only from {ratio:.{int(ratio < 10)}f} times the usual size"
 
 
 def worst_rows(rows: list[DetectableRow]) -> list[DetectableRow]:
