@@ -167,7 +167,7 @@ def _rates(answered):
     at_3 = [case for case in single if case.is_clear]
     for where, some, goal, wider in (
         ("2 MDB", at_2, 0.85, 0.88),
-        ("3 MDB or more", at_3, 0.95, 0.97),
+        ("3 MDB and more", at_3, 0.95, 0.97),
     ):
         strict, by_class = ([case.names(case.named, c) for case in some] for c in (False, True))
         yield _share(f"right at {where}", strict, goal)
@@ -176,7 +176,7 @@ def _rates(answered):
         any(case.names(label, by_class=True) for label in case.verdict["set"])
         for case in at_2 + at_3
     ]
-    yield _share("95 % set contains the truth", held, 0.95)
+    yield _share("the 95 % set holds the truth", held, 0.95)
     noisy = [case.named == "unknown" or case.is_only_noise for case in withheld]
     yield _share("withheld: unknown or noise", noisy, 0.85)
     right = [case.is_right for case in withheld]
@@ -190,12 +190,12 @@ def _rates(answered):
     yield _share("withheld: wrongly named", far, maximum=0.04)
     flagged = [case for case in outside if case.named == "unknown"]
     yield _share("outside: unknown", [case.named == "unknown" for case in outside], 0.80)
-    yield _share("outside: hint right where unknown", [case.leads for case in flagged], 0.75)
+    yield _share("outside: lead right where unknown", [case.leads for case in flagged], 0.75)
     yield _share("both of a pair", [case.names(case.named) for case in pair], 0.90)
     by_class = [case.names(case.named, by_class=True) for case in pair]
     yield _share("both of a pair, by class", by_class, 0.90)
     inside = [hit for case in single if case.goal_size >= 2 for hit in _inside(case)]
-    yield _share("95 % intervals contain the parameter", inside, 0.93, 0.97)
+    yield _share("95 % intervals hold the parameter", inside, 0.93, 0.97)
 
 
 def _alarms(clean):
@@ -214,9 +214,9 @@ def _figures(answered):
     sizes = [len(case.verdict["set"]) for case in single if case.goal_size >= 2]
     yield _figure("size of the 95 % set", sizes, np.mean, maximum=1.5)
     closed = [share for share in map(_closed, clear) if share is not None]
-    yield _figure("gap closed at 3 MDB or more, median", closed, np.median, 0.98)
+    yield _figure("gap closed at 3 MDB and more, median", closed, np.median, 0.98)
     yield _figure(
-        "gap closed at 3 MDB or more, p10", closed, lambda values: np.quantile(values, 0.1), 0.85
+        "gap closed at 3 MDB and more, p10", closed, lambda values: np.quantile(values, 0.1), 0.85
     )
     at_3 = [case for case in clear if case.goal_size == 3 and case.names(case.named)]
     error = [e for e in map(_error, at_3) if e is not None]
@@ -225,9 +225,7 @@ def _figures(answered):
     name = "calibration error of the probability"
     yield _figure(name, pairs, lambda values: calibration_error(*values.T), maximum=0.04)
     stated = [c.verdict["p_value"] for c in answered if c.kind == "clean" and c.document]
-    yield _figure(
-        "clean: p-values uniform (KS)", stated, lambda p: kstest(p, "uniform").pvalue, 0.01
-    )
+    yield _figure("clean: p-values even (KS)", stated, lambda p: kstest(p, "uniform").pvalue, 0.01)
 
 
 def _share(name, hits, minimum=None, maximum=None):

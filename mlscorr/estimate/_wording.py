@@ -29,8 +29,9 @@ def _refused(names, targets):
 
 def _unstated_drift(names, size, first, last):
     return (
-        f"{', '.join(names)} all deviate by at least {size:.2f} m per axis from {first:.1f} to "
-        f"{last:.1f} s. The POS drifts more than it states there, so its sigma was increased."
+        f"{', '.join(names)} deviate together by at least {size:.2f} m per axis from "
+        f"{first:.1f} to {last:.1f} s. The POS drifts more than it states there, so its sigma was "
+        "increased."
     )
 
 
@@ -92,7 +93,7 @@ def _lowered_order(targets, epochs, asked, order):
 
 
 def _few_targets(targets, least):
-    noun = "point takes" if targets == 1 else "points take"
+    noun = "point was" if targets == 1 else "points were"
     return (
         f"Only {targets} control {noun} used, so a wrong point cannot be identified. Survey at "
         f"least {least}."
@@ -155,14 +156,14 @@ def _wrong_mounting(components, corrections, sigmas, statistic, critical, scanne
             parts.append(f"{part} {np.degrees(lack):.2f} ± {np.degrees(sigma):.2f} deg")
         else:
             parts.append(f"{part} {lack:.3f} ± {sigma:.3f} m")
-    which = "a wrong mounting causes it: corrections"
+    which = "wrong mounting; estimated corrections:"
     if scanners > 1:
-        which = f"wrong mountings cause it: common corrections of the {scanners} scanners"
+        which = f"wrong mountings; estimated common corrections of the {scanners} scanners:"
     return (
         "The misclosures depend on the direction of travel (arrows of opposite passes are "
-        f"opposite). Probably {which} {', '.join(parts)} (chi-squared {statistic:.0f}, critical "
-        f"value {critical:.0f}). This correction treats them as drift: run mlscorr calibrate "
-        "--clouds first, and correct the survey that it writes."
+        f"opposite). Likely cause: {which} {', '.join(parts)} (chi-squared {statistic:.0f}, "
+        f"critical value {critical:.0f}). This correction treats them as drift: run mlscorr "
+        "calibrate --clouds first, and correct the survey that it writes."
     )
 
 
@@ -188,11 +189,11 @@ def _wrong_scanner(name, first, corrections, sigmas):
 
 SENTENCES: dict[str, Wording] = {
     "zero sigmas": (
-        "All {epochs} trajectory epochs state a {column} of 0 {unit}, which is not realistic. "
+        "All {epochs} trajectory epochs state {column} = 0 {unit}, which is not realistic. "
         "The values under [pos] in survey.toml are used instead."
     ),
     "filled sigmas": (
-        "{filled} of {epochs} trajectory epochs state a {column} of 0 {unit}, or an isolated "
+        "{filled} of {epochs} trajectory epochs state {column} = 0 {unit}, or an isolated "
         "outlier (first at {first:.3f} s). The values of the neighboring epochs are used there."
     ),
     "unstated drift": _unstated_drift,

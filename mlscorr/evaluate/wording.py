@@ -63,7 +63,7 @@ def _net(words, length, extent, observations, log_evidence):
 
 def _scale(size, sigma, ground, is_ground, **net):
     """The scale beside that of ground distances, and how to declare it."""
-    words = f"larger than in the cloud by {1e6 * size[0]:+.0f} +/- {1e6 * sigma[0]:.0f} ppm"
+    words = f"larger than the cloud by {1e6 * size[0]:+.0f} +/- {1e6 * sigma[0]:.0f} ppm"
     factor = f"scale_factor = {1 / (1 + size[0]):.6f}"
     if ground is None:
         cause = (
@@ -137,8 +137,8 @@ def _classes(axis, size, is_conformant, rmse, fit, survey):
         tested = "It meets"
     return (
         f"{tested} the {size}-cm {axis} accuracy class: RMSE_{axis[0].upper()} is "
-        f"{100 * rmse:.1f} cm ({100 * fit:.1f} cm from the product, {100 * survey:.1f} cm from "
-        "the survey of the points)."
+        f"{100 * rmse:.1f} cm ({100 * fit:.1f} cm fit to the points, {100 * survey:.1f} cm "
+        "survey of the points)."
     )
 
 
@@ -173,7 +173,7 @@ def _inaccurate(axis, survey):
 REASONS: dict[str, Wording] = {  # why a surveyed point took no part in the estimate
     **MATCHING,
     "check point": "check point",
-    "outlier": "outlier: statistic {statistic:.1f} against {critical:.1f}",
+    "outlier": "outlier: statistic {statistic:.1f}, critical value {critical:.1f}",
     "no pose": "{points} points near it, at {start:.1f} to {end:.1f} s, were measured outside "
     "the trajectory or in one of its gaps, where nothing is interpolated.",
     "seen by others": "Another scanner scanned it, this one did not.",

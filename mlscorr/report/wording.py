@@ -202,7 +202,7 @@ def _lost(names, words):
 
 
 def _elsewhere(count, by_others):
-    return f"{count} {_verb(count, 'is', 'are')} {PLACES[by_others]}."
+    return f"{count} {_verb(count, 'was', 'were')} {PLACES[by_others]}."
 
 
 def _control(scored, surveyed, refused, hidden, elsewhere):

@@ -179,17 +179,17 @@ BAD = [
         "check point unknown",
         edit("survey.toml", '"control.csv"', '"control.csv"\ncheck = ["X*"]'),
         2,
-        ["control.check names 'X*'"],
+        ["control.check lists 'X*'"],
     ),
     (
         "column unknown",
         edit("survey.toml", '"control.csv"', '"control.csv"\ncolumns.easting = "X"'),
         2,
-        ["control.csv has no column 'X'", "survey.toml names the easting"],
+        ["control.csv has no column 'X'", "survey.toml sets as the easting"],
     ),
     # the cloud: exit code 3
     ("cloud empty", empty("pass-1.laz"), 3, ["pass-1.laz", "0 bytes"]),
-    ("cloud cut off", cut("pass-1.laz", 0.6), 3, ["pass-1.laz", "cut off", "copy it anew"]),
+    ("cloud cut off", cut("pass-1.laz", 0.6), 3, ["pass-1.laz", "truncated", "copy it again"]),
     (
         "cloud is text",
         edit("survey.toml", "pass-1.laz", "control.csv"),
@@ -217,7 +217,7 @@ BAD = [
     ),
     # the trajectory: exit code 3
     ("trajectory empty", empty("trajectory.csv"), 3, ["trajectory.csv is empty"]),
-    ("trajectory cut off", cut("trajectory.csv", 0.7003), 3, ["trajectory.csv", "cut off"]),
+    ("trajectory cut off", cut("trajectory.csv", 0.7003), 3, ["trajectory.csv", "truncated"]),
     (
         "NaN in trajectory",
         rows("trajectory.csv", cell(7, 2, "nan")),
@@ -240,7 +240,7 @@ BAD = [
         "radians for degrees",
         rows("trajectory.csv", scaled((4, 5, 6), np.pi / 180)),
         3,
-        ["radians where degrees belong"],
+        ["radians up to 1.5708 are expected"],
     ),
     (
         "SBET in degrees",
@@ -334,7 +334,7 @@ def test_files_of_an_earlier_run_are_named(tmp_path, capsys):
     with work(tmp_path, True), output_folder(tmp_path, overwrite=True) as folder:
         (folder / "new.json").write_text("new")
     (said,) = capsys.readouterr().err.splitlines()
-    assert "left as they were" in said
+    assert "Left unchanged" in said
     assert ": out.sbet, out.tum, pictures/map.png, smrmsg_out.out. Delete" in said
     assert "new.json" not in said and (tmp_path / "new.json").read_text() == "new"
 
@@ -406,9 +406,9 @@ def test_a_process_of_its_own_refuses_it_alike(bad, survey):
     ("out", "arguments", "code", "words"),
     [
         ("full", (), 2, ["holds 1 entry already", "notes.txt", "--overwrite"]),
-        ("survey", (), 2, ["holds the input"]),
-        ("survey", ("--overwrite",), 2, ["holds the input"]),
-        ("survey/../survey", ("--overwrite",), 2, ["holds the input"]),
+        ("survey", (), 2, ["contains the input"]),
+        ("survey", ("--overwrite",), 2, ["contains the input"]),
+        ("survey/../survey", ("--overwrite",), 2, ["contains the input"]),
         ("full/notes.txt", (), 2, ["is a file", "need a folder"]),
         ("full/notes.txt/out", (), 5, ["can't be made", "Not a directory"]),
         ("/proc/mlscorr/out", (), 5, ["can't be made", "/proc"]),

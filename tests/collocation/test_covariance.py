@@ -87,5 +87,5 @@ def test_what_is_no_covariance_is_refused():
     with pytest.raises(ValueError, match=r"'gaussian' is none of exponential, matern32, matern52"):
         Covariance("gaussian", 30.0)
     for time in (0.0, -1.0, np.nan):
-        with pytest.raises(ValueError, match="should be positive"):
+        with pytest.raises(ValueError, match="must be positive"):
             Covariance("exponential", time)

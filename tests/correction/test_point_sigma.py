@@ -124,7 +124,7 @@ def test_there_is_no_sigma_outside_the_trajectory_nor_in_a_gap():
 def test_a_trajectory_without_sigmas_is_refused():
     "Where nothing is known of the pose nothing is said of the points"
     trajectory = drive(sigmas=False)
-    with pytest.raises(ValueError, match="has no sigmas of position and attitude"):
+    with pytest.raises(ValueError, match="sigmas of position and attitude; this one has none"):
         PointSigma.of(Correction(trajectory, trajectory), NOISELESS)
 
 

@@ -41,7 +41,7 @@ def applied(change, value, at="clock"):
     [
         (lambda value: value.speed, "line \\d+, .*test_guard.py.*AttributeError.*speed"),
         (lambda value: sys.exit(0), "SystemExit: 0"),
-        (lambda value: None, "it gives a NoneType"),
+        (lambda value: None, "it returns a NoneType"),
         (lambda value: replace(value, kept=0.5 * value.kept), "kept is float64 .5,., not bool"),
         (lambda value: replace(value, gps_time=1j * value.gps_time), "gps_time is complex128"),
         (

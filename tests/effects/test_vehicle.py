@@ -34,5 +34,5 @@ def test_events_outside_the_drive_and_unknown_targets_are_refused():
     with pytest.raises(ValueError, match=r"position_bump at 200 s .* ends after 160\.0 s"):
         bump.apply(TRAJECTORY, REFERENCE)
     outlier = make_effect("target_outlier", magnitude=[0, 0, 1], target="T3")
-    with pytest.raises(ValueError, match=r"'T3', which is none of the 6 targets; .* 'T03'"):
+    with pytest.raises(ValueError, match=r"'T3', which is not among the 6 targets; .* 'T03'"):
         outlier.apply(CONTROL, REFERENCE)

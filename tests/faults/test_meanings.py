@@ -19,11 +19,11 @@ from tests.faults.sizes import IS_FULL, tries
 FOOT = 0.3048  # m
 PLACE = ("easting", "northing", "height")
 ANGLES = ("roll", "pitch", "heading")
-OUTSIDE = "None of the sampled times .* lie inside the trajectory .*(days|UTC)"
+OUTSIDE = "None of the sampled times .* are inside the trajectory .*(days|UTC)"
 BESIDE = "deg off the scan plane .*(gps_time wrong|another scanner)"
 HEADING = "heading of .*trajectory.csv differs from the course"
-DATUM = "(below|above) the cloud as the POS puts it .*vertical datum"
-APART = "No point of the cloud lies within .*same CRS"
+DATUM = "(below|above) the cloud .*vertical datum"
+APART = "No point of the cloud is within .*same CRS"
 HEIGHTS = "m (above|below) the trajectory.*heights"
 
 
@@ -144,7 +144,7 @@ READ = {
     ),
     "angles in radians": (
         lambda r: column("trajectory.csv", ANGLES, np.pi / 180),
-        "radians where degrees belong",
+        "radians up to 1.5708 are expected",
     ),
     "sizes in centimetres": (lambda r: column("control.csv", ["size"], 100.0), "centimetres"),
     "sigmas of zero": (
@@ -156,7 +156,7 @@ READ = {
         "lever_arm.*can't be used",
     ),
     "a geographic CRS": (lambda r: text("EPSG:32650", "EPSG:4326"), "projected CRS is needed"),
-    "a CRS in feet": (lambda r: text("EPSG:32650", "EPSG:2263"), "foot, not in metres"),
+    "a CRS in feet": (lambda r: text("EPSG:32650", "EPSG:2263"), "foot, not in meters"),
 }
 ESTIMATED = {
     "cloud late by a second": (lambda r: later(any_of(r, -1.0, 1.0)), BESIDE),
@@ -173,7 +173,7 @@ ESTIMATED = {
     ),
     "another horizontal datum": (
         lambda r: column("control.csv", PLACE[:2], 1.0, any_of(r, -1, 1) * r.uniform(0.25, 4.0)),
-        "beside the cloud as the POS puts it .*horizontal datum",
+        "offset from the cloud .*horizontal datum",
     ),
     "radii for sizes": (
         lambda r: column("control.csv", ["size"], 0.5),
@@ -195,9 +195,9 @@ ESTIMATED = {
 }
 
 CHECKED = {  # what a check says in words of its own
-    "heights over another ellipsoid or geoid": "geoid undulation",
+    "heights over another ellipsoid or geoid": "geoid heights",
     "heights of control in feet": "or feet",
-    "radii for sizes": "look like radii",
+    "radii for sizes": "seem to be radii",
 }
 
 

@@ -217,7 +217,7 @@ def test_an_interruption_says_whether_results_stand(has_results, capsys):
     with pytest.raises(typer.Exit) as ended, exit_code(Exit.BAD_DATA, lambda: has_results):
         raise KeyboardInterrupt
     assert ended.value.exit_code == 130
-    assert ("all results were written" in capsys.readouterr().err) == has_results
+    assert ("all results were already written" in capsys.readouterr().err) == has_results
 
 
 def test_a_document_that_finds_no_room_leaves_the_one_before(tmp_path):

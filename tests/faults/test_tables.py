@@ -84,12 +84,12 @@ def test_a_decimal_comma_is_said(tmp_path):
     [
         (CONTROL + POINT + '"' + "x" * 5_000_000, "never ends|columns"),
         (CONTROL + POINT + '"' + "x\n" * 2_000_000, "never ends|columns"),
-        ("n" * 5_000_000, "characters or more"),
+        ("n" * 5_000_000, "or more characters"),
         ("," * 9_000 + "\n" + POINT, "no column name"),
         (CONTROL.replace("name", "n" * 5_000) + POINT, "no column name"),
         (CONTROL + POINT.replace("0.6", "6" * 100_000 + "x"), "not a number"),
         (CONTROL + POINT.replace("circle", "c" * 50_000), "unknown kind"),
-        (b"\x00" * 1_000_000, "no column|characters or more"),
+        (b"\x00" * 1_000_000, "no column|or more characters"),
     ],
     ids=["field", "lines", "header", "commas", "long name", "digits", "kind", "zeros"],
 )

@@ -100,7 +100,7 @@ def test_segments_count_from_zero_and_gaps_belong_to_none():
 @pytest.mark.parametrize("asked", [-0.001, 3.0, 22.2])
 def test_nothing_is_extrapolated_or_carried_over_a_gap(asked):
     "A time before, after or in a gap is refused, with the span and the number of gaps"
-    sentence = r"1 of 2 times lie outside the trajectory \[413200.000, 413222.000\] s .* 2 gaps"
+    sentence = r"1 of 2 times are outside the trajectory \[413200.000, 413222.000\] s .* 2 gaps"
     with pytest.raises(ValueError, match=sentence):
         gappy().at(START + np.array([1.0, asked]))
 
