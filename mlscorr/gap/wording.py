@@ -206,7 +206,7 @@ def headline(where: Where, label: str, lead: str, start: float) -> str:
         size = f"The residuals together agree with the simulation within chance ({chance})"
     is_moved = label != "none"
     if not is_measurable and not is_moved:
-        return f"No part of the survey is conspicuous. {size}."
+        return f"There is no significant difference. {size}."
     whole = "the effect of the cause" if is_moved else "the gap"
     best = _largest(_places(where.splits, _acts_on(label, lead), start))
     if best is None:

@@ -76,7 +76,7 @@ def test_nothing_needs_to_be_done_where_all_is_as_stated(whole, before, over, rm
     closed = closure(before=before, over=over)
     assert excess_of(found, closed, [Agreement("target", 9, rms_mm, 20.6)]) == excess
     assert keys(advice_of(found, closed, [], excess)) == [OF_EXCESS[excess]]
-    assert ("Nothing is wrong" in sentence_of(found, excess)) == (not excess)
+    assert ("No error was detected" in sentence_of(found, excess)) == (not excess)
     assert (OF_EXCESS[excess] == "nothing to do") == (not excess)
 
 

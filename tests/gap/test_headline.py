@@ -69,7 +69,7 @@ def test_an_unknown_error_is_located_by_what_it_looks_like():
 
 @pytest.mark.parametrize(
     ("before", "words"),
-    [(2.0, "Nothing stands out."), (9.0, "No part of the survey is conspicuous.")],
+    [(2.0, "There is no significant difference."), (9.0, "No part of the survey is conspicuous.")],
 )
 def test_without_a_cause_only_what_exceeds_chance_is_located(before, words):
     "Bins within their null bands are no place, whatever their share is"

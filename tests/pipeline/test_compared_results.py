@@ -177,12 +177,16 @@ def test_different_surveys_are_refused_with_a_way_out(pair):
 
 def test_what_is_no_result_is_refused(pair, tmp_path, street):
     "A survey, a cut report, another document, a project"
-    with pytest.raises(ValueError, match=r"no result of mlscorr correct: it holds no report\.json"):
+    with pytest.raises(
+        ValueError,
+        match="not a result of mlscorr correct: it has no "
+        r"report\.json",
+    ):
         mlscorr.compare_results(pair[0], street)
     report = pair[1] / "report.json"
     whole = report.read_text()
     report.write_text(whole[: len(whole) // 2])
-    with pytest.raises(ValueError, match=r"no JSON document: .*interrupted"):
+    with pytest.raises(ValueError, match=r"not a JSON document: .*interrupted"):
         mlscorr.compare_results(*pair)
     report.write_text(whole.replace("mlscorr.report/1", "mlscorr.report/9", 1))
     with pytest.raises(ValueError, match=r"schema 'mlscorr\.report/9', not"):

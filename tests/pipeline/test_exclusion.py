@@ -86,9 +86,9 @@ def test_a_name_that_is_none_is_refused_with_the_nearest(street, choice, words):
 def test_check_points_and_contradictions_are_refused(street):
     "A check point takes no part anyhow; a name can't be excluded and included"
     survey = read_survey(street)
-    with pytest.raises(SurveyFileError, match="is a check point and takes no part"):
+    with pytest.raises(SurveyFileError, match="is a check point and never used"):
         survey.choosing(exclude=survey.check.name)
-    with pytest.raises(SurveyFileError, match="both name"):
+    with pytest.raises(SurveyFileError, match="both list"):
         survey.choosing(exclude=survey.control.name[:1], include=survey.control.name[:1])
 
 

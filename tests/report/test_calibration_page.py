@@ -62,7 +62,7 @@ def test_the_page_says_first_what_the_mounting_lacks_and_what_the_site_does_not_
     assert [row["name"] for row in undetermined.values["components"]] == ["lever arm up"]
     assert content["rating"] == "amber"
     text = words(calibration_page({"name": "site", **content}).html())
-    first = text[: text.index("How far the cloud is")]
+    first = text[: text.index("Misclosures at the surveyed targets")]
     assert all(row["sentence"] in first for row in content["statements"])
 
 
@@ -90,9 +90,9 @@ def test_the_page_says_next_what_fits_its_clouds():
     "Clouds that are as the recorded mounting put them are written anew before they are corrected"
     content = {"name": "site", **calibrated()}
     still = words(calibration_page(content | {"files": []}).html())
-    assert "still as the recorded mounting put them. Next: run mlscorr calibrate --clouds" in still
+    assert "still use the recorded mounting. Next: run mlscorr calibrate --clouds" in still
     done = words(calibration_page(content | {"files": [{"name": "pass-1.laz"}]}).html())
-    assert "Next: run mlscorr correct with the survey.toml beside this page." in done
+    assert "Next: run mlscorr correct with the survey.toml next to this page." in done
 
 
 def test_least_squares_without_control_has_no_result():

@@ -168,7 +168,7 @@ def test_what_cannot_be_shown_is_refused(cloud, correction, tmp_path):
         mlscorr.show(walls="cloud.laz", page=page)
     with pytest.raises(TypeError, match="TriangleMesh"):
         mlscorr.show(o3d.t.geometry.TriangleMesh.create_box(), page=page)
-    with pytest.raises(ValueError, match="shows none"):
+    with pytest.raises(ValueError, match="shows nothing"):
         mlscorr.show(cloud, points=0, page=page)
     broken = cloud.xyz.copy()
     broken[3] = np.inf

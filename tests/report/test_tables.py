@@ -11,7 +11,7 @@ from tests.beds.reports import drive, fabricate
     ("changes", "labels"),
     [
         ({}, ["Check points, before", "Check points, after", "Control points, before"]),
-        ({"checks": False}, ["Control points, before", "Control points, left out in turn"]),
+        ({"checks": False}, ["Control points, before", "Control points, leave-one-out"]),
         ({"count": 0}, ["Control points, before", "Control points, after (fit)"]),
     ],
 )

@@ -245,12 +245,12 @@ CATALOGUE = [
         "assumed",
         {
             "count": 1,
-            "purpose": " until control points show better",
+            "purpose": " until control points give an estimate",
             "sections": ["[pos]"],
             "has_sigma": True,
         },
-        "1 accuracy was not given and is assumed until control points show better. Set known "
-        "values under [pos] in survey.toml, or add sigma columns to the trajectory.",
+        "1 accuracy was not given and is assumed until control points give an estimate. Set "
+        "known values under [pos] in survey.toml, or add sigma columns to the trajectory.",
     ),
     (
         "assumed",
@@ -612,7 +612,7 @@ def test_no_sentence_is_missing_from_the_catalogue():
 def test_an_extrapolated_part_is_named_by_time_and_way():
     "And what it is, with its sigma"
     assert stretch_in_words(50.0, 61.5, 300.0, 60.0, "no control", 1.25) == (
-        "50.0 to 61.5 s, 300 to 360 m of the way",
+        "50.0 to 61.5 s, chainage 300 to 360 m",
         "no control; sigma up to 1.25 m",
     )
 

@@ -96,7 +96,7 @@ def test_a_missing_scenario_is_named(tmp_path):
         ("[drive]\nspeed = nan", r"drive\.speed = nan .* finite number"),
         ("origin = [0, 0, inf]", r"origin\.2 = inf .* finite number"),
         ("[scene]\nkind = 'road'", r"scene\.kind = 'road' .* 'street', 'river' or 'mesh'"),
-        ('scene: kind = "mesh" needs a file', r'scene: a file is needed for kind = "mesh"'),
+        ('[scene]\nkind = "mesh"', r'scene: kind = "mesh" needs a file'),
         ("[scanner]\nrange_noise = 1", r"scanner is a list of sections; write \[\[scanner\]\]"),
         ("scanner = []", r"scanner = \[\] .* at least 1 item"),
         ("[pos]\noutages = [[50, 30]]", r"pos\.outages of 30 s from 50 s lies outside .* of 60 s"),

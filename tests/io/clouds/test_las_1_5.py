@@ -93,7 +93,7 @@ def test_week_time_and_wkt_2_of_las_1_5(street, tmp_path):
             "<B",
             6,
             OFFSET_FLAG,
-            "states a time offset, and times in seconds",
+            "states a time offset together with times in seconds",
         ),
         ("a format of old", "<B", 104, 1, "LAS 1.5 has point formats 6 to 10, not 1"),
         ("the header of 1.4", "<H", 94, 375, "its header has 375 bytes .* LAS 1.5 needs 393"),

@@ -207,7 +207,7 @@ def test_degrees_become_radians_and_the_mounting_a_rotation(folder):
         (
             "[control]",
             '[control]\ncrs = "EPSG:32650"',
-            r"control\.crs .* crs stands above the first",
+            r"control\.crs .* crs belongs above the first",
         ),
         ("[control]", "[mounting]\nlever_arm = [100.5, 0.0, 0.0]\n[control]", "less than or equal"),
     ],
@@ -261,7 +261,7 @@ def test_the_known_keys_beside_unknown_ones_come_once(folder):
     ("content", "message"),
     [
         (b'name = "street\n', "not valid TOML: .*at line 1"),
-        (b"crs = EPSG:32650\n", "at line 1, .*Text and paths stand in quotation marks"),
+        (b"crs = EPSG:32650\n", "at line 1, .*Put text and paths in quotation marks"),
         (TOML.replace("[cloud]", "[cloud").encode(), "not valid TOML: .*at line 5"),
         (b"name = 'a'\nname = 'b'\n", "not valid TOML"),
         (b"name = '\xff\xfe'\n", "not a text file in UTF-8; .*mlscorr init"),
@@ -297,13 +297,13 @@ def test_a_missing_survey_says_what_is_expected(tmp_path):
             r"trajectory\.file of .*trajectori.csv, which does not exist; .* is trajectory.csv",
         ),
         ("control.csv", "points.csv", r"control\.file of .*points.csv, which does not exist"),
-        ("pass-*.las", "drive-*.las", r"cloud\.files of .*no file is like .*drive-\*"),
+        ("pass-*.las", "drive-*.las", r"cloud\.files of .*no file matches .*drive-\*"),
         (
             "control.csv",
             "Control.csv ",
-            r"Control.csv , which .*; the nearest there is control.csv",
+            "Control.csv , which .*; the nearest existing name is control.csv",
         ),
-        ("pass-*.las", ".", r"cloud\.files of .*is a folder: .*clouds by a pattern"),
+        ("pass-*.las", ".", r"cloud\.files of .*is a folder: .*clouds as a pattern"),
         ("pass-*.las", "pass-9.las", r"cloud\.files of .*pass-9.las, which does not exist"),
         ("[control]", '[scene]\nreference = "r.ply"\n[control]', r"scene\.reference of"),
         ('trajectory.csv"', 'trajectory.csv"\naccuracy = "s.out"', r"trajectory\.accuracy of"),
@@ -339,7 +339,7 @@ def test_a_pattern_of_all_folders_takes_no_results_for_input(folder, mark):
     shutil.copy(folder / "pass-1.las", folder / "out" / "pass-1.las")
     (folder / mark).write_text("{}")
     toml(folder, '["pass-*.las"]', '["**/*.las"]')
-    with pytest.warns(UserWarning, match=r"leaves out results of an earlier run in \S+/out\."):
+    with pytest.warns(UserWarning, match=r"excludes results of an earlier run in \S+/out\."):
         paths = read_survey(folder).cloud_paths
     assert [*paths] == [folder / "pass-1.las", folder / "pass-2.las"]
 
@@ -349,7 +349,7 @@ def test_a_pattern_of_all_folders_takes_no_results_for_input(folder, mark):
     [
         ("EPSG:326500", "'EPSG:326500' is unknown"),
         ("EPSG:4326", "projected CRS is needed"),
-        ("EPSG:2227", "not in metres"),
+        ("EPSG:2227", "not in meters"),
     ],
 )
 def test_a_crs_that_can_not_be_meant_is_refused(folder, crs, message):
@@ -384,7 +384,7 @@ def test_the_asked_time_system_is_obeyed(folder):
     ("content", "words"),
     [
         (b"", r"is empty \(0 bytes\): .* interrupted"),
-        (b"LASF" + bytes(100), "cut off: it has 104 b"),
+        (b"LASF" + bytes(100), "truncated: it has 104 b"),
     ],
 )
 def test_a_broken_cloud_is_refused(folder, content, words):
@@ -415,13 +415,17 @@ def test_swapped_control_is_refused(folder):
 
 def test_control_of_another_zone_is_refused(folder):
     "The same points in the next zone lie hundreds of km off: distance and cause are named"
-    with pytest.raises(ValueError, match=r"lies 57\d\.\d km from it .limit 5 km.*CRS or zones"):
+    with pytest.raises(
+        ValueError,
+        match=r"is 57\d\.\d km from the trajectory .limit 5 km.*CRS "
+        "or zones",
+    ):
         read_survey(exchange(folder, lambda e, n: (e - 573_000.0, n + 12_000.0)))
 
 
 def test_the_number_of_a_zone_in_front_of_eastings_is_named(folder):
     "50 532 010 for 532 010 m, as offices write it: 50 000 km off, and metres without the 50"
-    with pytest.raises(ValueError, match=r"the number 50 of a map zone .* it is \d+ m: .* 50 000"):
+    with pytest.raises(ValueError, match=r"the zone number 50 .* distance is \d+ m: .* 50 000"):
         read_survey(exchange(folder, lambda e, n: (e + 50e6, n)))
 
 
@@ -636,7 +640,7 @@ def test_a_place_under_two_names_is_warned_of(tmp_path):
     "Who lists control points as check points once more hears that neither of the two counts"
     again = CONTROL.strip().splitlines()[1].replace("T01", "K01").replace("control", "check")
     with pytest.warns(
-        UserWarning, match="one place two names: T01 and K01. .* leave one of the two"
+        UserWarning, match="two names for one position: T01 and K01. .* remove one of the two"
     ):
         read_control(control(tmp_path, text=CONTROL.strip() + f"\n{again}\n"))
 
@@ -680,7 +684,7 @@ def test_an_sbet_survey_says_what_was_assumed(folder):
     toml(folder, "pass-*.las", "points.las")
     toml(folder, "trajectory.csv", "sbet.out")
     exchange(folder, lambda e, n: (e - 212_000, n + 807_000))
-    with pytest.warns(UserWarning, match="points.las are in steps of 0.01 m"):
+    with pytest.warns(UserWarning, match="points.las have a resolution of 0.01 m"):
         survey = read_survey(folder)
     assert "taken as WGS 84, the datum of WGS 84 / UTM zone 11N" in survey.notes[1]
     assert "ellipsoidal heights were kept" in survey.notes[2]
@@ -751,16 +755,20 @@ def test_a_measured_lever_arm_needs_no_boresight_sigma(mounted):
     ("old", "new", "message"),
     [
         ("./pass-2.las", "pass-1.las", r"2 of the 2 .* one .*pass-1.las \(2, left\), .* none"),
-        ('["./pass-2.las"]', '["trajectory.csv"]', r"trajectory.csv of scanner 2 is none of the 2"),
-        ("./pass-2.las", "drive-*", r"scanner\.files of .*: no file is like .*drive-\*"),
-        ('"left"', '"2"', r"names of their own, and these are 2, 2 \(without"),
+        (
+            '["./pass-2.las"]',
+            '["trajectory.csv"]',
+            "trajectory.csv of scanner 2 is not among the 2",
+        ),
+        ("./pass-2.las", "drive-*", r"scanner\.files of .*: no file matches .*drive-\*"),
+        ('"left"', '"2"', r"unique names, and these are 2, 2 \(the"),
         ('files = ["./pass-2.las"]', "", r"scanner\.1: files is missing"),
         ('files = ["./pass-2.las"]', "point_source_ids = [2]", r"1 of the 2 .*1.las \(2, left"),
         ("range_noise", "range_nose", r"scanner\.0\.range_nose .* scanner\.range_noise"),
         (
             "[control]",
             "[mounting]\nlever_arm = [0, 0, 0]\nboresight = [0, 0, 0]\n[control]",
-            r"\[mounting\] is that of one scanner",
+            r"\[mounting\] applies to a single scanner",
         ),
     ],
 )

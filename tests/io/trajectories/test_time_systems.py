@@ -145,7 +145,7 @@ def test_a_week_that_ends_within_a_cloud_counts_on(rows):
         assert np.abs(match.placed(times) - start - running).max() < 1e-6
         assert match.inside == 1.0
         assert match.trajectory_system == system
-        assert "604800 s are added where its times start again" in str(match)
+        assert "604800 s are added after the rollover" in str(match)
     with pytest.raises(ValueError, match="None of"):
         match_times("a.laz", times, False, trajectory(100_000.0, 100_100.0))
 
@@ -163,8 +163,8 @@ def test_a_trajectory_in_utc_that_starts_before_the_cloud_is_named():
     for early in (18.0, -18.0):
         covering = trajectory(OF_WEEK[0] - early - 0.5, OF_WEEK[25] - early + 0.5)
         sentence = (
-            rf"Only 42 % of.*with \{-early:+.0f} s: one of both may be in UTC, or the trajectory "
-            rf"covers a part.*add {early:.0f} to trajectory.time_constant"
+            rf"Only 42 % of.*with \{-early:+.0f} s: one may be in UTC, or the trajectory covers "
+            f"only part.*add {early:.0f} to trajectory.time_constant"
         )
         with pytest.raises(ValueError, match=sentence):
             match_times("a.laz", OF_WEEK[:26], False, covering)
@@ -211,7 +211,7 @@ def test_times_in_other_units_are_refused(factor):
 
 def test_a_trajectory_that_covers_a_part_is_refused():
     "With a third of the cloud covered, the file is said to be short, not the system wrong"
-    with pytest.raises(ValueError, match="covers a part of the cloud"):
+    with pytest.raises(ValueError, match="covers only part of the cloud"):
         match_times("a.laz", OF_WEEK, False, trajectory(OF_WEEK[0], OF_WEEK[170]))
 
 

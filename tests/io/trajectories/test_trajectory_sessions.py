@@ -173,7 +173,7 @@ def test_a_survey_of_two_trajectories_is_that_of_one(folder):
     read = [file.path.name for file in survey.inputs if file.what == "trajectory"]
     assert read == ["run-2.csv", "run-1.csv"]
     assert (
-        "joined of 2 files in order of time (run-1.csv [413200.000, 413214.950] s, run-2"
+        "joined from 2 files in time order (run-1.csv [413200.000, 413214.950] s, run-2"
         in (survey.notes[1])
     )
 
@@ -252,7 +252,7 @@ def test_sigmas_that_one_lacks_are_those_of_pos_or_asked_for(folder):
     assert survey.trajectory.position_sigma[first] == pytest.approx(0.03)
     assert survey.trajectory.position_sigma[~first] == pytest.approx(0.5)
     assert survey.trajectory.attitude_sigma is None
-    assert any("run-2.csv does not state is that of [pos]" in note for note in survey.notes)
+    assert any("run-2.csv has no sigma" in note for note in survey.notes)
 
 
 def test_points_that_belong_to_a_trajectory_lie_within_it(folder):
@@ -287,7 +287,7 @@ def test_some_points_outside_their_trajectory_are_warned_of(folder):
     [
         ('"run-1.csv"', '"./run-2.csv"', r"2 of the .* name the file .*run-2"),
         ('"run-1.csv"', '"run-7.csv"', r"trajectory\.file of .* names .*run-7\.csv, which"),
-        ('"run-1.csv"', '"run-1.csv"\nfiles = ["control.csv"]', r"control\.csv is none of the 2"),
+        ('"run-1.csv"', '"run-1.csv"\nfiles = ["control.csv"]', r"control\.csv is not among the 2"),
         ('"run-1.csv"', '"run-1.csv"\npoint_source_ids = [70000]', r"1\.point_source_ids\.0 = 700"),
         ('"run-1.csv"', '"run-1.csv"\nfile_s = []', r"\.1\.file_s .* is trajectory\.file"),
         ("[control]", "[[trajectory]]\n[control]", r"trajectory\.2\.file is missing"),

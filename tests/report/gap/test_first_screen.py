@@ -20,7 +20,7 @@ def test_two_answers_stand_apart():
     items = {item["name"]: item["text"] for item in rows["Accuracy"]["items"]}
     assert items["Surveyed targets"].startswith("off by 4.1 cm (RMS per axis), 1.2 cm")
     assert items["Surveyed targets"].endswith("(worse from 2.4 cm on)")
-    assert items["Scanner clock offset"] == "moves what was compared by 1.2 cm (RMS)"
+    assert items["Scanner clock offset"] == "effect on the residuals: 1.2 cm (RMS)"
 
 
 def test_a_good_survey_is_good_in_both():
@@ -34,14 +34,16 @@ def test_a_good_survey_is_good_in_both():
 def test_what_the_simulator_has_already_is_off_the_residuals():
     "A second round says so, for the cloud itself is still as it was"
     _, rows = facts(gap_document("none", simulator={"effects": [{"name": "time_offset"}]}))
-    assert rows["Accuracy"]["sentence"].startswith("The recorded cloud, less what the simulator")
+    assert rows["Accuracy"]["sentence"].startswith(
+        "The recorded cloud, after removing the errors in the simulator"
+    )
 
 
 @pytest.mark.parametrize(
     ("left_out", "mendable", "rating"),
     [
         ({"range_bias": "It acts on the range, and the survey has no [mounting]."}, True, "amber"),
-        ({"dropout": "No row of this survey depends on it."}, False, "green"),
+        ({"dropout": "No residual of this survey depends on it."}, False, "green"),
     ],
 )
 def test_what_could_not_be_judged_is_said_first(left_out, mendable, rating):
@@ -64,7 +66,7 @@ def test_a_default_is_called_assumed_and_judges_nothing():
     accuracy = rows["Accuracy"]
     assumed = rows["Assumed"]
     assert accuracy["rating"] == assumed["rating"] == "amber"
-    assert "no sigma of the POS is stated" in accuracy["sentence"]
+    assert "no sigma of the POS is given" in accuracy["sentence"]
     assert accuracy["items"][0]["text"] == "off by 1.4 cm (RMS per axis)"
     assert assumed["sentence"].startswith("2 accuracies that nobody stated are assumed")
     items = {item["name"]: item["text"] for item in assumed["items"]}
