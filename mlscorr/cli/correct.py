@@ -295,7 +295,7 @@ def tell(
         say_residuals(report["targets"])
     rows = [
         ("control points", report["control"], "after"),
-        ("  each left out in turn", report["control"], "  leave-one-out"),
+        ("  leave-one-out", report["control"], "leave_one_out"),
         ("check points", report["check"], "after"),
     ]
     terminal.say_rmse(rows, width=24, decimals=3)

@@ -19,11 +19,11 @@ from mlscorr.survey import Severity, Statement
 
 PARTS = ("lever_arm", "boresight")
 SECTIONS = {
-    "Corrections": "What it lacks",
-    "Misclosures": "How far off",
-    "targets": "Every target",
-    "Correlation": "What looks alike",
-    "Input": "What was used",
+    "mounting": "Corrections",
+    "misclosures": "Misclosures",
+    "targets": "Targets",
+    "correlation": "Correlation",
+    "notes": "Input",
 }
 
 

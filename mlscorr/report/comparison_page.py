@@ -11,12 +11,12 @@ from mlscorr.report._comparison_screen import ranking, undetermined
 from mlscorr.report.pages import Page, data_uri
 
 SECTIONS = {  # in their order; one without anything to show is left out
-    "scores": "What remains",
+    "scores": "Residuals",
     "check": "Check points only",
     "absent": "Not determined",
-    "figure": "As a picture",
-    "methods": "Chart",
-    "unseen": "Not seen",
+    "figure": "Chart",
+    "methods": "Methods",
+    "unseen": "Not found",
 }
 KINDS = {  # colour, mark and words
     "none": (style.GREY, "x", "as recorded"),

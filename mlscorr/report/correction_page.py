@@ -28,18 +28,18 @@ from mlscorr.targets import FittedTarget
 from mlscorr.wording import number, percent, thousands
 
 SECTIONS = {  # in their order; one without anything to show is left out
-    "Misclosures": "How far off",
+    "statistics": "Misclosures",
     "sigmas": "Stated sigmas",
     "accuracy": "Accuracy",
     "pictures": "Before and after",
     "turn": "3D view",
     "correction": "Over time",
     "map": "Map",
-    "ties": "Two passes",
-    "residuals": "Every target",
-    "targets": "As found",
+    "ties": "Tie features",
+    "residuals": "Residuals",
+    "targets": "Extracted targets",
     "model": "Model",
-    "Input": "What was used",
+    "used": "Input",
     "conventions": "Conventions",
 }
 TABLES = {  # of the model: its title, and what its columns are

@@ -358,7 +358,7 @@ def _left_out(report) -> Iterator[StatementRow]:
         return
     if left_out.n and report.judgement[2] == "check":
         values = {"rmse": left_out.rmse[:3], "rmse_3d": left_out.rmse[4]}
-        yield StatementRow.of("Left out in turn", Statement("Leave-one-out", values=values))
+        yield StatementRow.of("Leave-one-out", Statement("left out", values=values))
     elif not left_out.n and report.points("control").scored == 1:
         yield StatementRow.of("Leave-one-out", Statement("single control point", "warning"))
 

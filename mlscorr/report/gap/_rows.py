@@ -24,7 +24,7 @@ def numbers(values: Iterable[float | None]) -> np.ndarray:
 
 COVARIATES = {
     "time": "Time since the start",
-    "Chainage": "Way along the road",
+    "location": "Chainage",
     "range": "Distance from the scanner",
     "incidence": "Angle of incidence",
     "scan_angle": "Scan angle",

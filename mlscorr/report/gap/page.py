@@ -83,12 +83,12 @@ def _separability(document):
 
 SECTIONS = {  # in their order; one without anything to show is left out
     "where": "Location",
-    "innovations": "Over time",
-    "evidence": "Candidates",
+    "innovations": "Innovations",
+    "evidence": "Hypotheses",
     "causes": "Causes in numbers",
-    "Separability": "What can be told apart",
-    "Decrease of the gap": "How far it shrinks",
-    "Rounds": "Round by round",
+    "separability": "Separability",
+    "closure": "Decrease of the gap",
+    "rounds": "Rounds",
     "channels": "Other channels",
     "distances": "Other distances",
     "map": "Map",
@@ -98,7 +98,7 @@ SECTIONS = {  # in their order; one without anything to show is left out
 }
 PLANNED = {
     "accuracy": "Accuracy along the drive",
-    "Smallest detectable errors": "How small an error would show",
+    "detectable": "Smallest detectable errors",
     "separability": SECTIONS["separability"],
     "map": SECTIONS["map"],
     "next": SECTIONS["next"],
