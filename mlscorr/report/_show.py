@@ -277,7 +277,7 @@ def _common_origin(layers):
     there = [layer for layer in layers if len(layer)]
     if not there:
         names = ", ".join(layer.name for layer in layers)
-        raise ValueError(f"There is nothing to show: {names} have no points and no lines.")
+        raise ValueError(f"There is nothing to show: {names} are empty.")
     for layer in there:
         bad = np.flatnonzero(~np.isfinite(layer.xyz).all(axis=1))
         if len(bad):

@@ -48,7 +48,7 @@ def applied(change, value, at="clock"):
             lambda value: replace(value, gps_time=value.gps_time[:, None]),
             "gps_time is float64 .5, 1.",
         ),
-        (lambda value: replace(value, gps_time=value.gps_time / 0.0), "of gps_time 5 of 5 numbers"),
+        (lambda value: replace(value, gps_time=value.gps_time / 0.0), "5 of 5 values of gps_time"),
     ],
 )
 def test_what_cannot_take_the_place_of_the_value_is_refused(change, said):

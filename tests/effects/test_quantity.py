@@ -15,7 +15,7 @@ from mlscorr.effects import (
         (
             "boresight",
             {"magnitude": [200, 0, 0]},
-            r"^boresight of 200 deg exceeds 10 deg; a mounting .* to a degree\.$",
+            r"^boresight of 200 deg exceeds 10 deg; drawings .* to a degree\.$",
         ),
         ("boresight", {"magnitude": 1.0}, "of 1.0 is invalid: it must be 3 numbers in deg"),
         ("range_bias", {"magnitude": [1.0]}, "must be one number in m"),
@@ -24,7 +24,7 @@ from mlscorr.effects import (
         ("range_bias", {"magnitude": np.nan}, "of nan is not finite"),
         ("range_noise", {"magnitude": -0.1}, "range_noise of -0.1 m is less than 0 m"),
         ("range_bias", {"size": 0.1}, r"no parameter 'size'; its parameters are magnitude \(m\)"),
-        ("position_step", {"magnitude": [0, 0, 1]}, r"lacks time; .*magnitude \(3 numbers in m\)"),
+        ("position_step", {"magnitude": [0, 0, 1]}, r"needs time; .*magnitude \(3 numbers in m\)"),
         ("angle_eccentricity", {"magnitude": 1e-3, "phase": 90}, "phase of angle.* 90 rad exceeds"),
         (
             "target_outlier",

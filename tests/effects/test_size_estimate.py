@@ -38,7 +38,7 @@ def test_a_wave_is_said_by_its_amplitude():
     kind = effect_class("angle_eccentricity")
     values = [SizeEstimate(3e-4, 1e-5, "rad"), SizeEstimate(-4e-4, 1e-5, "rad")]
     text = kind.describe(dict(zip(kind.parts, values, strict=True)))
-    assert "wrong by up to 0.500 mrad ± 0.010 mrad, once a turn" in text
+    assert "wrong by up to 0.500 mrad ± 0.010 mrad, once per turn" in text
     values[1] = SizeEstimate(float("nan"), None, "rad")
     assert "up to –, once" in kind.describe(dict(zip(kind.parts, values, strict=True)))
 

@@ -196,7 +196,9 @@ def test_each_scanner_has_its_part():
     text = words(html)
     assert text.count("Scanner left") == 6
     assert "1 and 2, scanners left and right" in text
-    assert text.index("right beside left") > text.index("Scanner right beside scanner left")
+    assert text.index("right relative to left") > text.index(
+        "scanner right relative to scanner left"
+    )
 
 
 def test_how_well_scanners_fit_each_other_comes_first():

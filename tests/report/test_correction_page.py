@@ -82,7 +82,7 @@ def test_names_that_hold_html_are_shown_and_not_run(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "expected"),
     [
-        ({}, r"Check points: RMSE [\d./]+ m before, [\d./]+ m after \(E/N/H\), 2 points that took"),
+        ({}, r"Check points, .*: RMSE [\d./]+ m before, [\d./]+ m after \(E/N/H\), 2 points\."),
         ({"checks": False}, r"no check points\. Control points, leave-one-out: .* 8 points"),
         ({"count": 1}, r"Fit to the points used for the correction: .*, 1 point\."),
         ({"count": 0}, "no point was surveyed"),
@@ -101,7 +101,7 @@ def test_says_so_when_the_correction_made_it_worse(rise, worse, tmp_path):
     survey, correction, report = fabricate(drive())
     report.check.after.rmse[2] = report.check.before.rmse[2] + rise
     html = page(tmp_path, survey, correction, report)
-    assert ("worse than before: H by 0.012 m" in words(html)) == worse
+    assert ("increased after the correction: H by 0.012 m" in words(html)) == worse
     assert ('class="verdict red"' in html) == worse
 
 

@@ -86,7 +86,7 @@ def test_a_single_control_point_is_corrected_by_no_others(checks):
     "It is said that the POS alone checks it, and no number of what the others make of it"
     rows = [row for row in fabricate(drive(), count=3)[2].targets if row.name != "T02"]
     report = report_of(drive(), rows if checks else rows[:1])
-    (fact,) = said(report, "Left out in turn").values()
+    (fact,) = said(report, "Leave-one-out").values()
     assert (fact.key, fact.severity) == ("single control point", "warning")
     words = " ".join(f"{row.sentence} {row.items}" for row in statements(report))
     assert "the others" not in words and "(leave-one-out)" not in words
@@ -243,7 +243,7 @@ def test_a_drive_that_others_hold_is_nowhere_said_to_stand_on_the_pos_alone(weak
     report = replace(report, targets=rows, support=Support(weak))
     (fact,) = said(report, "Control points").values()
     assert (fact.key, fact.severity) == ("control of other drives", "warning")
-    assert headline(report).startswith("2 of 2 surveyed check points were seen and scored.")
+    assert headline(report).startswith("2 of 2 surveyed check points were found")
     alone = Support((WeakStretch(0.0, 9.0, 45.0, 0.02, REASONS[NO_CONTROL]),))
     assert list(said(replace(report, support=alone), "Control points")) == ["no control point"]
 

@@ -15,7 +15,7 @@ def test_the_systems_and_beliefs_are_named():
     survey, _, _ = fabricate(drive())
     pairs = dict(systems(survey))
     assert pairs["Coordinate reference system"] == "EPSG:32650"
-    assert pairs["Time of pass-1.laz"] == "GPS week seconds, as the trajectory's"
+    assert pairs["Time of pass-1.laz"] == "GPS week seconds, as in the trajectory"
     assert pairs["Epochs of the trajectory"] == "3 000 at 50 Hz"
     assert "not stated" in dict(systems(replace(survey, crs=None)))["Coordinate reference system"]
 

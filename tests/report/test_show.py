@@ -41,7 +41,7 @@ def read(path):
     text = path.read_text(encoding="utf-8")
     scene = json.loads(re.search(r'id="scene">(.*?)</script>', text, re.S)[1])
     entries = re.findall(r"<b>(.*?)</b> <span>(.*?)</span>", text)
-    words = re.search(r"Map axes about (\d+) E, (\d+) N, (-?\d+) H", text)
+    words = re.search(r"Map axes relative to (\d+) E, (\d+) N, (-?\d+) H", text)
     origin = np.array([float(word) for word in words.groups()])
     return entries, scene["layers"], origin, text
 

@@ -623,7 +623,7 @@ def test_an_extrapolated_part_is_named_by_time_and_way():
         (
             {"value": 0.02, "unit": "m", "estimate": 0.031},
             None,
-            "2.0 cm assumed; about 3.1 cm by this survey",
+            "2.0 cm assumed; estimated from this survey: 3.1 cm",
         ),
         ({"value": 0.02, "unit": "m"}, "for the sigmas", "2.0 cm assumed; for the sigmas"),
         ({"value": (0.01, 0.02), "unit": "deg"}, None, "0.01°, 0.02° assumed"),

@@ -18,8 +18,8 @@ def test_two_answers_stand_apart():
     assert list(rows)[:2] == ["Accuracy", "Unmodelled"] and rating == "red"
     assert "less accurate than stated" in rows["Accuracy"]["sentence"]
     items = {item["name"]: item["text"] for item in rows["Accuracy"]["items"]}
-    assert items["Surveyed targets"].startswith("off by 4.1 cm (RMS per axis), 1.2 cm")
-    assert items["Surveyed targets"].endswith("(worse from 2.4 cm on)")
+    assert items["Surveyed targets"].startswith("RMS 4.1 cm per axis, 1.2 cm")
+    assert items["Surveyed targets"].endswith("(limit 2.4 cm)")
     assert items["Scanner clock offset"] == "effect on the residuals: 1.2 cm (RMS)"
 
 
@@ -67,10 +67,10 @@ def test_a_default_is_called_assumed_and_judges_nothing():
     assumed = rows["Assumed"]
     assert accuracy["rating"] == assumed["rating"] == "amber"
     assert "no sigma of the POS is given" in accuracy["sentence"]
-    assert accuracy["items"][0]["text"] == "off by 1.4 cm (RMS per axis)"
-    assert assumed["sentence"].startswith("2 accuracies that nobody stated are assumed")
+    assert accuracy["items"][0]["text"] == "RMS 1.4 cm per axis"
+    assert assumed["sentence"].startswith("2 accuracies were not given and are assumed")
     items = {item["name"]: item["text"] for item in assumed["items"]}
-    assert items["Position of the POS"] == "2.0 cm assumed; about 20.0 cm by this survey"
+    assert items["Position of the POS"] == "2.0 cm assumed; estimated from this survey: 20.0 cm"
     assert items["Correlation time of the POS"].startswith("30 s assumed; 0.1 to 3 times")
     assert "Assumed" not in facts(gap_document("none"))[1]
 

@@ -39,6 +39,6 @@ def test_windows_of_a_worse_pos_are_told_with_their_times():
     assert list(found["time_offset"]) == ["magnitude"] and len(found["position_noise"]) == 9
     assert effect_class("position_noise").describe(found["position_noise"]) == (
         "The positions of the POS are less accurate than the simulator assumes: errors up to 12 "
-        "times as large between gps_time 413205 s and 413225 s, between gps_time 413300 s and 413340 s and once "
-        "more."
+        "times as large between gps_time 413205 s and 413225 s, between gps_time 413300 s and "
+        "413340 s and once more."
     )

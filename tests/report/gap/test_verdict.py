@@ -31,10 +31,19 @@ def summary(document):
         ),
         ("unknown", ["91 in 100", "the nearest known effect, lever arm", "16.4 mm → 1.9 mm"]),
         ("pair", ["Two errors", "2.1 ms ± 0.4 ms ahead of", "93 mm ± 4 mm farther left"]),
-        ("noise", ["Noisier than stated", "7.1 mm ± 0.4 mm of scatter", "more than 99 in 100"]),
-        ("alike", ["One of two is wrong", "Either the recorded lever arm", "31 mm ± 7 mm above"]),
+        (
+            "noise",
+            ["Noisier than stated", "7.1 mm ± 0.4 mm of additional noise", "more than 99 in 100"],
+        ),
+        ("alike", ["One of two errors", "Either the recorded lever arm", "31 mm ± 7 mm above"]),
         ("alike", ["97 in 100"]),  # of the one or the other: 61 + 36
-        ("bump", ["between gps_time 413215 s and 413225 s: 17.2 cm ± 2.0 cm to the east", "88 in"]),
+        (
+            "bump",
+            [
+                "between gps_time 413215 s and 413225 s, by up to 17.2 cm ± 2.0 cm to the east",
+                "88 in",
+            ],
+        ),
         ("bump", ["Not ruled out: something unknown (3 in 100)."]),
         ("too little", ["No verdict yet", "Only 2 targets were seen; 12 are needed."]),
     ],

@@ -53,7 +53,9 @@ def test_the_title_counts_check_points_alone_where_there_are_some():
     check = replace(target("T2", (0, 0, 0)), role="check", after=np.array([0.1, 0.0, 0.0]))
     rows = [target("T1", (0, 0, 0), (5.0, 0.0, 0.0)), check, replace(check, gps_time=START)]
     title = overview(scouted([1, 1, 1]), rows, PictureOptions(SIZE)).title
-    assert title.startswith("1 check point, seen 2 times: 30.0 cm off before, 10.0 cm after")
+    assert title.startswith(
+        "3D RMSE at 1 check point, 2 observations: 30.0 cm before, 10.0 cm after"
+    )
 
 
 def test_the_title_does_not_boast_of_the_fit_of_control_points():
