@@ -33,7 +33,7 @@ def make(
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ) -> None:
-    """Make surveys, seal their labels, and put those into key.json. Goes on where it stopped."""
+    """Create surveys and store their sealed labels in key.json. Continues an interrupted run."""
     with exit_code(Exit.BAD_DATA), progress_bars() as progress:
         from mlscorr.pipeline import make_blind
 
@@ -49,7 +49,7 @@ def run(
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ) -> None:
-    """Diagnose each survey that has no answer yet, from its folder alone."""
+    """Diagnose each survey without an answer, from its folder alone."""
     with exit_code(Exit.BAD_DATA), progress_bars() as progress:
         from mlscorr.pipeline import run_blind
 

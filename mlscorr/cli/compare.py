@@ -60,9 +60,9 @@ def compare(
     quiet: terminal.Quiet = False,
     verbose: terminal.Verbose = 0,
 ) -> None:
-    """Correct a survey by every method, and score them by the same check points.
+    """Correct a survey with every method and compare their RMSE at the same check points.
 
-    Two folders that mlscorr correct wrote are compared with each other instead:
+    Two folders written by mlscorr correct are compared with each other instead:
     mlscorr compare corrected-1 corrected-2 -o compared
     """
     with terminal.exit_code(terminal.Exit.USAGE), progress_bars():

@@ -131,7 +131,7 @@ def correct(
     quiet: terminal.Quiet = False,
     verbose: terminal.Verbose = 0,
 ) -> None:
-    """Correct the cloud of a survey, or all drives of a project.toml, and report on it."""
+    """Correct the clouds of a survey, or all drives of a project.toml, and write a report."""
     out = chosen_out(out, survey, "correct")
     with terminal.exit_code(terminal.Exit.USAGE), progress_bars():
         from mlscorr.evaluate import failures, read_gate

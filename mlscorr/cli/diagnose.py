@@ -57,7 +57,7 @@ def diagnose(
     quiet: terminal.Quiet = False,
     verbose: terminal.Verbose = 0,
 ) -> None:
-    """Find where reality and simulation differ, why, and how far the gap can be closed."""
+    """Find differences between survey and simulation, their cause, and how much it explains."""
     out = chosen_out(out, survey, "diagnose")
     with terminal.exit_code(terminal.Exit.USAGE), progress_bars():
         from mlscorr.simulate import read_simulator

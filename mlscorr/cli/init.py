@@ -33,9 +33,9 @@ def init(
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ) -> None:
-    """Write a survey.toml for the files in a folder, and say which is which and why.
+    """Write a survey.toml for the files in a folder, with the role of each file and the reason.
 
-    What only you know is marked in it, all at once, and the exit code is 4.
+    Values that only you know are marked in it, and the exit code is 4.
     """
     with exit_code(Exit.USAGE), progress_bars() as progress:
         progress("Identifying the files of the folder")

@@ -30,7 +30,7 @@ def plan(
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ) -> None:
-    """Tell which effects a planned survey can show and tell apart; it needs no cloud."""
+    """Predict which errors a planned survey can detect and separate; needs no cloud."""
     out = chosen_out(out, survey, "plan")
     with work(out, overwrite, survey, planned=True) as progress:
         recorded = mlscorr.read_survey(survey, planned=True)

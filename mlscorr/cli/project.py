@@ -90,7 +90,7 @@ def status(
     quiet: terminal.Quiet = False,
     verbose: terminal.Verbose = 0,
 ) -> None:
-    """Tell how far the correction of a project has come, while it runs or afterwards."""
+    """Show the progress of the correction of a project, during the run or afterwards."""
     with terminal.exit_code(terminal.Exit.USAGE):
         from mlscorr.pipeline.project import project_status
 

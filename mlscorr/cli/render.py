@@ -65,7 +65,7 @@ def render(
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ) -> None:
-    """Draw a survey before and after its correction; neither a display nor a GPU is needed."""
+    """Draw a survey before and after its correction; needs neither display nor GPU."""
     out = chosen_out(out, survey, "render")
     with exit_code(Exit.USAGE), progress_bars():
         pixels = _read_size(size)

@@ -40,7 +40,7 @@ def simulate(
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ) -> None:
-    """Simulate a survey from a scenario: a survey folder, and the truth beside it."""
+    """Simulate a survey from a scenario: a survey folder with its truth."""
     out = chosen_out(out, scenario, "simulate", is_by_name=True)
     with exit_code(Exit.USAGE), progress_bars():
         from mlscorr.simulate import read_scenario, scenario_files

@@ -29,7 +29,7 @@ def ties(
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ) -> None:
-    """Find walls, roads, poles and paint that two passes both saw, and how far apart they lie."""
+    """Find tie features between passes (walls, roads, poles, paint) and their misclosures."""
     out = chosen_out(out, survey, "ties")
     with work(out, overwrite, survey) as progress:
         recorded = mlscorr.read_survey(survey)

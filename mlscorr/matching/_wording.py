@@ -30,7 +30,7 @@ def _whereabouts(time: float, away: float, found_name: str | None) -> str:
     """When an observation was made, how far from a surveyed point, and its name if it has one."""
     name = ""
     if found_name is not None:
-        name = f" and is {found_name}"
+        name = f" (it is {found_name})"
     return f"was found at {_seconds(time)}, {_metres(away)} away{name}"
 
 

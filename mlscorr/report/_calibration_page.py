@@ -219,7 +219,7 @@ def _ties(content) -> Iterator[StatementRow]:
         "after": ties["after"]["median"],
         "without_drift": without_drift,
     }
-    yield StatementRow.of("Two passes", Statement("two passes", values=values))
+    yield StatementRow.of("Tie features", Statement("two passes", values=values))
 
 
 def calibration_page(content: dict[str, Any]) -> Page:

@@ -223,8 +223,8 @@ def key_figures(correction: Correction, report: CorrectionReport) -> list[tuple[
     change = np.linalg.norm(correction.corrected.position - correction.recorded.position, axis=1)
     figures = []
     deeds = {
-        "control": ("used for the correction", "took part"),
-        "check": ("tested it", "available to test it"),
+        "control": ("used for the correction", "used"),
+        "check": ("used to test it", "available to test it"),
     }
     for role, (what, nothing) in deeds.items():
         points, n = report.count(role)

@@ -106,7 +106,7 @@ def _kinds_legend(used, words):
     handles = [Line2D([], [], label=words, **TRACK)]
     dot = {"linestyle": "none", "marker": "o", "markersize": 3, "color": "#5b2a86"}
     if used.any():
-        handles.append(Line2D([], [], label="Seen twice", **dot))
+        handles.append(Line2D([], [], label="Used", **dot))
     if not used.all():
         words = "Rejected: contradicts the others"
         handles.append(Line2D([], [], linestyle="none", label=words, **MARKS["unused"]))

@@ -13,9 +13,9 @@ from mlscorr.report import style
 from mlscorr.report.pages import Page, data_uri
 
 SECTIONS = {  # in their order; one without anything to show is left out
-    "time": "Over time",
+    "time": "Trajectories",
     "scores": "RMSE",
-    "targets": "Every target",
+    "targets": "Targets",
     "model": "Model and coverage",
     "only": "Warnings",
     "files": "Files",

@@ -33,7 +33,7 @@ def test_unseen_control_has_a_reason_with_the_nearest_find():
     (refusal,) = found.refusals
     assert (refusal.name, refusal.pass_number) == ("T02", None)
     assert refusal.reason.startswith("No circle of 0.60 m was found near it")
-    assert "was found at 357705.0 s, 100.00 m away and is T01" in refusal.reason
+    assert "was found at 357705.0 s, 100.00 m away (it is T01)" in refusal.reason
 
 
 def test_a_find_that_is_another_point_is_named():
@@ -43,7 +43,7 @@ def test_a_find_that_is_another_point_is_named():
     (refusal,) = found.refusals
     assert refusal.name == "T11" and refusal.pass_number is None
     assert refusal.reason.startswith("Each circle of 0.60 m found near it (search radius 10.00 m)")
-    assert "was found at 357745.0 s, 4.00 m away and is T05" in refusal.reason
+    assert "was found at 357745.0 s, 4.00 m away (it is T05)" in refusal.reason
 
 
 def test_a_find_that_was_refused_says_why():

@@ -156,7 +156,7 @@ def test_what_the_drift_explains_between_passes_is_said_apart():
     content = calibrated() | {"ties": ties}
     drift = {"with_drift": {"ties": {"after": {"median": 0.002}}}}
     for more, without_drift in (({}, None), (drift, 0.002)):
-        (passes,) = said(calibration_statements(content | more, []), "Two passes")
+        (passes,) = said(calibration_statements(content | more, []), "Tie features")
         assert passes.values == {
             "used": 80,
             "n": 90,

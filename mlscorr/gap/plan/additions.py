@@ -102,8 +102,8 @@ def next_data(
             if after > INFERENCE.same:
                 end = ", which is still not separable."
             why = (
-                f"{lowered(titles(names))}: squared correlation decreases from {before:.2f} to "
-                f"{after:.2f}{end}"
+                f"the squared correlation of {lowered(titles(names))} decreases from "
+                f"{before:.2f} to {after:.2f}{end}"
             )
             data.append(NextData(name, why, before, after))
     return tuple(sorted(data, key=lambda planned: planned.after or 0.0))

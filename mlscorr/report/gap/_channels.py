@@ -151,7 +151,7 @@ def channels_figure(document: dict) -> Figure:
         _draw(panel, each, table)
     for panel in panels[len(tables) :]:
         panel.set_visible(False)
-    marks = ((BLUE, "Within chance"), (VERMILLION, "Beyond chance"))
+    marks = ((BLUE, "Not significant"), (VERMILLION, "Significant"))
     handles = [Line2D([], [], color=c, marker="o", lw=1.2, ms=4, label=text) for c, text in marks]
     handles.append(Line2D([], [], color=GREY, linewidth=0.9, label="As simulated"))
     legend_above(figure, handles)

@@ -22,7 +22,7 @@ from mlscorr.report.style import (
 from mlscorr.wording import known, percent
 
 FAMILIES = {  # colour, hatch, words
-    "none": (GREY, "", "nothing wrong"),
+    "none": (GREY, "", "no error"),
     "unknown": (ORANGE, "////", "something unknown"),
     "noise": (GREEN, "....", "noise class"),
     "effect": (BLUE, "", "known effect"),

@@ -275,7 +275,7 @@ def _cause(document):
     elif answer["probability"] >= 0.5:
         kicker = "One error"
     else:
-        kicker = "Possibly wrong"
+        kicker = "Possible error"
     return VerdictBox("bad", kicker, sentences, large)
 
 
@@ -360,7 +360,7 @@ def _certainty(document):
     ):
         words = "another is more probable, but a wrong verdict would cost more"
     more = [chance(answer["p_value"]), "± is 1 sigma." if is_named(document) else ""]
-    return Fact("How sure", f"{_in_hundred(share)}: {words}", " ".join(filter(None, more)))
+    return Fact("Confidence", f"{_in_hundred(share)}: {words}", " ".join(filter(None, more)))
 
 
 def _in_hundred(share: float | None) -> str:

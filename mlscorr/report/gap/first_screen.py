@@ -46,7 +46,7 @@ def gap_screen(document: dict) -> dict[str, object]:
     items += [
         (fact.title, f"{fact.number}{fact.stop} {fact.more}".strip()) for fact in facts(document)
     ]
-    answer = StatementRow("Unmodelled", RATINGS[box.tone], f"{box.kicker}. {first}", tuple(items))
+    answer = StatementRow("Unmodeled", RATINGS[box.tone], f"{box.kicker}. {first}", tuple(items))
     warnings = warning_statements(document["warnings"])
     beside = (*channel_statements(document), *unjudged(document))
     judged = ", and the accuracy is not tested against it"
@@ -128,4 +128,4 @@ def unjudged(document: dict) -> Iterator[StatementRow]:
         total = len(left) + len({*judged} - {"none", "unknown"})
         sentence = f"{len(left)} of {total} types of error can't be tested here."
         rating = "amber" if document["mendable"] else "green"
-        yield StatementRow("Not judged", rating, sentence, items)
+        yield StatementRow("Not tested", rating, sentence, items)

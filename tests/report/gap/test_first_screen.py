@@ -15,7 +15,7 @@ def facts(document):
 def test_two_answers_stand_apart():
     "Whether the cloud is accurate is one question, whether something is unmodelled another"
     rating, rows = facts(gap_document("time_offset"))
-    assert list(rows)[:2] == ["Accuracy", "Unmodelled"] and rating == "red"
+    assert list(rows)[:2] == ["Accuracy", "Unmodeled"] and rating == "red"
     assert "less accurate than stated" in rows["Accuracy"]["sentence"]
     items = {item["name"]: item["text"] for item in rows["Accuracy"]["items"]}
     assert items["Surveyed targets"].startswith("RMS 4.1 cm per axis, 1.2 cm")
@@ -27,7 +27,7 @@ def test_a_good_survey_is_good_in_both():
     "Nothing unmodelled, and no channel farther off than 1.96 stated sigmas"
     good = [{"channel": "target", "things": 16, "rms_mm": 19.0, "stated_mm": 10.0}]
     _, rows = facts(gap_document("none", agreement=good))
-    assert rows["Accuracy"]["rating"] == rows["Unmodelled"]["rating"] == "green"
+    assert rows["Accuracy"]["rating"] == rows["Unmodeled"]["rating"] == "green"
     assert "as accurate as stated" in rows["Accuracy"]["sentence"]
 
 
@@ -49,7 +49,7 @@ def test_what_the_simulator_has_already_is_off_the_residuals():
 def test_what_could_not_be_judged_is_said_first(left_out, mendable, rating):
     "With the reason, and amber where the user could give what is missing"
     _, rows = facts(gap_document("none", left_out=left_out, mendable=[*left_out] * mendable))
-    row = rows["Not judged"]
+    row = rows["Not tested"]
     assert row["rating"] == rating and row["sentence"].startswith("1 of ")
     assert row["items"][0]["text"] in left_out.values()
 
@@ -86,6 +86,6 @@ def test_a_time_that_is_assumed_leaves_the_accuracy_to_be_judged():
 def test_a_noisy_pos_is_not_noisier_than_what_nobody_stated():
     "The verdict on positions compares them with what is assumed, and says that"
     document = gap_document("position_noise", 0.97, assumed=ASSUMED)
-    assert "Noisier than assumed" in facts(document)[1]["Unmodelled"]["sentence"]
+    assert "Noisier than assumed" in facts(document)[1]["Unmodeled"]["sentence"]
     document = gap_document("position_noise", 0.97)
-    assert "Noisier than stated" in facts(document)[1]["Unmodelled"]["sentence"]
+    assert "Noisier than stated" in facts(document)[1]["Unmodeled"]["sentence"]
