@@ -74,7 +74,7 @@ def texts(node: ast.AST, kind: str) -> Iterator[tuple[str, str]]:
     """Pairs (kind, text) of the strings below a node that are no docstrings."""
     if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
         return
-    if isinstance(node, ast.JoinedStr) or isinstance(node, ast.Constant):
+    if isinstance(node, ast.JoinedStr | ast.Constant):
         if text := template(node):
             yield kind, text
         return

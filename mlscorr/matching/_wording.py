@@ -21,9 +21,9 @@ def _limit(search_radius: float) -> str:
 def _corrected(neighbours: Sequence[tuple[str, float]], sigma: float) -> str:
     """By which neighbours an observation was corrected, and how well."""
     if not neighbours:
-        return f"no other target constrains the misclosure there (sigma {_metres(sigma)})"
+        return f"No other target constrains the misclosure there (sigma {_metres(sigma)})"
     words = [f"{name} ({later:+.1f} s)" for name, later in neighbours]
-    return f"its neighbors {' and '.join(words)} predict it with a sigma of {_metres(sigma)}"
+    return f"Its neighbors {' and '.join(words)} predict the misclosure with a sigma of {_metres(sigma)}"
 
 
 def _whereabouts(time: float, away: float, found_name: str | None) -> str:
@@ -39,7 +39,7 @@ def _other_appearance(
 ):
     sentence = (
         f"The observation at {_seconds(time)} is a {kind} of {_metres(size)} and {name} is a "
-        f"{surveyed_kind} of {_metres(surveyed_size)}, {_metres(off)} from it after correction; "
+        f"{surveyed_kind} of {_metres(surveyed_size)}, {_metres(off)} from it after correction. "
         f"{_corrected(neighbours, sigma)}"
     )
     if not exchanged:
@@ -51,7 +51,7 @@ def _wrong_point(
     name, time, off, probability, observations, misclosure, search_radius, neighbours, sigma
 ):
     return (
-        f"{name} is {_metres(off)} from the corrected observation at {_seconds(time)}; "
+        f"{name} is {_metres(off)} from the corrected observation at {_seconds(time)}. "
         f"{_corrected(neighbours, sigma)}. Its coordinates are wrong, or the observation is "
         f"another object (probability {number(probability)} by "
         f"{counted(observations, 'observation')}; misclosure {_metres(misclosure)}, "
@@ -63,7 +63,7 @@ def _two_points(names, apart, time, probabilities, search_radius, neighbours, si
     first, second = map(number, probabilities)
     return (
         f"{names[0]} and {names[1]}, {_metres(apart)} apart, both match the observation at "
-        f"{_seconds(time)} ({_limit(search_radius)}, probability {first} and {second}); "
+        f"{_seconds(time)} ({_limit(search_radius)}, probability {first} and {second}). "
         f"{_corrected(neighbours, sigma)}."
     )
 
@@ -72,7 +72,7 @@ def _two_observations(name, apart, times, probability, search_radius, neighbours
     return (
         f"Two observations {_metres(apart)} apart, at {_seconds(times[0])} and "
         f"{_seconds(times[1])}, both match {name} ({_limit(search_radius)}, probability "
-        f"{number(probability)} of the first); {_corrected(neighbours, sigma)}."
+        f"{number(probability)} of the first). {_corrected(neighbours, sigma)}."
     )
 
 
@@ -80,13 +80,13 @@ def _doubtful(name, misclosure, time, probability, wrong, search_radius, neighbo
     return (
         f"The match of {name} with the observation at {_seconds(time)}, {_metres(misclosure)} "
         f"away, is uncertain ({_limit(search_radius)}, probability {number(probability)}; "
-        f"{number(wrong)} for a wrong surveyed point); {_corrected(neighbours, sigma)}."
+        f"{number(wrong)} for a wrong surveyed point). {_corrected(neighbours, sigma)}."
     )
 
 
 def _another_object(name, time, off, misclosure, search_radius, neighbours, sigma):
     return (
-        f"{name} is {_metres(off)} from the corrected observation at {_seconds(time)}; "
+        f"{name} is {_metres(off)} from the corrected observation at {_seconds(time)}. "
         f"{_corrected(neighbours, sigma)}. The observation is another object (misclosure "
         f"{_metres(misclosure)}, {_limit(search_radius)})."
     )

@@ -81,7 +81,7 @@ def test_a_look_alike_that_is_all_the_evidence_is_refused():
     assert len(found.matched) == 0
     assert {refusal.name for refusal in found.refusals} == {"T01", "T02"}
     assert "1.50 m apart, both match the observation at 357750.1 s" in found.reasons[0]
-    assert "no other target constrains the misclosure there" in found.reasons[0]
+    assert "No other target constrains the misclosure there" in found.reasons[0]
 
 
 def test_a_moved_control_point_is_found():

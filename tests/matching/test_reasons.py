@@ -207,7 +207,7 @@ def test_neighbours_are_named_with_their_times():
     assert first["neighbours"] == (("T02", 2.5),)
     assert middle["neighbours"] == (("T15", -2.5), ("T17", 2.5))
     assert first["sigma"] < 1.0 and middle["sigma"] < 1.0
-    words = "its neighbours T15 (-2.5 s) and T17 (+2.5 s) tell it to 0."
+    words = "Its neighbors T15 (-2.5 s) and T17 (+2.5 s) predict the misclosure with a sigma of 0."
     assert words in found.refusals[1].reason
 
 

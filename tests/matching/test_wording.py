@@ -24,8 +24,9 @@ CATALOGUE = [
             **CORRECTED,
         },
         "The observation at 357705.0 s is a circle of 0.60 m and T01 is a square of 0.50 m, "
-        "0.03 m from it after correction; its neighbors T02 (-4.2 s) and T04 (+6.1 s) predict "
-        "it with a sigma of 0.03 m. Kind or size is wrong in the survey or in the extraction.",
+        "0.03 m from it after correction. Its neighbors T02 (-4.2 s) and T04 (+6.1 s) predict "
+        "the misclosure with a sigma of 0.03 m. Kind or size is wrong in the survey or in the "
+        "extraction.",
     ),
     (
         "other appearance",
@@ -41,7 +42,7 @@ CATALOGUE = [
             **ALONE,
         },
         "The observation at 357705.0 s is a circle of 0.60 m and T01 is a square of 0.50 m, "
-        "0.03 m from it after correction; no other target constrains the misclosure there "
+        "0.03 m from it after correction. No other target constrains the misclosure there "
         "(sigma 0.40 m). T01 and T02 seem to be exchanged.",
     ),
     (
@@ -56,10 +57,10 @@ CATALOGUE = [
             "search_radius": 10.0,
             **CORRECTED,
         },
-        "T01 is 0.50 m from the corrected observation at 357705.0 s; its neighbors T02 (-4.2 s) "
-        "and T04 (+6.1 s) predict it with a sigma of 0.03 m. Its coordinates are wrong, or the "
-        "observation is another object (probability 0.998 by 2 observations; misclosure 0.71 m, "
-        "search radius 10.00 m): check its survey record, or exclude it.",
+        "T01 is 0.50 m from the corrected observation at 357705.0 s. Its neighbors T02 (-4.2 s) "
+        "and T04 (+6.1 s) predict the misclosure with a sigma of 0.03 m. Its coordinates are "
+        "wrong, or the observation is another object (probability 0.998 by 2 observations; "
+        "misclosure 0.71 m, search radius 10.00 m): check its survey record, or exclude it.",
     ),
     (
         "two points",
@@ -72,7 +73,7 @@ CATALOGUE = [
             **ALONE,
         },
         "T01 and T02, 0.31 m apart, both match the observation at 357705.0 s (search radius "
-        "10.00 m, probability 0.520 and 0.480); no other target constrains the misclosure there "
+        "10.00 m, probability 0.520 and 0.480). No other target constrains the misclosure there "
         "(sigma 0.40 m).",
     ),
     (
@@ -86,7 +87,7 @@ CATALOGUE = [
             **ALONE,
         },
         "Two observations 0.31 m apart, at 357705.0 s and 357705.4 s, both match T01 (search "
-        "radius 10.00 m, probability 0.520 of the first); no other target constrains the "
+        "radius 10.00 m, probability 0.520 of the first). No other target constrains the "
         "misclosure there (sigma 0.40 m).",
     ),
     (
@@ -101,7 +102,7 @@ CATALOGUE = [
             **ALONE,
         },
         "The match of T01 with the observation at 357705.0 s, 2.10 m away, is uncertain (search "
-        "radius 10.00 m, probability 0.800; 0.150 for a wrong surveyed point); no other target "
+        "radius 10.00 m, probability 0.800; 0.150 for a wrong surveyed point). No other target "
         "constrains the misclosure there (sigma 0.40 m).",
     ),
     (
@@ -114,9 +115,9 @@ CATALOGUE = [
             "search_radius": 10.0,
             **CORRECTED,
         },
-        "T01 is 5.50 m from the corrected observation at 357705.0 s; its neighbors T02 (-4.2 s) "
-        "and T04 (+6.1 s) predict it with a sigma of 0.03 m. The observation is another object "
-        "(misclosure 6.00 m, search radius 10.00 m).",
+        "T01 is 5.50 m from the corrected observation at 357705.0 s. Its neighbors T02 (-4.2 s) "
+        "and T04 (+6.1 s) predict the misclosure with a sigma of 0.03 m. The observation is "
+        "another object (misclosure 6.00 m, search radius 10.00 m).",
     ),
     ("no control", CIRCLE, "No point was surveyed for the circle of 0.60 m at 357705.0 s."),
     (

@@ -54,7 +54,7 @@ def sentence(
         return (
             f"{_opening(lost, is_further)} on flat surfaces give no return {where}, "
             f"{percent(simulated, 1)} in the simulation: the simulator "
-            f"{'lacks lost returns' if value > 0 else 'loses too many returns'}."
+            f"{'loses too few returns' if value > 0 else 'loses too many returns'}."
         )
     return (
         f"{_opening('depth edges', is_further)} are smeared over "
