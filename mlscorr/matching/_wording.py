@@ -23,7 +23,8 @@ def _corrected(neighbours: Sequence[tuple[str, float]], sigma: float) -> str:
     if not neighbours:
         return f"No other target constrains the misclosure there (sigma {_metres(sigma)})"
     words = [f"{name} ({later:+.1f} s)" for name, later in neighbours]
-    return f"Its neighbors {' and '.join(words)} predict the misclosure with a sigma of {_metres(sigma)}"
+    listed = " and ".join(words)
+    return f"Its neighbors {listed} predict the misclosure with a sigma of {_metres(sigma)}"
 
 
 def _whereabouts(time: float, away: float, found_name: str | None) -> str:
