@@ -264,7 +264,7 @@ def test_rows_that_carry_the_trend_cannot_be_left_out():
     design = np.array([[1, 0], [1, 0], [1, 1.0]])
     solved = collocate_correlated(gps_time, np.zeros(3), 1e-4 * np.eye(3), design, [])
     assert [solved.determined_without([row]) for row in range(3)] == [True, True, False]
-    with pytest.raises(ValueError, match=r"Without the 1 observations .* the other 2 do not"):
+    with pytest.raises(ValueError, match=r"Without the 1 observations.*2 do not"):
         solved.leave_out([2])
 
 

@@ -78,7 +78,7 @@ def test_knots_too_close_are_refused_in_a_sentence():
         return [SparseRows(gps_time, np.zeros((n, 1)), Noise(1e-4 * unit), unit, [signal])]
 
     fine = collocate_by_knots(rows(1.0))
-    with pytest.raises(ValueError, match=r"Rounding leaves .* signal 1 \(matern52, 3600 s\) at a"):
+    with pytest.raises(ValueError, match=r"signal 1 \(matern52, 3600 s\) at a"):
         collocate_by_knots(rows(3600.0), fine.solver)
     assert np.isfinite(collocate_by_knots(rows(3600.0)).log_likelihood)
 

@@ -305,7 +305,7 @@ def test_a_large_site_is_calibrated_with_parameters_from_a_part_of_it():
 
 def test_too_few_targets_are_refused():
     "Two control points cannot hold six components, however often they are seen"
-    with pytest.raises(ValueError, match=r"2 control points were found .* needs 3 at least"):
+    with pytest.raises(ValueError, match="2 control points were found"):
         Site(8, targets=2).calibrate()
 
 

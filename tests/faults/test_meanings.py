@@ -144,7 +144,7 @@ READ = {
     ),
     "angles in radians": (
         lambda r: column("trajectory.csv", ANGLES, np.pi / 180),
-        "radians up to 1.5708 are expected",
+        "seem to be in radians",
     ),
     "sizes in centimetres": (lambda r: column("control.csv", ["size"], 100.0), "centimetres"),
     "sigmas of zero": (

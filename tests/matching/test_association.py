@@ -151,7 +151,7 @@ def test_an_observation_between_look_alikes_is_refused():
     for refusal in found.refusals:
         assert refusal.pass_number == 1
         assert "T01" in refusal.reason and "T02" in refusal.reason
-        assert "claim" in refusal.reason
+        assert "both match" in refusal.reason
         assert "search radius 10.00 m" in refusal.reason
     assert found.reasons == (found.refusals[0].reason,)
 

@@ -68,7 +68,7 @@ def test_points_share_what_is_stated_once():
     ("changed", "words"),
     [
         ({"name": ["A", "A"]}, "names occur twice"),
-        ({"kind": "disc"}, "kind = 'disc' is none of circle"),
+        ({"kind": "disc"}, "kind = 'disc' is"),
         ({"size": [0.6, np.nan]}, "1 of 2 surveyed points"),
         ({"position": [PLACE]}, "different numbers of rows"),
     ],

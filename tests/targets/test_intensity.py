@@ -11,7 +11,7 @@ from mlscorr.targets import why_useless
 def test_why_useless_names_the_reason():
     "All equal, or a flag of two values; 8 bits in 16 are of use"
     assert "all points is 7" in why_useless(np.full(5, 7))
-    assert "only 2 values" in why_useless(np.arange(10) % 2)
+    assert "only 2" in why_useless(np.arange(10) % 2)
     assert why_useless(np.arange(256)) is None
 
 

@@ -318,7 +318,7 @@ def _likely_unit(size):
     if size <= 0:
         return "it must be positive."
     smallest, largest = SETTINGS.target_size
-    sizes = {"centimetres": size / 100, "millimetres": size / 1000}
+    sizes = {"centimeters": size / 100, "millimeters": size / 1000}
     usual = np.sqrt(smallest * largest)
     unit = min(sizes, key=lambda unit: abs(np.log(sizes[unit] / usual)))
     if smallest <= sizes[unit] <= largest:

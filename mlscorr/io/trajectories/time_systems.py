@@ -152,7 +152,7 @@ def match_times(
         if match.cloud_system != flagged:
             warnings.warn(
                 f"The header of {name} states {NAMES[flagged]}, but its times "
-                f"[{times.min():.1f}, {times.max():.1f}] s match the trajectory as {match}.",
+                f"[{times.min():.1f}, {times.max():.1f}] s were recognized as {match}.",
                 stacklevel=2,
             )
     return match

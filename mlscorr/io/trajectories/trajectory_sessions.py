@@ -275,12 +275,12 @@ def join_sessions(
                 continue
             if _are_one([names[j], names[i]], parts[j], parts[i], is_common, pos):
                 bases[i] = bases[j]
-                how = "identical to, and joined with,"
+                how = "and are identical: the two are joined"
             else:
-                how = "equal within their sigmas to, and separate from,"
+                how = "and are equal within their sigmas: the two stay separate"
             notes.append(
-                f"{is_common.sum()} epochs of {names[i]} overlap {names[j]}. They are {how} "
-                f"those of {names[j]}, which are used."
+                f"{is_common.sum()} epochs of {names[i]} overlap {names[j]} {how}. Those of "
+                f"{names[j]} are used."
             )
             is_new &= ~is_common
         if is_new.any():

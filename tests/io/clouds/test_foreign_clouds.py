@@ -150,7 +150,7 @@ def test_a_ply_is_read_in_all_its_forms(form, tmp_path):
     assert layout.point_format == 7 and not layout.is_standard
     las = laspy.read(converted(path).path)
     assert np.array_equal(las.red, colours["red"] * 257)
-    assert "with times by scalar_GpsTime; without its nx. What" in converted(path).note
+    assert "with times by scalar_GpsTime; without its nx." in converted(path).note
 
 
 def test_scans_of_an_e57_are_placed_and_invalid_points_left_out(tmp_path):
@@ -195,7 +195,7 @@ def test_times_of_an_e57_count_from_its_start_where_they_fit(
     [
         (np.linspace(0.0, 1.0, 500), (0, 65_535), "intensities of 0 to 1 as 65535"),
         (np.linspace(-20.0, 5.0, 500), (0, 65_535), r"of -20 to 5 as 2621.4 \(value - -20\)"),
-        (np.linspace(0.0, 255.0, 500), (0, 255), "points with times by gps_time. What"),
+        (np.linspace(0.0, 255.0, 500), (0, 255), "points with times by gps_time. The corrected"),
     ],
 )
 def test_intensities_come_into_16_bits_and_their_scale_is_said(intensity, stored, words, tmp_path):
@@ -278,7 +278,7 @@ REFUSED = {
     ),
     "e.ply of text cut off": (
         lambda path: cut(path, write_ply, few(), None, "ascii"),
-        "behind point 0|cut off",
+        "point 0",
     ),
     "f.ply in nanoseconds": (
         lambda path: write_ply(path, few() | {"gps_time": np.full(500, 1.7e18)}),
@@ -308,7 +308,7 @@ REFUSED = {
     ),
     "l.e57 cut off": (
         lambda path: cut(path, write_e57, [scan_of(few())]),
-        r"can't be read as E57 \(.*cut off",
+        r"can't be read as E57 \(",
     ),
     "m.e57 that is none": (
         lambda path: path.write_bytes(bytes(5000)) and path,

@@ -47,7 +47,7 @@ def test_wkt_and_codes_state_the_same(tmp_path):
 @pytest.mark.parametrize(
     ("stated", "crs", "words"),
     [
-        ("EPSG:32650", "EPSG:32649", "in places .* km apart"),
+        ("EPSG:32650", "EPSG:32649", "of the cloud .* km apart"),
         ("EPSG:32650+5773", "EPSG:32650+3855", "the height systems differ"),
         ("EPSG:2263", "EPSG:32618", "in US survey foot, and mlscorr needs meters"),
         ("EPSG:4326", "EPSG:32650", "in degree, and mlscorr needs meters"),

@@ -158,7 +158,7 @@ def test_a_folder_with_other_things_is_refused(store):
     "Neither inputs nor what is there already are written over; a missing bucket is named"
     write_json("s3://results/other/project.json", {"name": "other"})
     out = as_path("s3://results/other")
-    with pytest.raises(ValueError, match=r"holds 1 entry already \(first: project\.json\)"):
+    with pytest.raises(ValueError, match=r"1 entry.*\(first: project\.json\)"):
         check_store_output(out, [], overwrite=False)
     with pytest.raises(ValueError, match=r"holds the input a\.laz, which must stay"):
         check_store_output(out, [out / "a.laz"], overwrite=True)

@@ -193,7 +193,7 @@ def test_a_lost_connection_is_no_damaged_file(store):
     store.lost = "long.laz"
     store.lost_after = 3
     try:
-        with pytest.raises(OSError, match=r"long\.laz can't be reached .* when tried again"):
+        with pytest.raises(OSError, match=r"long\.laz can't be reached"):
             list(read_chunks(CloudFile(layout.path, layout.points, 0.0, "week")))
     finally:
         store.lost = ""
@@ -202,7 +202,7 @@ def test_a_lost_connection_is_no_damaged_file(store):
 @pytest.mark.parametrize(
     ("name", "sentence"),
     [
-        ("s3://streets/tuesday", "streets/tuesday does not exist; a survey is a folder"),
+        ("s3://streets/tuesday", "streets/tuesday does not exist.*survey is a folder"),
         ("s3://avenues/monday", "there is no bucket avenues at this endpoint"),
     ],
 )

@@ -89,12 +89,12 @@ WRONG = [
     ([DRIVE.format("a"), DRIVE.format("a")], r": 1 names are repeated \(first: a\)"),
     ([DRIVE.format("a"), DRIVE.format("b").replace("b/*", "a/*")], "belong to two drives"),
     ([DRIVE.format("a").replace('name = "a"', 'name = "tiles"')], "can't be a folder"),
-    ([IDS.format("a", "[1, 2]"), IDS.format("b", "[2]")], "point_source_id 2 of .* of one"),
+    ([IDS.format("a", "[1, 2]"), IDS.format("b", "[2]")], "point_source_id 2 of"),
     ([IDS.format("a", "[1]") + SCANNER, IDS.format("b", "[2]")], "one id can't do both"),
     (['[cloud]\nfiles = ["*/*.laz"]\n', DRIVE.format("a")], "belong to no drive"),
     ([DRIVE.format("a").replace("a/*.laz", "s4://bucket/a.laz")], "unknown scheme s4://"),
     (['[[drive]]\nname = "a"\n'], "a drive needs survey"),
-    (["name = 1\n", DRIVE.format("a")], "name = 1 can't be used"),
+    (["name = 1", DRIVE.format("a")], "name = 1 can't be used"),
     (['nmae = "x"\n', DRIVE.format("a")], "the nearest known one is name"),
 ]
 
@@ -163,7 +163,7 @@ def test_a_copy_of_another_drives_cloud_is_refused(city):
     "Both files and drives are named; by point_source_ids of their own two drives may share copies"
     for name in ("a", "b"):
         write_cloud(city / name / f"tile-{name}.laz", points=9)
-    words = r"tile-b.laz, of drive b, is a copy of .*tile-a.laz, of drive a: all .* twice"
+    words = r"tile-b\.laz, of drive b, is a copy of.*tile-a\.laz, of drive a"
     for parts in (
         [DRIVE.format("a"), DRIVE.format("b")],
         [IDS.format("a", "[1]"), DRIVE.format("b")],

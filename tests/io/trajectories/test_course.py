@@ -117,7 +117,7 @@ def test_gon_for_degrees_is_refused_by_the_course(tmp_path):
     assert np.degrees(turn).max() < 1e-6
     straight = table_of(drive(np.full(400, 210.0)))
     straight[:, 6] = np.mod(straight[:, 6], 360.0) / 0.9
-    with pytest.warns(UserWarning, match=r"\+23\.3 deg beside .* may be gon, .* fit to 0\.0 deg"):
+    with pytest.warns(UserWarning, match=r"\+23\.3 deg.*may be gon,.*to 0\.0 deg"):
         read_trajectory(csv_of(tmp_path / "t.csv", straight))
 
 

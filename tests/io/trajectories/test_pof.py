@@ -75,7 +75,7 @@ def changed(**fields):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (pof_bytes(drive(100), CRS)[:-1], "6799 bytes .* 100 records of 64 bytes, 6800 .* cut off"),
+        (pof_bytes(drive(100), CRS)[:-1], "6799 bytes.*100 records of 64 bytes, 6800"),
         (pof_bytes(drive(100), CRS) + b"\0", "6801 bytes .* may have another layout"),
         (pof_bytes(drive(100), CRS)[:100], "not a POF of RIEGL .*100 bytes.* truncated"),
         (bytes(1000), "not a POF of RIEGL"),
@@ -116,7 +116,7 @@ def test_a_pof_takes_no_conventions_and_needs_a_crs(tmp_path):
     "What is known need not be said; a POFX has no public layout"
     path = put(tmp_path / "a.pof", pof_bytes(drive(100), CRS))
     section = TrajectorySection(file="", roll="right side up")
-    with pytest.raises(ValueError, match=r"is a POF, .* remove roll from \[trajectory\]"):
+    with pytest.raises(ValueError, match=r"is a POF.*remove roll from \[trajectory\]"):
         read_trajectory_file(path, CRS, None, section)
     with pytest.raises(ValueError, match=r"a POF with latitude and longitude: set crs"):
         read_trajectory(path)

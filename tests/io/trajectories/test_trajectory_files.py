@@ -62,7 +62,7 @@ def test_an_export_of_inertial_explorer_is_read(tmp_path):
     names = f"GPSTime  Easting  Northing  H-Ell  Roll  Pitch  Heading  {SIGMAS}"
     units = "(sec)  (m)  (m)  (m)  (deg)  (deg)  (deg)  (m)  (m)  (m)  (deg)  (deg)  (deg)"
     path = explorer(tmp_path / "ie.txt", names, units, np.hstack([table, sigmas]))
-    with pytest.raises(ValueError, match=f'Inertial Explorer, .* heading = "{TRUE}" or "{GRID}"'):
+    with pytest.raises(ValueError, match=f'Inertial Explorer or .* heading = "{TRUE}" or "{GRID}"'):
         read(path)
     file = read(path, heading=TRUE)
     assert_same(file.trajectory, expected)
@@ -89,7 +89,7 @@ def test_an_export_of_pospac_is_read(tmp_path):
     )
     units = "(time in Sec, distance in Meters, orientation angles and SD in Degrees)"
     path = explorer(tmp_path / "export.txt", names, f"\n {units} \n", np.hstack(rows))
-    with pytest.raises(ValueError, match=f'POSPac, .* heading = "{TRUE}" or "{GRID}"'):
+    with pytest.raises(ValueError, match=f'POSPac.* heading = "{TRUE}" or "{GRID}"'):
         read(path)
     file = read(path, heading=TRUE)
     assert_same(file.trajectory, expected)
@@ -186,7 +186,7 @@ def test_our_own_columns_may_be_in_radians(tmp_path):
     "What is refused without angles = 'rad' is read with it, and said"
     expected = drive(100, sigmas=False)
     path = csv_of(tmp_path / "t.csv", table_of(expected, degrees=False))
-    with pytest.raises(ValueError, match=r"radians up to 1.5708 are expected"):
+    with pytest.raises(ValueError, match=r"seem to be in radians"):
         read(path)
     file = read(path, angles="rad")
     assert_same(file.trajectory, expected)
@@ -222,7 +222,7 @@ def test_a_column_in_utc_is_named_with_the_seconds_that_it_needs(tmp_path):
     for name, is_utc in (("UTC", True), ("Stempel", False)):
         path = tmp_path / f"{name}.csv"
         path.write_text(text.replace("gps_time", name))
-        with pytest.raises(ValueError, match=f"as columns.gps_time = '{name}'") as error:
+        with pytest.raises(ValueError, match=f"columns.gps_time = '{name}'") as error:
             read(path)
         assert ("UTC also need trajectory.time_constant: 18 s" in str(error.value)) is is_utc
 
@@ -292,7 +292,7 @@ def test_an_sbet_is_known_under_any_name(tmp_path):
         file = read(written(tmp_path / name, sbet_records()), "EPSG:32611")
         assert file.is_sbet and file.layout is None
         assert_same(file.trajectory, expected)
-    with pytest.raises(ValueError, match=r"is an SBET, .* remove angles from \[trajectory\]"):
+    with pytest.raises(ValueError, match=r"is an SBET.*remove angles from \[trajectory\]"):
         read(tmp_path / "export.bin", angles="rad")
 
 

@@ -150,9 +150,9 @@ def test_bad_epochs_are_refused(tmp_path, change, message):
         ("\n\n", "is empty"),
         (HEADER + "\n", "header but no epochs"),
         (HEADER.replace("heading", "yaw") + "\n1,2,3,4,5,6,7\n", "no column heading; it has"),
-        (HEADER.replace(",", ";") + "\n1;2;3\n", "Line 2 .* 3 columns where 7 belong"),
+        (HEADER.replace(",", ";") + "\n1;2;3\n", "Line 2.*3 columns where 7"),
         (HEADER + ",height\n1,2,3,4,5,6,7,8\n", "column height 2 times"),
-        (HEADER + "\n1,2,3,4,5,6,7\n2,2,3,4\n", "Line 3 .* 4 columns .* cut off"),
+        (HEADER + "\n1,2,3,4,5,6,7\n2,2,3,4\n", "Line 3.*4 columns"),
         (HEADER + "\n1,2,3,4,5,6,7\n2,2,x,4,5,6,7\n", "Line 3 .*'x' where a number is expected"),
         (HEADER + "\n1,2,3,4,5,6,7\n2,2,,4,5,6,7\n", "Line 3 .*'' where a number is expected"),
         (
@@ -178,7 +178,7 @@ def test_binary_under_a_csv_name_is_refused(tmp_path):
 def test_radians_where_degrees_belong_are_refused(tmp_path):
     "A heading that fits the course as radians, and not as degrees, is in radians"
     path = csv_of(tmp_path / "t.csv", table_of(drive(), degrees=False))
-    with pytest.raises(ValueError, match=r"radians up to 1.5708 are expected"):
+    with pytest.raises(ValueError, match=r"seem to be in radians"):
         read_trajectory(path)
 
 
@@ -203,7 +203,7 @@ def test_milliseconds_are_no_seconds(tmp_path):
     table = table_of(drive(1000, sigmas=False))
     table[:, 0] *= 1e3
     table[500:, 0] += 1e6  # as of a drive of 18 minutes
-    with pytest.raises(ValueError, match=r"lasts 12\.2 days, .* 0\.009 m/s: .*milli.*Give seconds"):
+    with pytest.raises(ValueError, match=r"lasts 12\.2 days.*0\.009 m/s:.*Give seconds"):
         read_trajectory(csv_of(tmp_path / "t.csv", table))
 
 
@@ -326,7 +326,7 @@ def test_sbet_datum_is_the_one_of_the_crs(tmp_path):
         (None, "set crs in survey.toml"),
         ("EPSG:99999", "'EPSG:99999' is unknown"),
         ("EPSG:4326", "projected CRS is needed"),
-        ("EPSG:2227", "US survey foot, not in metres"),
+        ("EPSG:2227", "US survey foot, not in"),
         ("EPSG:2048", "axes must point east and north"),
         ("EPSG:32733+5715", "has the axes east, north, down; axes must .* up if there is a height"),
     ],
