@@ -160,7 +160,7 @@ def test_a_folder_with_other_things_is_refused(store):
     out = as_path("s3://results/other")
     with pytest.raises(ValueError, match=r"1 entry.*\(first: project\.json\)"):
         check_store_output(out, [], overwrite=False)
-    with pytest.raises(ValueError, match=r"holds the input a\.laz, which must stay"):
+    with pytest.raises(ValueError, match=r"the input a\.laz, which must"):
         check_store_output(out, [out / "a.laz"], overwrite=True)
     with pytest.raises(ValueError, match=r"holds the input first/a\.laz, which must stay"):
         check_store_output(out, [out / "first" / "a.laz"], True, ["first"])

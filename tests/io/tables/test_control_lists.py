@@ -270,7 +270,7 @@ def test_a_workbook_is_read_from_the_sheet_that_holds_the_table(drive, tmp_path)
     assert points.layout.endswith("role control, except check for P*.")
     book.copy_worksheet(book.active)
     book.save(tmp_path / "list.xlsx")
-    with pytest.raises(ValueError, match=r"a table in 2 sheets \(Sheet, Sheet Copy\)"):
+    with pytest.raises(ValueError, match=r"in 2 sheets \(Sheet, Sheet Copy\)"):
         read_control(tmp_path / "list.xlsx", section, drive)
     (tmp_path / "list.xlsx").write_text("no zip")
     with pytest.raises(ValueError, match="not an Excel workbook"):

@@ -120,7 +120,7 @@ def test_a_pof_takes_no_conventions_and_needs_a_crs(tmp_path):
         read_trajectory_file(path, CRS, None, section)
     with pytest.raises(ValueError, match=r"a POF with latitude and longitude: set crs"):
         read_trajectory(path)
-    with pytest.raises(ValueError, match="POFX of RIEGL, whose layout is not public: export it"):
+    with pytest.raises(ValueError, match="POFX of RIEGL, whose layout is not public"):
         read_trajectory(put(tmp_path / "a.pofx", bytes(1000)), CRS)
 
 
