@@ -805,7 +805,7 @@ def with_included(
         for row in np.flatnonzero(is_its):
             taken[int(row)] = refusal.name
         sentence = (
-            f"{refusal.name} is used because include lists it. Matching rejected it: "
+            f"{refusal.name} is used because include names it. Matching rejected it: "
             f"{refusal.reason}"
         )
         warned.append((refusal.name, sentence))

@@ -63,4 +63,4 @@ def test_what_is_neither_a_survey_nor_two_results_is_refused(pair, street, tmp_p
     assert not (tmp_path / "out").exists()
     (pair[1] / "trajectory.csv").unlink()
     ended = run(*pair)
-    assert ended.exit_code == 3 and "holds no trajectory.csv" in ended.stderr
+    assert ended.exit_code == 3 and "it has no trajectory.csv" in ended.stderr
