@@ -129,7 +129,7 @@ def test_a_table_cut_in_its_last_cell_is_told(cut, tmp_path):
     with pytest.warns(UserWarning, match=r"last line of.*trajectory\.csv has no"):
         read_trajectory(path)
     (tmp_path / "a.toml").write_text("number = 12")
-    with pytest.warns(UserWarning, match=r"last line of .*a\.toml has no end"):
+    with pytest.warns(UserWarning, match=r"last line of .*a\.toml has no"):
         read_toml(tmp_path / "a.toml", Section, "it")
 
 
