@@ -115,7 +115,7 @@ def test_what_no_judged_effect_explains_may_be_one_that_needs_a_mounting():
     first, second = advice_of(found, closure(), [], "", left_out=left_out)
     assert first == Statement("unstated mounting", values={"effects": 2})
     assert second.key == "unknown error"
-    assert "explains it." in sentence_of(found, "")
+    assert "No tested effect explains" in sentence_of(found, "")
 
 
 def test_what_chance_makes_is_not_closed():

@@ -45,14 +45,14 @@ def test_a_cause_is_located_by_what_it_acts_on():
 def test_brightness_is_stated_in_counts_where_it_matters():
     "Range walk acts on the received intensity: 10^4.239 is 17338 counts"
     said = headline(where(BRIGHT, FAST), "range_walk", "", START)
-    assert "at intensities of 17338 to 44978 (16 bits), where 10 %" in said
+    assert "at intensities of 17338 to 44978 (16 bits), with 10 %" in said
 
 
 def test_a_time_is_that_of_the_survey():
     "A passing error from 9.3 s after the start is told in gps_time"
     passing = split("time", 9.3, 40.5, share=0.89, rows=0.5)
     said = headline(where(BRIGHT, passing), "position_bump", "", START)
-    assert "between gps_time 413209.3 s and 413240.5 s, where 50 %" in said
+    assert "between gps_time 413209.3 s and 413240.5 s, with 50 %" in said
 
 
 def test_an_unknown_error_is_located_by_what_it_looks_like():

@@ -162,7 +162,7 @@ def test_a_pof_with_its_poq_is_known_by_its_ending(folder):
     started = mlscorr.init(folder)
     assert tomllib.loads(started.text)["trajectory"] == {"file": "LINE.POF", "accuracy": "LINE.POQ"}
     reason = next(role.reason for role in started.roles if role.path.name == "LINE.pofx")
-    assert "not public: export it as POF" in reason
+    assert "not public. Export it as POF" in reason
     assert any("RIEGL's POF 1.1" in note for note in started.notes)
 
 
@@ -381,14 +381,16 @@ AMBIGUOUS = {
         write("control.csv", CONTROL + control(swap=True)),
         ["Easting and northing seem to be swapped"],
     ),
-    "clouds in feet": (far, ["km from the trajectory .* beside it .* as feet", "map coordinates"]),
+    "clouds in feet": (far, ["km from the trajectory.* near it .* as feet", "map coordinates"]),
     "X and Y far away": (
         write("control.csv", "Pt,X,Y,Z\nP1,10.0,20.0,3.0\nP2,15.0,25.0,3.0\n"),
         ["neither order is", "Also needed: .*kind", "--set 'control.size = 0.6'"],
     ),
     "seconds of the day": (
         write("trajectory.csv", HEADER + trajectory(START % 86_400.0)),
-        ["^((?!--set).)*seconds of the day, add 345600 to .*instead. Nothing was written.$"],
+        [
+            "^((?!--set).)*seconds of the day, you can add 345600 to .*instead. Nothing was written.$"
+        ],
     ),
     "a workbook of another office program": (
         lambda folder: (folder / "control.csv").rename(folder / "control.ods"),
@@ -451,7 +453,7 @@ ASKED = {  # what is written, words of the question, and the keys that are open
     ),
     "angles in radians": (
         write("trajectory.csv", HEADER + trajectory(row="{:.3f},{:.4f},3374000,42,0,0,1.5708")),
-        ["seem to be radians"],
+        ["seem to be in radians"],
         ["trajectory.angles"],
     ),
     "a time by another name": (

@@ -356,7 +356,7 @@ def test_a_stop_in_a_given_path_adds_no_length(tmp_path):
         ("a.pos", "hello world\n", "not a table of time, latitude"),
         ("b.pos", "1 532000 3374000 40\n2 532000 3374000 40\n", "not latitude and longitude"),
         ("c.pos", "1 30 114 40\n1 30 114 40\n2 30 114 40\n", "must increase"),
-        ("d.pos", "1 30 114 40\n", "at least 2 epochs"),
+        ("d.pos", "1 30 114 40\n", "needs at least 2"),
         (
             "a.csv",
             "gps_time,x,y,z\n1,2,three,4\n",

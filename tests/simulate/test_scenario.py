@@ -99,9 +99,9 @@ def test_a_missing_scenario_is_named(tmp_path):
         ('[scene]\nkind = "mesh"', r'scene: kind = "mesh" needs a file'),
         ("[scanner]\nrange_noise = 1", r"scanner is a list of sections; write \[\[scanner\]\]"),
         ("scanner = []", r"scanner = \[\] .* at least 1 item"),
-        ("[pos]\noutages = [[50, 30]]", r"pos\.outages of 30 s from 50 s lies outside .* of 60 s"),
-        ("[pos]\ncanyons = [[60, 1]]", r"pos\.canyons of 1 s from 60 s lies outside"),
-        ("[drive]\nstops = [[59, 2]]", r"drive\.stops of 2 s from 59 s lies outside"),
+        ("[pos]\noutages = [[50, 30]]", r"pos\.outages of 30 s from 50 s is outside .* of 60 s"),
+        ("[pos]\ncanyons = [[60, 1]]", r"pos\.canyons of 1 s from 60 s is outside"),
+        ("[drive]\nstops = [[59, 2]]", r"drive\.stops of 2 s from 59 s is outside"),
         ("[pos]\noutages = [[5, -1]]", r"pos\.outages\.0\.1 = -1 .* greater than 0"),
         ("[[effects]]\nmagnitude = 1", r"effects\.0\.name is missing"),
         (

@@ -72,5 +72,5 @@ def test_a_sigma_of_zero_is_refused(with_surface):
     none = replace(
         g.background, position=0 * g.background.position, attitude=0 * g.background.attitude
     )
-    with pytest.raises(ValueError, match="sigma of zero"):
+    with pytest.raises(ValueError, match="a sigma is zero"):
         Observations.of(exact, none).whitener()
