@@ -388,9 +388,7 @@ AMBIGUOUS = {
     ),
     "seconds of the day": (
         write("trajectory.csv", HEADER + trajectory(START % 86_400.0)),
-        [
-            "^((?!--set).)*seconds of the day, you can add 345600 to .*instead. Nothing was written.$"
-        ],
+        ["^((?!--set).)*seconds of the day, you can add 345600 .*instead. Nothing was written.$"],
     ),
     "a workbook of another office program": (
         lambda folder: (folder / "control.csv").rename(folder / "control.ods"),

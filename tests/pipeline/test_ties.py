@@ -98,7 +98,7 @@ def test_a_tunnel_is_named_with_its_direction():
     exact /= np.linalg.norm(exact, axis=1, keepdims=True)
     (sentence,) = of_features(replace(features, direction=exact)).warnings
     assert "1.00, " in sentence.replace("-", "")
-    assert "unheld" in sentence
+    assert "unconstrained" in sentence
 
 
 def test_the_library_gives_what_the_command_gives(tmp_path):

@@ -194,7 +194,7 @@ def test_a_tunnel_names_the_direction_that_nobody_holds():
     features = street_bed.features()
     features = features[(np.abs(features.direction[:, 0]) < 0.1) & (features.kind == "plane")]
     estimate = tied_street(features)
-    (sentence,) = [text for text in estimate.warnings if "unheld" in text]
+    (sentence,) = [text for text in estimate.warnings if "unconstrained" in text]
     assert "E, N, H = 1.00" in sentence.replace("-", "")
     assert estimate.untied == ""
 
