@@ -90,8 +90,7 @@ def make_effect(name: str, **parameters: Any) -> Effect:
     TimeOffset(magnitude=0.002)
     >>> make_effect("boresight", magnitude=[200, 0, 0])
     Traceback (most recent call last):
-    ValueError: boresight of 200 deg exceeds 10 deg; a mounting is known from its drawing to a
-    degree.
+    ValueError: boresight of 200 deg exceeds 10 deg; drawings give a mounting to a degree.
     """
     kind = effect_class(name)
     known = {field.name: field for field in fields(kind)}

@@ -236,7 +236,7 @@ def _visibility(small, ratio):
     """Whether the survey can see an effect, in words.
 
     >>> _visibility(0.02, 0.4), _visibility(0.02, 2.5)
-    ('yes', 'only if 2.5 times the usual')
+    ('yes', 'only from 2.5 times the usual size')
     """
     if ratio is None:
         if known(small):

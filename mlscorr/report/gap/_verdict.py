@@ -390,8 +390,8 @@ def chance(p_value: float | None) -> str:
     p_value : float or None
 
     >>> chance(0.04976)
-    'Of 100 surveys with a POS as bad as fits this one, and nothing else wrong, 5 would look as
-    odd.'
+    'Of 100 surveys without any error and with an equally inaccurate POS, 5 would deviate as
+    much.'
     """
     if not known(p_value):
         return ""
