@@ -14,12 +14,12 @@ from mlscorr.pos import SignalParameters, drift_history, drift_signals
 from mlscorr.survey import SAME_EPOCH, Trajectory
 
 REASONS = (
-    "control points hold it",
-    "its pass has no control point",
-    "before the first control point of its pass",
-    "past the last control point of its pass",
-    "in a GNSS outage, past its last control point",
-    "control points tell less than half of the drift's variance",
+    "constrained by control points",
+    "pass without control point",
+    "before the first control point of the pass",
+    "after the last control point of the pass",
+    "in a GNSS outage, after the last control point",
+    "control points explain less than half of the variance of the drift",
 )
 HELD, NO_CONTROL, BEFORE_FIRST, PAST_LAST, IN_OUTAGE, DRIFT = range(len(REASONS))
 

@@ -218,7 +218,7 @@ def test_an_area_where_nothing_was_seen_corrects_nothing(drives):
     bare = replace(drive, features=drive.features[[]])
     ((corrected, state),) = drives_by_areas([bare], areas, 1, ORIGIN)
     assert state.state == "uncorrected" and np.abs(added(corrected)).max() < 1e-9
-    assert {stretch.why for stretch in corrected.held[1].weak} == {"its pass has no control point"}
+    assert {stretch.why for stretch in corrected.held[1].weak} == {"pass without control point"}
 
 
 def test_nothing_corrects_a_drive_elsewhere(drives):
@@ -228,7 +228,7 @@ def test_nothing_corrects_a_drive_elsewhere(drives):
     corrected, state = apart["second"]
     assert state.state == "uncorrected" and not state.tied_with
     assert np.abs(added(corrected)).max() < 1e-9
-    assert {stretch.why for stretch in corrected.held[1].weak} == {"its pass has no control point"}
+    assert {stretch.why for stretch in corrected.held[1].weak} == {"pass without control point"}
     alone = results([first])["first"][0]
     assert np.array_equal(added(apart["first"][0]), added(alone))
     assert apart["first"][1].state == "controlled"
