@@ -123,10 +123,8 @@ def _improved(before, after, kind, times, holds_everywhere):
     before.
     """
     addition = ""
-    if not holds_everywhere and kind == "check":
-        addition = ". Not every check point was found, so this may not hold for the whole cloud"
-    elif not holds_everywhere:
-        addition = ". This holds only where control points constrain the cloud"
+    if not holds_everywhere:
+        addition = ". It does not apply to the whole cloud; the items below state where"
     elif times is not None:
         addition = f" ({times:.0f} times smaller)"
     return f"{_change(before, after, kind)}{addition}."
@@ -233,7 +231,7 @@ def _moved(held, extrapolated, left):
     """Sentence on the share of corrected points, and the basis."""
     total = max(held + extrapolated + left, 1)
     sentence = (
-        f"{percent(held / total)} of the points are constrained by control, "
+        f"{percent(held / total)} of all points constrained by control, "
         f"{percent(extrapolated / total)} extrapolated, {percent(left / total)} not corrected."
     )
     if left:

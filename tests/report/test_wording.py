@@ -67,14 +67,14 @@ CATALOGUE = [
     (
         "improved",
         {**OFF, "kind": "check", "times": 9.7, "holds_everywhere": False},
-        "3D RMSE at independent check points: 77.5 cm before, 8.0 cm after the correction. Not "
-        "every check point was found, so this may not hold for the whole cloud.",
+        "3D RMSE at independent check points: 77.5 cm before, 8.0 cm after the correction. It "
+        "does not apply to the whole cloud; the items below state where.",
     ),
     (
         "improved",
         {**OFF, "kind": "leave-one-out", "times": 9.7, "holds_everywhere": False},
         "3D RMSE at control points (leave-one-out): 77.5 cm before, 8.0 cm after the "
-        "correction. This holds only where control points constrain the cloud.",
+        "correction. It does not apply to the whole cloud; the items below state where.",
     ),
     (
         "improved",
@@ -120,13 +120,13 @@ CATALOGUE = [
     (
         "points",
         {"held": 900, "extrapolated": 93, "left": 7},
-        "90 % of the points are constrained by control, 9 % extrapolated, 0.7 % not corrected. "
+        "90 % of all points constrained by control, 9 % extrapolated, 0.7 % not corrected. "
         "7 of 1000 points were measured outside the trajectory or in its gaps.",
     ),
     (
         "points",
         {"held": 1000, "extrapolated": 0, "left": 0},
-        "100 % of the points are constrained by control, 0 % extrapolated, 0 % not corrected.",
+        "100 % of all points constrained by control, 0 % extrapolated, 0 % not corrected.",
     ),
     (
         "no check point",
