@@ -29,12 +29,14 @@ from mlscorr.estimate.mounting import prior_sigma
 from mlscorr.estimate.outages import with_drift_history
 from mlscorr.estimate.posterior import (
     Objective,
+    choose_parameters,
+    drifting_prior,
     most_probable,
     position_prior,
 )
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.support import Support, find_support
-from mlscorr.estimate.target_tests import Screening, TargetTest, screen
+from mlscorr.estimate.target_tests import Screening, TargetTest, all_tests, screen
 from mlscorr.estimate.tied import TieResiduals, robust_ties, screen_with_ties
 from mlscorr.pos import SignalParameters
 from mlscorr.survey import (
@@ -216,7 +218,8 @@ def _judged(trajectory, matched, pos, order, kept_in):
     drifts.
     """
     drifts = ()
-    while True:
+    new = None
+    while new is None or new:
         drifting = with_drifts(trajectory, drifts)
         adjustment = position_adjustment(drifting, matched, pos, order, position_prior)
         adjustment = replace(adjustment, order=affordable_order(order, adjustment))
@@ -225,9 +228,14 @@ def _judged(trajectory, matched, pos, order, kept_in):
         judgement = judge(adjustment, screening, len(drifts))
         known = {name for drift in drifts for name in drift.names}
         new = [drift for drift in judgement.drifts if not known.issuperset(drift.names)]
-        if not new:
-            return adjustment, screening, judgement.probability, drifts
+        if not drifts:
+            plain = adjustment
         drifts = (*drifts, *new)
+    if len(drifts) > 1 and not screening.outliers:  # it may drift unstated between the points, too
+        adjustment = replace(plain, prior=drifting_prior)
+        posterior = choose_parameters(adjustment)
+        screening = Screening(posterior, (), tuple(all_tests(adjustment, posterior)), ())
+    return adjustment, screening, judgement.probability, drifts
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
