@@ -232,6 +232,8 @@ def _groups(adjustment, refused):
 def _burst(trajectory, time, names, start, end):
     """The UnstatedDrift of a run of observations, of unit size."""
     begin, finish = trajectory.passes[trajectory.segment(time[start])]
+    # a target observed in the first or last epoch of a pass is inside, too
+    begin, finish = np.nextafter(begin, -np.inf), np.nextafter(finish, np.inf)
     beside = POS_SETTINGS.sigma_interval  # observations within it share their drift
     first = time[time < time[start] - beside].max(initial=begin)
     last = time[time > time[end - 1] + beside].min(initial=finish)

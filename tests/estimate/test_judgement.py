@@ -114,3 +114,14 @@ def test_a_target_that_deviates_alike_in_two_passes_is_wrong():
         adjustment = position_adjustment(case.recorded, matched, Pos(), 0, position_prior)
         odds.append(odds_of(adjustment, ["T02"]))
     assert odds[0] < odds[1] - STRONG
+
+
+@pytest.mark.parametrize("end", [0, -1])
+def test_a_target_at_an_end_of_the_pass_is_judged_as_any_other(end):
+    "A lone deviation in the first or last epoch of the recording is a blunder rather, too"
+    times = even(20)
+    times[end] = EPOCHS[end]
+    case, _ = bumped_case(0, times)
+    number = range(20)[end]
+    case.spoil(number, [0.4, -0.4, 0.4])
+    assert -STRONG < odds_of(case.adjustment(), [case.control.name[number]]) < 0.0
