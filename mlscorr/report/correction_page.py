@@ -167,7 +167,7 @@ def weak_places(correction: Correction, report: CorrectionReport) -> list[list[f
     correction : Correction
     report : CorrectionReport
     """
-    middles = [(stretch.start + stretch.end) / 2 for stretch in report.support.weak]
+    middles = [(interval.start + interval.end) / 2 for interval in report.support.weak]
     return _places(correction, middles)
 
 
@@ -346,7 +346,7 @@ def coverage(correction: Correction, report: CorrectionReport) -> list[tuple[str
     metres = number(report.metres_extrapolated, 0)
     outside = covered.points_outside_trajectory
     beyond = covered.points_outside_control
-    unheld = covered.points_extrapolated
+    extrapolated = covered.points_extrapolated
     gaps = correction.recorded.gaps
     noise = covered.points_noise
     values = {
@@ -355,7 +355,9 @@ def coverage(correction: Correction, report: CorrectionReport) -> list[tuple[str
         "Longest time without control inside a pass": f"{number(covered.longest_gap_s)} s",
         "Points outside the trajectory (left as they were)": points(outside),
         "Points before the first or past the last control point": points(beyond),
-        "Points whose correction is extrapolated: no control point holds them": points(unheld),
+        "Points whose correction is extrapolated: no control point holds them": points(
+            extrapolated
+        ),
         "Points flagged as noise (not measured, corrected like all others)": points(noise),
         "Time and way whose correction is extrapolated": f"{seconds} s, {metres} m",
         "Gaps of the trajectory (nothing is interpolated across them)": len(gaps),

@@ -81,9 +81,9 @@ def weak_lines(correction: Correction, report: CorrectionReport) -> list[np.ndar
     """
     corrected = correction.corrected
     lines = []
-    for stretch in report.support.weak:
+    for interval in report.support.weak:
         time = corrected.gps_time
-        inside = np.flatnonzero((time >= stretch.start) & (time <= stretch.end))
+        inside = np.flatnonzero((time >= interval.start) & (time <= interval.end))
         if len(inside):
             step = max(1, len(inside) // SETTINGS.curve_epochs)
             lines.append(corrected.position[inside[::step], :2])

@@ -159,7 +159,7 @@ def test_a_mounting_is_weakly_known():
     adjustment = mounting_adjustment(position, case.matched, [MOUNTING], corrected, WEAK)
     assert [factor.kind for factor in adjustment.factors] == [TARGET, PRIOR]
     expected = np.column_stack([np.eye(6), -corrected]) / WEAK[:, None]
-    np.testing.assert_allclose(adjustment.believed(None), expected, rtol=1e-12)
+    np.testing.assert_allclose(adjustment.prior_rows(None), expected, rtol=1e-12)
     assert len(adjustment.solve(None).misclosure) == 18
     assert not adjustment.pose_design(case.recorded.gps_time[:4]).any()
 
@@ -240,7 +240,7 @@ def test_another_kind_of_control_is_solved_with_the_others(with_heights):
     assert both.rows_of("height").tolist() == list(range(size, size + 40))
     assert np.array_equal(both.rows_of(TARGET), alone.rows_of(TARGET))
     solved = both.solve(parameters)
-    expected = collocate_rows_dense(both.rows(parameters), both.believed(parameters))
+    expected = collocate_rows_dense(both.rows(parameters), both.prior_rows(parameters))
     asked = pose_rows(both, parameters, np.arange(5, len(both.trajectory), 50))
     pose, spread = solved.predict(*asked)
     dense, dense_spread = expected.predict(*asked)
@@ -271,7 +271,7 @@ def test_a_likelihood_changes_smoothly_with_any_kind_of_control(with_heights):
     near = [replace(parameters, drift_scale=(1.0 + h) * parameters.drift_scale) for h in (1e-3, 0)]
     fast = both.likelihoods(near, parameters, both.weigh(parameters))
     dense = [
-        collocate_rows_dense(both.rows(each), both.believed(each)).log_likelihood for each in near
+        collocate_rows_dense(both.rows(each), both.prior_rows(each)).log_likelihood for each in near
     ]
     assert fast[0] - fast[1] == pytest.approx(dense[0] - dense[1], rel=0.01)
 

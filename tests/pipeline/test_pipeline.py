@@ -544,7 +544,7 @@ def test_effects_of_another_simulator_are_corrected(effect):
 def test_a_drive_that_is_known_to_millimetres_is_not_called_extrapolated():
     "practice_lever_arm: 16 control points and ties hold nine tenths of it, drift or bias alike"
     support = correct_shared("practice_lever_arm").estimate.support
-    assert sum(stretch.seconds for stretch in support.weak) < 0.1 * 104.0  # s
+    assert sum(interval.seconds for interval in support.weak) < 0.1 * 104.0  # s
 
 
 @pytest.mark.long

@@ -344,16 +344,16 @@ def _accepted(evidence, score, best):
 def _facts(rows, evidence, best):
     """Properties of the survey that matter for the weight of evidence."""
     observations = evidence.observations
-    raised = observations.errors.raised >= 0
+    increased = observations.errors.increased >= 0
     is_event = best is not None and bool(effect_class(best).moment())
-    moved = np.zeros(len(raised))
+    moved = np.zeros(len(increased))
     if is_event:
         moved = (_best_columns(evidence, best)[observations.row] ** 2).sum(axis=1)
     return {
         "rough": float((rows.channel == "roughness").any()),
-        "raised": float(raised.mean()),
+        "raised": float(increased.mean()),
         "event": float(is_event),
-        "event in raised": float(moved[raised].sum() / max(moved.sum(), 1e-300)),
+        "event in raised": float(moved[increased].sum() / max(moved.sum(), 1e-300)),
         "scale": float(np.log(evidence.likely_model("none").scale)),
         "size": float(np.log(len(observations))),
         "odd": len(evidence.tail) / len(observations),

@@ -85,7 +85,7 @@ def gate(survey: Survey, gps_time: np.ndarray) -> np.ndarray:
         Units: m.
     """
     sigma = PosErrors.stated(survey.trajectory, survey.pos).at(gps_time)
-    size = SETTINGS.surface_gate_sigmas * np.linalg.norm(sigma.drift + sigma.held, axis=1)
+    size = SETTINGS.surface_gate_sigmas * np.linalg.norm(sigma.drift + sigma.known_gnss, axis=1)
     return np.clip(size, SETTINGS.least_surface_gate, SEARCH_RADIUS)
 
 

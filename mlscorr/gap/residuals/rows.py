@@ -214,7 +214,7 @@ class Background:
         Intervals in which it is assumed to be worse; see Pos.
     clock : (l,) array, optional
         Clock of the position error, which jumps where it restarts; gps_time by default. Units: s.
-    raised : (l,) int array, optional
+    increased : (l,) int array, optional
         Index of the interval with increased stated sigma, from 0; -1, the default, outside.
     """
 
@@ -225,7 +225,7 @@ class Background:
     correlation_time: float
     windows: tuple = ()
     clock: np.ndarray | None = None
-    raised: np.ndarray | None = None
+    increased: np.ndarray | None = None
 
 
 def background(rows: Rows, survey: Survey) -> Background:
@@ -251,7 +251,7 @@ def background(rows: Rows, survey: Survey) -> Background:
         survey.pos.correlation_time,
         survey.pos.windows,
         sigma.clock,
-        sigma.history.raised(gps_time),
+        sigma.history.increase(gps_time),
     )
 
 

@@ -339,8 +339,8 @@ class River:
         """Find a position on a post behind the quay's edge, on the slope, or above the steps."""
         inland = rng.uniform(*POSTS[kind])
         foot = self.place(s, inland, self.bank.height(kind, inland))
-        raised = STEPS_RAISE if kind == "steps" else 0.0
-        centre = foot + ON_POSTS.draw(half, rng, raised) * UP
+        extra_height = STEPS_RAISE if kind == "steps" else 0.0
+        centre = foot + ON_POSTS.draw(half, rng, extra_height) * UP
         lateral = float(self.shore(s) + inland)
         return TargetSpot("post", s, lateral, centre, -self._facing(s), UP, foot[2])
 
