@@ -29,6 +29,11 @@ SCRIPTS = {  # picture: (script, whether it is drawn without being named)
     "calibrate_mounting": ("benchmarks/pictures/calibrate_mounting.py", True),
     "diagnose": ("benchmarks/pictures/diagnose_gap.py", True),
     "decision_costs": ("benchmarks/decision_costs.py", False),
+    "control_sigma": ("benchmarks/pictures/control_sigma.py", True),
+    "ties_gain": ("benchmarks/pictures/ties_gain.py", True),
+    "plan": ("benchmarks/pictures/plan.py", True),
+    "targets": ("benchmarks/pictures/targets.py", True),
+    "certificate": ("benchmarks/pictures/certificate.py", True),
     "pos_error": ("benchmarks/pictures/pos_error.py", False),
     "paper_car": ("benchmarks/paper/car.py", False),
     "paper_boat": ("benchmarks/paper/boat.py", False),
@@ -36,6 +41,12 @@ SCRIPTS = {  # picture: (script, whether it is drawn without being named)
     "real_pos_gap": ("benchmarks/real/pos_gap.py", False),
     "two_pass_gap": ("benchmarks/real/two_pass_gap.py", False),
 }
+DIAGRAMS = (  # drawn by one script, which the name of the picture tells what to draw
+    *("commands", "folder", "install", "workflow", "stages", "frames", "north", "two_scanners"),
+    *("overlap", "city", "cluster", "object_store", "control_list", "clouds", "ground_scale"),
+    *("own_simulator", "blind", "atomic"),
+)
+SCRIPTS |= dict.fromkeys(DIAGRAMS, ("benchmarks/pictures/diagrams.py", True))
 # of 255, of the pixels: see above
 CHANNEL = 16
 SHARE = 0.01

@@ -28,10 +28,10 @@ SCENARIOS = {
     "motorway": "a fast drive under open sky",
 }
 CORRECTED = {
-    "wuhan_drive": "a real drive with its real POS error (two GNSS outages of 60 s, up to 2.9 m) "
-    "over a simulated street, 16 control + 8 check points",
-    "practice_none": "a good survey with a quiet POS, made by another simulator",
-    "practice_lever_arm": "a survey with a wrong lever arm, made by another simulator: corrected",
+    "wuhan_drive": "real drive with real POS error (two GNSS outages of 60 s, up to 2.9 m), "
+    "simulated street",
+    "practice_none": "good survey with a quiet POS, from another simulator",
+    "practice_lever_arm": "survey with a wrong lever arm, from another simulator: corrected",
 }
 
 
@@ -96,14 +96,14 @@ def results(_):
     compared = compare(read_survey(surveys / "wuhan_drive")).document
     after = {row["name"]: row["check"]["rmse"] for row in compared["methods"]}
     command = "`mlscorr compare wuhan_drive -o OUT`"
-    best = "the same by the best move of the whole cloud as one (affine)"
+    best = "the same, corrected by one affine transformation"
     rows.insert(1, [best, "", axes(after["affine"]), command])
-    rows.insert(2, ["the same by polynomials of order 4", "", axes(after["ls-4"]), ""])
+    rows.insert(2, ["the same, corrected by polynomials of order 4", "", axes(after["ls-4"]), ""])
     with tempfile.TemporaryDirectory() as folder:
         calibrated = calibrate(read_survey(surveys / "practice_lever_arm"))
         check = calibrated.write(Path(folder) / "calibrated")["lsc"]["check"]
     command = "`mlscorr calibrate practice_lever_arm -o OUT`"
-    rows.append(["the same: calibrated", "", axes(check["after"]["rmse"], 3), command])
+    rows.append(["the same, calibrated", "", axes(check["after"]["rmse"], 3), command])
     drives = np.array([drive(seed)[:6] for seed in range(20)])
     for title, function, command in (
         ("20 simulated drives, outage of 25 s, median", np.median, "`python benchmarks/seeds.py`"),

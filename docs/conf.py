@@ -7,10 +7,12 @@ that of the links in docs/index.md; formulas become MathML, which needs no net a
 import logging
 import os
 import re
+import runpy
 import shutil
 from importlib import metadata
 from pathlib import Path
 
+import typer.main
 from docutils import nodes
 from docutils.utils.math.latex2mathml import tex2mathml
 from sphinx_gallery.scrapers import figure_rst
@@ -56,8 +58,13 @@ PROFILE.mkdir(parents=True, exist_ok=True)
 (PROFILE / "ipython_kernel_config.py").write_text("c.IPKernelApp.log_level = 40\n")
 os.environ["IPYTHONDIR"] = str(PROFILE.parent)
 logging.getLogger("traitlets").setLevel(logging.ERROR)  # dash, which open3d loads, is not there
+logging.getLogger("mlscorr").propagate = False  # the log of an example goes into its log.txt alone
 
 ROOT = Path(__file__).resolve().parents[1]
+
+# docs/architecture.md shows the imports as they are now
+ROOMS = runpy.run_path(str(ROOT / "benchmarks" / "pictures" / "rooms.py"))
+ROOMS["draw"](ROOT / "assets" / "architecture.svg")
 
 
 def start_example(gallery_conf, name):
@@ -125,6 +132,34 @@ def add_contents(app, docname, source):
         source[0] += "\n".join(lines)
 
 
+def options_of(name, command):
+    """Lines of Markdown: the options of a command, and of those within it."""
+    lines = [f"### mlscorr {name}", "", "| option | meaning |", "|---|---|"]
+    for one in command.params:
+        if one.param_type_name == "option":
+            names = ", ".join(f"`{option}`" for option in (*one.opts, *one.secondary_opts))
+            meaning = " ".join((one.help or "").split()).replace("|", "\\|")
+            lines.append(f"| {names} | {meaning} |")
+    inner = getattr(command, "commands", {})
+    if inner:
+        lines = []
+    for inner_name, one in inner.items():
+        lines += ["", *options_of(f"{name} {inner_name}", one)]
+    return lines
+
+
+def add_options(app, docname, source):
+    """Put the options of all commands, as --help has them, into their page."""
+    if docname != "docs/options":
+        return
+    from mlscorr.cli import app as commands
+
+    lines = ["## All options", ""]
+    for name, command in typer.main.get_command(commands).commands.items():
+        lines += [*options_of(name, command), ""]
+    source[0] = source[0].replace("<!-- options -->", "\n".join(lines))
+
+
 def lead_to_gallery(app, docname, source):
     """Let links to the examples lead to the pages that the build makes of them."""
     source[0] = source[0].replace("examples/README.rst", "build/gallery/index.rst")
@@ -156,6 +191,7 @@ def setup(app):
     """Connect the above."""
     app.connect("source-read", lead_to_gallery, priority=400)  # before the contents
     app.connect("source-read", add_contents)
+    app.connect("source-read", add_options)
     app.connect("autodoc-process-docstring", head_examples, priority=1)  # before napoleon
     app.connect("build-finished", lead_to_index)
     app.add_html_math_renderer("mathml", (write_math, None), (write_math, None))

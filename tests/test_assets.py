@@ -45,6 +45,20 @@ def test_a_moved_curve_is_a_change_and_a_shade_is_none(tmp_path):
     assert share["cut"] == 1.0
 
 
+def test_the_drawing_of_the_rooms_has_every_room(tmp_path):
+    "Each room of the plan once, and only imports from a floor to a lower one"
+    rooms = runpy.run_path(str(PICTURES / "rooms.py"))
+    rooms["draw"](tmp_path / "rooms.svg")
+    text = (tmp_path / "rooms.svg").read_text()
+    plan = rooms["floors"]()
+    names = [room for floor in plan for room in floor]
+    assert all(text.count(f">{room}<") == 1 for room in names)
+    height = {room: number for number, floor in enumerate(plan) for room in floor}
+    lines = list(rooms["imports"](names))
+    assert len(lines) >= len(names) - 2
+    assert all(height[room] > height[other] for room, other in lines)
+
+
 @pytest.mark.long
 def test_correct_a_survey_makes_its_picture(street, tmp_path):
     "The picture of the README shows a survey that the script is given, and it prints its RMSE"

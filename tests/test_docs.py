@@ -8,6 +8,7 @@ from pkgutil import resolve_name
 from typing import get_args
 
 import pytest
+import readability
 from pydantic import BaseModel
 from readme_tables import PAGES
 from typer.main import get_command
@@ -22,9 +23,13 @@ from mlscorr.simulate.simulator_file import SimulatorFile
 from tests.beds.places import ROOT
 
 NAMES = [page.name for page in PAGES]
+FIVE_MINUTES = 1000  # words of prose
+CONTRIBUTING = ROOT / "CONTRIBUTING.md"
+BENCHMARK_OPTIONS = {"--seeds", "--passes", "--without-paint", "--words"}
+PRINTED_PATH = re.compile(r"`((?:mlscorr|tests|benchmarks|docs)/[\w/.-]*)`")
 
 
-@pytest.fixture(params=PAGES, ids=NAMES)
+@pytest.fixture(params=[*PAGES, CONTRIBUTING], ids=[*NAMES, CONTRIBUTING.name])
 def page(request):
     return request.param
 
@@ -55,15 +60,74 @@ def test_commands_and_scripts_exist(page):
         assert (ROOT / script).is_file(), script
 
 
+def options_of(command, words):
+    "Names of the options of a command, or of the one within it that the words name"
+    inner = getattr(command, "commands", {})
+    if words and words[0] in inner:
+        return options_of(inner[words[0]], words[1:])
+    return {name for one in command.params for name in (*one.opts, *one.secondary_opts)}
+
+
+def test_every_option_of_a_command_exists(page):
+    "In lines of commands, continued or not, and in sentences and tables"
+    text = page.read_text().replace("\\\n", " ")
+    app_command = get_command(app)
+    for line in re.findall(r"(?m)^mlscorr ([^#\n]+)", text):
+        known = options_of(app_command, line.split()) | {"--help"}
+        used = re.findall(r"(?<!\S)(--?[a-z][\w-]*)", re.sub(r"\"[^\"]*\"|'[^']*'", "", line))
+        assert set(used) <= known, line
+    every = {"--version", "--install-completion", "--help"}
+    for command in app_command.commands.values():
+        for one in (command, *getattr(command, "commands", {}).values()):
+            every |= options_of(one, [])
+    others = ("CONTRIBUTING.md", "cluster.md")  # options of dask and of benchmarks
+    inline = re.findall(r"`(--[a-z][a-z-]+)", text)
+    assert page.name in others or not {*inline} - every - BENCHMARK_OPTIONS
+
+
 def test_every_survey_toml_can_be_read(page):
-    "The sections that the pages show are those that a survey has, or a simulator"
+    "The sections that the pages show are those of a survey, a project, a scenario or a simulator"
     for block in re.findall(r"```toml\n(.*?)```", page.read_text(), flags=re.S):
         document = tomllib.loads(block)
-        if isinstance(document.get("drive"), list):
+        model = SimulatorFile
+        if "cloud" in document:
+            model = SurveyFile
+        elif isinstance(document.get("drive"), list):
             model = ProjectFile
-        else:
-            model = SimulatorFile
-        (SurveyFile if "cloud" in document else model).model_validate(document)
+        elif "drive" in document:
+            model = Scenario
+        model.model_validate(document)
+
+
+def test_paths_of_the_project_are_there(page):
+    "Files that a page names are in the project"
+    for name in PRINTED_PATH.findall(page.read_text()):
+        assert (ROOT / name).exists(), name
+
+
+@pytest.mark.parametrize("path", readability.PAGES, ids=lambda path: path.name)
+def test_a_page_reads_well(path):
+    "No sentence over 35 words, a Flesch reading ease of 45 or more"
+    found = readability.reading(readability.text_of(path))
+    assert len(readability.words_of(found.longest)) <= readability.LONGEST, found.longest
+    assert found.ease >= readability.EASE
+    assert found.words <= FIVE_MINUTES
+
+
+@pytest.mark.parametrize("path", PAGES, ids=NAMES)
+def test_a_page_opens_with_a_picture(path):
+    "Above the first heading below the title"
+    assert "![" in path.read_text().split("\n## ")[0]
+
+
+def test_the_reading_ease_is_that_of_flesch():
+    "The cat sat on the mat: six words of a syllable, 116 as published; code and tables count not"
+    easy = readability.reading("# Title\n\nThe cat sat on the mat.\n\n| a | table |\n")
+    assert easy.words == 6
+    assert easy.ease == pytest.approx(116.1, abs=0.1)
+    hard = readability.reading("Collocation estimates parameters, `--order` included.\n")
+    assert hard.ease < 0
+    assert readability.reading("It is held.\n").private[0][:2] == (1, "held")
 
 
 def test_the_readme_is_short_and_leads_to_every_page():
@@ -81,7 +145,7 @@ def test_names_of_the_package_are_there(page):
         resolve_name(name)
 
 
-@pytest.mark.parametrize("name", ["tutorial", "own-simulator"])
+@pytest.mark.parametrize("name", ["tutorial", "own-effect", "targets", "api"])
 def test_python_of_the_manual_runs(name, street, tmp_path, monkeypatch):
     "The blocks of a page run one after the other beside a survey.toml"
     monkeypatch.chdir(shutil.copytree(street, tmp_path / "street"))
@@ -129,12 +193,11 @@ def test_no_property_of_the_api_page_opens_with_a_colon():
 
 
 def test_every_effect_is_listed_with_its_unit_and_usual_size():
-    "docs/effects.md says what the library does"
+    "docs/effects.md lists what the library has; its sentences are its own"
     text = (ROOT / "docs" / "effects.md").read_text()
     for kind in known_effects():
         (row,) = re.findall(rf"(?m)^\| `{kind.name}` \| (.*) \|$", text)
         magnitude = kind.quantities()["magnitude"]
-        assert row.startswith(kind.meaning)
         assert f"`magnitude` ({magnitude.unit})" in row and row.endswith(f"{magnitude.typical:g}")
         assert all(f"`{name}`" in row for name in kind.circumstances())
 

@@ -80,7 +80,7 @@ def _fit(trajectory, matched, curve: Curve, cut):
 def _by_epoch(matched):
     """Control epochs (k,), and the mean misclosure (k, 3) of the targets observed at each."""
     if len(matched) == 0:
-        raise Undetermined("There is no control point in the cloud to interpolate between.")
+        raise Undetermined("No control point was found in the cloud to interpolate between.")
     starts = control_epochs(matched.gps_time)
     number = np.searchsorted(starts, matched.gps_time, side="right") - 1
     count = np.bincount(number)
@@ -126,8 +126,9 @@ def fit_gaussian_process(trajectory: Trajectory, matched: Matched) -> Correction
     epochs, misclosure = _by_epoch(matched)
     if len(epochs) < 3:
         raise Undetermined(
-            "Scale, correlation time and noise of a Gaussian process need control points at 3 "
-            f"epochs at least; here are {len(epochs)}, {SAME_EPOCH:.0f} s or more apart."
+            "A Gaussian process needs control points at 3 or more epochs to estimate scale, "
+            f"correlation time and noise; there are {len(epochs)}, {SAME_EPOCH:.0f} s or more "
+            "apart."
         )
     span = float(np.ptp(epochs))
     first = epochs[0]
@@ -241,7 +242,6 @@ def _require_epochs(gps_time, order):
     count = len(control_epochs(gps_time))
     if count <= order + 1:
         raise Undetermined(
-            f"A polynomial of order {order} needs control points at {order + 2} epochs at least "
-            f"(section 2.4.2 of the paper); here are {count}, {SAME_EPOCH:.0f} s or more "
-            "apart."
+            f"A polynomial of order {order} needs control points at {order + 2} or more epochs "
+            f"(section 2.4.2 of the paper); there are {count}, {SAME_EPOCH:.0f} s or more apart."
         )

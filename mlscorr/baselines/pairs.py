@@ -47,7 +47,7 @@ class CentredPairs:
         """
         if len(matched) == 0:
             raise Undetermined(
-                "A transformation needs control points that were found in the cloud; there is none."
+                "No control point was found in the cloud; a transformation needs some."
             )
         observations = matched.observations
         variance = np.mean(matched.variance, axis=1)
@@ -103,8 +103,8 @@ class CentredPairs:
         least = max(SETTINGS.clear_spread * sigma, digits)
         if spread < least:
             raise Undetermined(
-                f"{parameters} are not determined: the {self.targets} control points lie on one "
-                f"{shape}, from which they differ by {spread:.4f} m (RMS); {least:.4f} m would be "
+                f"{parameters} are not determined: the {self.targets} control points deviate "
+                f"from one {shape} by only {spread:.4f} m (RMS). At least {least:.4f} m is "
                 f"needed, {SETTINGS.clear_spread:.0f} times the sigma of a misclosure."
             )
 

@@ -118,14 +118,14 @@ def _warn(registration):
     fitness = registration.fitness
     if fitness < SETTINGS.poor_fitness:
         warnings.warn(
-            f"ICP ({variant}) brings only {percent(fitness)} of the targets' points within "
-            f"{SETTINGS.inlier} m of the surveyed surfaces (inlier RMSE "
-            f"{registration.inlier_rmse:.4f} m): no rigid motion fits them.",
+            f"No rigid motion fits: ICP ({variant}) brings only {percent(fitness)} of the "
+            f"targets' points within {SETTINGS.inlier} m of the surveyed surfaces (inlier RMSE "
+            f"{registration.inlier_rmse:.4f} m).",
             stacklevel=3,
         )
     if registration.control_after > registration.control_before + SETTINGS.worsening:
         warnings.warn(
-            f"ICP ({variant}) moved the cloud away from control: 3D RMSE "
+            f"ICP ({variant}) made the fit to the control worse: 3D RMSE "
             f"{registration.control_before:.4f} m before, {registration.control_after:.4f} m "
             f"after (fitness {fitness:.2f}, inlier RMSE {registration.inlier_rmse:.4f} m).",
             stacklevel=3,

@@ -55,8 +55,8 @@ def make_case(
                 raise
     else:
         raise ValueError(
-            f"None of {ATTEMPTS} surveys shows a {case.kind} case of {case.mdb:.1f} times "
-            f"the minimal detectable bias ({', '.join(case.names)} first): choose another seed."
+            f"None of {ATTEMPTS} surveys contains a {case.kind} case of {case.mdb:.1f} times the "
+            f"minimal detectable bias ({', '.join(case.names)} first). Choose another seed."
         )
     for name in TRUTH:
         (folder / name).unlink()

@@ -43,7 +43,7 @@ def apply(
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ) -> None:
-    """Take a clock offset, datum or mounting that was found out of clouds and trajectory."""
+    """Remove a clock offset, datum or mounting error that was found from clouds and trajectory."""
     out = chosen_out(out, survey, "apply")
     with exit_code(Exit.USAGE), progress_bars():
         import numpy as np
@@ -59,8 +59,8 @@ def apply(
     for effect in applied.effects:
         sizes = ", ".join(f"{size:.4g}" for size in np.atleast_1d(effect.magnitude))
         unit = effect.quantities()["magnitude"].unit
-        results.append(("Taken out", f"{effect.name} {sizes} {unit}"))
-    results.append(("Survey", f"{out / 'survey.toml'}, with the clouds beside it"))
+        results.append(("Removed", f"{effect.name} {sizes} {unit}"))
+    results.append(("Survey", f"{out / 'survey.toml'} and its clouds"))
     say_results(results)
     if any(file["untouched"] for file in content["files"]):
         raise typer.Exit(Exit.IN_PART)

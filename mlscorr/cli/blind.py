@@ -10,10 +10,10 @@ from mlscorr.cli.terminal import Effects, Exit, Json, Quiet, Verbose, as_epilog,
 from mlscorr.cli.work import print_json
 
 Check = Annotated[Path, typer.Argument(metavar="OUT", help="Folder of the blind check.")]
-Workers = Annotated[int, typer.Option(min=1, help="Processes side by side.")]
+Workers = Annotated[int, typer.Option(min=1, help="Number of parallel processes.")]
 
 blind = typer.Typer(
-    help="Check the diagnosis on simulated surveys whose labels are sealed.", no_args_is_help=True
+    help="Check the diagnosis on simulated surveys with sealed labels.", no_args_is_help=True
 )
 
 
@@ -24,19 +24,21 @@ def make(
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same surveys.")] = 1,
     mechanisms: Annotated[
         Path | None,
-        typer.Option(help="Python file with mechanisms of your own, instead of those that grade."),
+        typer.Option(
+            help="Python file with your own mechanisms, used instead of the built-in ones."
+        ),
     ] = None,
     effects: Effects = None,
     workers: Workers = 2,
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ) -> None:
-    """Make surveys, seal their labels, and put those into key.json. Goes on where it stopped."""
+    """Create surveys and store their sealed labels in key.json. Continues an interrupted run."""
     with exit_code(Exit.BAD_DATA), progress_bars() as progress:
         from mlscorr.pipeline import make_blind
 
         made = make_blind(out, cases, seed, workers, mechanisms, progress, effects)
-    say(f"{made} surveys are in {out / 'cases'}, their seals in {out / 'seals.json'}.")
+    say(f"{made} surveys written to {out / 'cases'}, their seals to {out / 'seals.json'}.")
 
 
 @blind.command(epilog=as_epilog(["mlscorr blind run blind --workers 2"]))
@@ -47,12 +49,12 @@ def run(
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ) -> None:
-    """Diagnose each survey that has no answer yet, from its folder alone."""
+    """Diagnose each survey without an answer, from its folder alone."""
     with exit_code(Exit.BAD_DATA), progress_bars() as progress:
         from mlscorr.pipeline import run_blind
 
         answered, failed = run_blind(out, workers, progress, effects)
-    say(f"{answered} surveys are diagnosed ({failed} could not be): {out / 'answers'}.")
+    say(f"{answered} surveys diagnosed ({failed} failed): {out / 'answers'}.")
 
 
 @blind.command(
@@ -78,7 +80,7 @@ def score_(
     for case in score["wrong"]:
         size = f" of {case['mdb']:.1f} MDB" if case["mdb"] else ""
         say(
-            f"{case['case']} {case['kind']}: {case['truth']}{size}, said {case['said']} "
+            f"{case['case']} {case['kind']}: {case['truth']}{size}, diagnosed as {case['said']} "
             f"({case['probability']:.2f}){': ' + case['lead'] if case['lead'] else ''}"
         )
     say(f"Score:  {out / 'score.json'}")

@@ -20,11 +20,12 @@ def calibrate(
     survey: SurveyArgument,
     out: Out = None,
     with_drift: Annotated[
-        bool, typer.Option("--with-drift", help="Estimate the POS error too; write trajectory.csv.")
+        bool,
+        typer.Option("--with-drift", help="Estimate the POS error as well; write trajectory.csv."),
     ] = False,
     no_ties: terminal.NoTies = False,
     clouds: Annotated[
-        bool, typer.Option("--clouds", help="Write the clouds as the calibration puts them.")
+        bool, typer.Option("--clouds", help="Write the clouds with the calibrated mounting.")
     ] = False,
     exclude: terminal.Exclude = (),
     overwrite: Overwrite = False,
@@ -54,9 +55,12 @@ def calibrate(
         ]
     )
     if not clouds:
-        say("Its clouds are still as the recorded mounting put them; --clouds writes them anew.")
+        say(
+            "The clouds still use the recorded mounting; --clouds writes them with the "
+            "calibrated one."
+        )
     if untouched := sum(file["untouched"] for file in content["files"]):
-        say(f"{untouched} points outside the trajectory were left as they were.")
+        say(f"{untouched} points outside the trajectory were not changed.")
         raise typer.Exit(terminal.Exit.IN_PART)
 
 
@@ -74,7 +78,7 @@ def _tell_mounting(content, methods):
     components.
     """
     titles = "".join(f"{title:>9s}{'sigma':>8s}" for title in methods)
-    say(f"{'What the recorded mounting lacks':34s}{titles}  determined")
+    say(f"{'Correction to recorded mounting':34s}{titles}  determined")
     for start, part, unit in ((0, "lever_arm", "m"), (3, "boresight", "deg")):
         for axis, name in enumerate(("right", "forward", "up")):
             numbers = "".join(

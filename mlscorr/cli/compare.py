@@ -24,15 +24,15 @@ def compare(
     survey: Annotated[
         Path,
         typer.Argument(
-            help="survey.toml, or the folder that holds it; or the first of two folders that "
-            "mlscorr correct wrote.",
+            help="survey.toml or its folder, or the first of two folders written by mlscorr "
+            "correct.",
             parser=terminal.path_or_url,
         ),
     ],
     second: Annotated[
         Path | None,
         typer.Argument(
-            help="The second result, which is compared with the first.",
+            help="Second result, compared with the first.",
             parser=terminal.path_or_url,
         ),
     ] = None,
@@ -41,8 +41,8 @@ def compare(
         typer.Option(
             "-o",
             "--out",
-            help="Folder for the results; FOLDER-compare beside the survey's FOLDER if none, and "
-            "nothing but the screen for two results.",
+            help="Folder for the results. Default: FOLDER-compare next to the survey's FOLDER; "
+            "for two results, nothing is written.",
             parser=terminal.path_or_url,
         ),
     ] = None,
@@ -50,8 +50,8 @@ def compare(
         list[str],
         typer.Option(
             metavar="METHOD",
-            help="Write the cloud as this method corrects it into a folder of its name; may be "
-            "given several times.",
+            help="Write the cloud corrected by this method, into a folder named after the "
+            "method. May be repeated.",
         ),
     ] = (),
     exclude: terminal.Exclude = (),
@@ -60,9 +60,9 @@ def compare(
     quiet: terminal.Quiet = False,
     verbose: terminal.Verbose = 0,
 ) -> None:
-    """Correct a survey by every method, and score them by the same check points.
+    """Correct a survey with every method and compare their RMSE at the same check points.
 
-    Two folders that mlscorr correct wrote are compared with each other instead:
+    Two folders written by mlscorr correct are compared with each other instead:
     mlscorr compare corrected-1 corrected-2 -o compared
     """
     with terminal.exit_code(terminal.Exit.USAGE), progress_bars():
@@ -84,8 +84,8 @@ def compare(
     left = [file for file in report["files"] if file["points_outside_trajectory"]]
     for file in left:
         terminal.warn(
-            f"{file['points_outside_trajectory']} of {file['points']} points of {file['name']} lie "
-            "outside the trajectory or in its gaps and were left as they were."
+            f"{file['points_outside_trajectory']} of {file['points']} points of {file['name']} "
+            "lie outside the trajectory or in its gaps and were not corrected."
         )
     if left:
         raise typer.Exit(terminal.Exit.IN_PART)
@@ -98,20 +98,22 @@ def _check_arguments(survey, second, clouds, exclude):
     if second is None:
         if is_result(survey):
             raise ValueError(
-                f"{survey} is a result of mlscorr correct, and one alone has nothing to be "
-                f"compared with. Name a second one: mlscorr compare {survey} OTHER -o compared."
+                f"{survey} is a single result of mlscorr correct; a comparison needs two. Add "
+                f"the second one: mlscorr compare {survey} OTHER -o compared."
             )
         return
     for path in (survey, second):
         if not is_result(path):
             raise ValueError(
-                f"{path} is no result of mlscorr correct: it holds no report.json. Give two "
-                "folders that mlscorr correct -o wrote, or one survey.toml."
+                f"{path} is not a result of mlscorr correct: it has no report.json. Give two "
+                "folders written by mlscorr correct -o, or one survey.toml."
             )
     if exclude:
-        raise ValueError("--exclude is of one survey; two results have their points already.")
+        raise ValueError(
+            "--exclude applies to one survey only; two results already have their points."
+        )
     if clouds:
-        raise ValueError("--clouds is of the methods on one survey; two results have no methods.")
+        raise ValueError("--clouds applies to the methods on one survey only, not to two results.")
 
 
 def _compare_results(first, second, out, overwrite, as_json):

@@ -31,8 +31,9 @@ def correct(
     survey: Annotated[
         Path,
         typer.Argument(
-            help="survey.toml or project.toml, or the folder that holds it; a path or a URL. For a "
-            "folder with neither, a survey.toml is inferred and written beside the results.",
+            help="survey.toml or project.toml, or the folder that contains it; a path or a URL. "
+            "If a folder has neither, a survey.toml is inferred and written with the "
+            "results.",
             parser=terminal.path_or_url,
         ),
     ],
@@ -41,88 +42,96 @@ def correct(
         int, typer.Option(min=0, max=9, help="Order of the polynomial trend of the position.")
     ] = 0,
     sigma: Annotated[
-        bool, typer.Option("--sigma", help="Add to each point one sigma of its E, N and H.")
+        bool, typer.Option("--sigma", help="Add fields with the sigma of E, N and H to each point.")
     ] = False,
     no_ties: terminal.NoTies = False,
     ties_only: Annotated[
-        bool, typer.Option("--ties-only", help="Bring passes together without any control point.")
+        bool, typer.Option("--ties-only", help="Align passes without any control point.")
     ] = False,
     no_report: Annotated[
-        bool, typer.Option("--no-report", help="Leave out report.html and the pictures: faster.")
+        bool, typer.Option("--no-report", help="Do not write report.html and the pictures: faster.")
     ] = False,
     pdf: Annotated[
         bool,
-        typer.Option("--pdf", help="Write certificate.pdf, too: two A4 pages to sign."),
+        typer.Option("--pdf", help="Also write certificate.pdf: two A4 pages to sign."),
     ] = False,
     trajectory: Annotated[
         list[str],
         typer.Option(
-            help="A further file for the corrected trajectory, in OUT: NAME.sbet (with its "
+            help="Additional file for the corrected trajectory, in OUT: NAME.sbet (with its "
             "smrmsg), NAME.tum, NAME.gpkg or NAME.geojson."
         ),
     ] = (),
     targets: Annotated[
         list[str],
         typer.Option(
-            help="A further file for the surveyed points, in OUT, for a GIS: NAME.gpkg (in the "
+            help="Additional file for the surveyed points, in OUT, for a GIS: NAME.gpkg (in the "
             "survey's CRS) or NAME.geojson (WGS 84)."
         ),
     ] = (),
     displacement: Annotated[
         bool,
-        typer.Option("--displacement", help="Add to each point by how much its E, N, H moved."),
+        typer.Option(
+            "--displacement", help="Add fields with the displacement in E, N, H to each point."
+        ),
     ] = False,
     exclude: terminal.Exclude = (),
     include: Annotated[
         list[str],
         typer.Option(
             metavar="NAME",
-            help="A control point that is used though it would be refused. May be repeated.",
+            help="Use this control point even if the tests reject it. May be repeated.",
         ),
     ] = (),
     worst_first: Annotated[
         bool,
-        typer.Option("--worst-first", help="Print the residual of each point, the largest first."),
+        typer.Option("--worst-first", help="Print the residual of each point, largest first."),
     ] = False,
     dry_run: Annotated[
         bool,
         typer.Option(
             "--dry-run",
-            help="Check the inputs, and say what would be read and written; write nothing. Exit "
-            "codes are those of mlscorr check.",
+            help="Check the inputs and list the files that would be read and written; write "
+            "nothing. Same exit codes as mlscorr check.",
         ),
     ] = False,
     provenance: Annotated[
         bool,
         typer.Option(
-            "--provenance", help="State version, settings and inputs in the header of each cloud."
+            "--provenance", help="Record version, settings and inputs in the header of each cloud."
         ),
     ] = False,
     fail_if: Annotated[
         list[str],
         typer.Option(
-            help='A quality gate, as "check.rmse_3d > 0.05" (m; e, n, h are easting, northing, '
-            'height), "check.n_seen < 8", "check.n_unseen > 0", "coverage.share_extrapolated > '
-            '0.1", "weak.sigma > 0.1" (m). Exit code 6 if one is met; all results are written.'
+            help='Quality gate, as "check.rmse_3d > 0.05" (m; e, n, h are easting, northing, '
+            'height), "check.n_seen < 8", "check.n_unseen > 0", '
+            '"coverage.share_extrapolated > 0.1", "weak.sigma > 0.1" (m). Exit code 6 '
+            "if one is met; all results are still written."
         ),
     ] = (),
     workers: Annotated[
-        int, typer.Option(min=1, help="Of a project.toml: processes of this machine that share it.")
+        int,
+        typer.Option(
+            min=1, help="project.toml only: number of parallel processes on this machine."
+        ),
     ] = 1,
     scheduler: Annotated[
         str | None,
-        typer.Option(help="Of a project.toml: address of a dask.distributed cluster's scheduler."),
+        typer.Option(help="project.toml only: address of a dask.distributed scheduler."),
     ] = None,
     resume: Annotated[
         bool,
-        typer.Option("--resume", help="Of a project.toml: do what is missing or changed in OUT."),
+        typer.Option(
+            "--resume", help="project.toml only: process only what is missing or changed in OUT."
+        ),
     ] = False,
     overwrite: terminal.Overwrite = False,
     as_json: terminal.Json = False,
     quiet: terminal.Quiet = False,
     verbose: terminal.Verbose = 0,
 ) -> None:
-    """Correct the cloud of a survey, or all drives of a project.toml, and report on it."""
+    """Correct the clouds of a survey, or all drives of a project.toml, and write a report."""
     out = chosen_out(out, survey, "correct")
     with terminal.exit_code(terminal.Exit.USAGE), progress_bars():
         from mlscorr.evaluate import failures, read_gate
@@ -134,7 +143,10 @@ def correct(
         check_distinct([*trajectory, *targets])
         gates = [read_gate(text) for text in fail_if]
         if no_ties and ties_only:
-            raise ValueError("--no-ties and --ties-only leave nothing to correct with: give one.")
+            raise ValueError(
+                "--no-ties with --ties-only leaves nothing for the correction. "
+                "Give only one of them."
+            )
         ties: TieUse | None = None
         if no_ties:
             ties = "off"
@@ -147,8 +159,9 @@ def correct(
 
             if provenance:
                 raise ValueError(
-                    "--provenance is of one survey, and a cloud of a project may belong to several "
-                    "drives. The report.json of each drive names its inputs and their SHA-256."
+                    "--provenance applies to one survey only, because a cloud of a project may "
+                    "belong to several drives. The report.json of each drive lists its inputs "
+                    "and their SHA-256."
                 )
             if pdf:
                 raise ValueError(
@@ -161,8 +174,8 @@ def correct(
             options = Options(*given)
         elif shared != (1, None, False):
             raise ValueError(
-                f"--workers, --scheduler and --resume are of a project.toml, and {survey} is one "
-                'survey. Two lines make a project of it: [[drive]] and survey = "survey.toml".'
+                f"--workers, --scheduler and --resume need a project.toml; {survey} is a single "
+                'survey. Two lines make it a project: [[drive]] and survey = "survey.toml".'
             )
     chosen = {"exclude": exclude, "include": include}
     if is_of_drives:
@@ -187,7 +200,7 @@ def correct(
                 from mlscorr.io.store import check_output
 
                 check_output(out, (), overwrite)
-                progress("Sorting the files of the folder")
+                progress("Identifying the files of the folder")
                 place = None if dry_run else out
                 inferred = ends.enter_context(inferred_survey(survey, place))
             path = inferred.path
@@ -278,7 +291,7 @@ def tell(
         say_residuals(report["targets"])
     rows = [
         ("control points", report["control"], "after"),
-        ("  each left out in turn", report["control"], "leave_one_out"),
+        ("  leave-one-out", report["control"], "leave_one_out"),
         ("check points", report["check"], "after"),
     ]
     terminal.say_rmse(rows, width=24, decimals=3)

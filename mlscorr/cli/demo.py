@@ -19,7 +19,7 @@ def demo(
     out: Annotated[
         Path, typer.Option("-o", "--out", help="Folder for the results.", parser=path_or_url)
     ] = Path("demo"),
-    seed: Annotated[int, typer.Option(min=0, help="Of the simulated survey.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the simulated survey.")] = 1,
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,

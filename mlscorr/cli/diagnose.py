@@ -25,15 +25,15 @@ def diagnose(
         Path | None,
         typer.Option(
             "--simulator",
-            help="simulator.toml: what is believed already, as an earlier run wrote it.",
+            help="simulator.toml with the errors known so far, as an earlier run wrote it.",
         ),
     ] = None,
     simulated: Annotated[
         list[Path],
         typer.Option(
-            help="Clouds that a simulator of your own made of this survey: a survey folder, a "
-            "folder of LAS or LAZ files, or a file. Given twice, the second is its next run, and "
-            "tells how far the gap shrinks."
+            help="Clouds of this survey from your own simulator: a survey folder, a folder of "
+            "LAS or LAZ files, or a file. If given twice, the second is the next run of "
+            "the simulator and shows how much the gap decreases."
         ),
     ] = (),
     effects: terminal.Effects = None,
@@ -41,14 +41,15 @@ def diagnose(
         bool,
         typer.Option(
             "--until-none",
-            help="Put what is found into the simulator and look again, until nothing is found.",
+            help="Add what is found to the simulator and repeat until nothing more is found.",
         ),
     ] = False,
     costs: Annotated[
         str,
         typer.Option(
-            help="What mistakes cost: careful, default or sensitive; or three numbers, of a false "
-            "alarm, a miss and unknown, where a wrong name costs 1: 4,1,0.9 is the default."
+            help="Costs of mistakes: careful, default or sensitive; or three numbers for a "
+            "false alarm, a miss and unknown, relative to a wrong name (1). Default: "
+            "4,1,0.9."
         ),
     ] = "default",
     overwrite: terminal.Overwrite = False,
@@ -56,7 +57,7 @@ def diagnose(
     quiet: terminal.Quiet = False,
     verbose: terminal.Verbose = 0,
 ) -> None:
-    """Find where reality and simulation differ, why, and how far the gap can be closed."""
+    """Find differences between survey and simulation, their cause, and how much it explains."""
     out = chosen_out(out, survey, "diagnose")
     with terminal.exit_code(terminal.Exit.USAGE), progress_bars():
         from mlscorr.simulate import read_simulator
@@ -65,13 +66,13 @@ def diagnose(
         chosen = _costs(costs)
         if len(simulated) > 2:
             raise ValueError(
-                f"--simulated is given {len(simulated)} times: give the clouds of one run, and "
-                "those of the next."
+                f"--simulated was given {len(simulated)} times. Give the clouds of one run, or "
+                "of one run and the next."
             )
         if simulated and until_none:
             raise ValueError(
-                "--until-none runs our simulator again, and --simulated compares with yours: give "
-                "one of them."
+                "--until-none repeats the built-in simulator and --simulated uses your own. "
+                "Give only one of them."
             )
         inputs = [path for path in (simulator, effects, *simulated) if path is not None]
     with work(out, overwrite, survey, [path for path in inputs if path.is_file()]) as progress:
@@ -108,8 +109,9 @@ def _costs(text):
         numbers = []
     if len(numbers) != 3 or not all(0 <= number < float("inf") for number in numbers):
         raise ValueError(
-            f"--costs {text} is neither {', '.join(OPERATING_POINTS)} nor three numbers from 0 on: "
-            "of a false alarm, a miss and unknown, where a wrong name costs 1, as 4,1,0.9."
+            f"--costs {text} is neither {', '.join(OPERATING_POINTS)} nor three numbers of 0 or "
+            "more. The numbers are the costs of a false alarm, a miss and unknown, relative to "
+            "a wrong name (1), as 4,1,0.9."
         )
     return Costs(*numbers)
 

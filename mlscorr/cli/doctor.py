@@ -13,7 +13,7 @@ EXAMPLES = (
 
 
 def doctor(as_json: Json = False) -> None:
-    """Tell what is installed, what is missing, and the line that installs it."""
+    """List what is installed, what is missing, and the command that installs it."""
     from mlscorr.io.store import document
 
     installation = mlscorr.doctor()

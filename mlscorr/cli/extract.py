@@ -40,11 +40,8 @@ def extract(
     say(f"{counted(len(targets), 'target-like object')} found.")
     if content["surveyed"]:
         points = len({row["name"] for row in targets if row["matched"]})
-        say(
-            f"{matched} of them are observations of {points} of the {content['surveyed']} surveyed "
-            "points."
-        )
+        say(f"{matched} of them match {points} of the {content['surveyed']} surveyed points.")
     for row in content["unseen"]:
-        say(f"Without target: {row['name']}: {row['reason']}")
+        say(f"No target: {row['name']}: {row['reason']}")
     tables = f"{out / 'targets.csv'} and {out / 'targets.json'}"
     say_results([("Targets", tables), ("Pictures", out / "targets.png")])

@@ -37,14 +37,14 @@ def chosen_out(out: Path | None, source: Path, command: str, is_by_name: bool = 
         from mlscorr.io.store import is_remote
 
         if is_remote(source):
-            raise ValueError(f"{source} is a URL: give the folder for the results, -o OUT.")
+            raise ValueError(f"{source} is a URL. Give a folder for the results with -o OUT.")
     folder = source.absolute()
     if is_by_name:
         folder = folder.with_suffix("")
     elif not folder.is_dir():
         folder = folder.parent
     chosen = folder.parent / f"{folder.name or 'survey'}-{command}"
-    say(f"Results go to {chosen} (-o chooses another folder).")
+    say(f"Results: {chosen} (-o chooses another folder).")
     return chosen
 
 

@@ -24,21 +24,21 @@ EXAMPLES = (
 def init(
     folder: Annotated[Path, typer.Argument(help="Folder with clouds, trajectory and control.")],
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="File to write, FOLDER/survey.toml if none.")
+        Path | None, typer.Option("-o", "--out", help="File to write. Default: FOLDER/survey.toml.")
     ] = None,
     given: Annotated[
         list[str],
-        typer.Option("--set", help="What survey.toml shall say, as 'control.size = 0.6'."),
+        typer.Option("--set", help="Value to write into survey.toml, as 'control.size = 0.6'."),
     ] = (),
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ) -> None:
-    """Write a survey.toml for the files in a folder, and say which is which and why.
+    """Write a survey.toml for the files in a folder, with the role of each file and the reason.
 
-    What only you know is marked in it, all at once, and the exit code is 4.
+    Values that only you know are marked in it, and the exit code is 4.
     """
     with exit_code(Exit.USAGE), progress_bars() as progress:
-        progress("Sorting the files of the folder")
+        progress("Identifying the files of the folder")
         started = mlscorr.init(folder, out, _document(given))
         started.write()
     for role in started.roles:
@@ -55,7 +55,7 @@ def init(
         warn(f"Open: {place.key} ({place})")
 
     number = counted(len(started.places), "open place")
-    warn(f'Written: {started.path}, with {number}. Fill in each "?" in it, then: {check}')
+    warn(f'Written: {started.path}, with {number}. Replace each "?" in it, then run {check}')
     raise typer.Exit(Exit.IN_PART)
 
 
@@ -73,5 +73,5 @@ def _document(given):
         return tomllib.loads("\n".join(lines))
     except tomllib.TOMLDecodeError as error:
         raise ValueError(
-            f"--set takes a key and its value, as 'control.size = 0.6': {error}."
+            f"--set needs a key and a value, as 'control.size = 0.6': {error}."
         ) from None

@@ -30,18 +30,18 @@ def plan(
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ) -> None:
-    """Tell which effects a planned survey can show and tell apart; it needs no cloud."""
+    """Predict which errors a planned survey can detect and separate; needs no cloud."""
     out = chosen_out(out, survey, "plan")
     with work(out, overwrite, survey, planned=True) as progress:
         recorded = mlscorr.read_survey(survey, planned=True)
-        progress("Predicting what each effect would show")
+        progress("Predicting the effect of each error")
         planned = mlscorr.plan(recorded)
         content = planned.write(out, overwrite)
     from mlscorr.effects import lowered, parameter_title, titles
     from mlscorr.report.gap import accuracy_sentence
 
     print_json(content, as_json)
-    say(f"{'Smallest effect that shows':39s}{'':>9s}  {'unit':12s}  usual size")
+    say(f"{'Smallest detectable error':39s}{'':>9s}  {'unit':12s}  usual size")
     for parts in content["detectable"].values():
         for part in parts:
             if part["typical"] is None:
@@ -51,7 +51,7 @@ def plan(
             words = f"{parameter_title(part['name']):39s}{part['detectable']:9.3g}"
             say(f"{words}  {part['unit']:12s}  {usual}")
     for members in content["classes"]:
-        say(f"Can't be told apart: {lowered(titles(members))}.")
+        say(f"Not separable: {lowered(titles(members))}.")
     if content["accuracy"] is not None:
         say(accuracy_sentence(content["accuracy"]))
     for number, sentence in enumerate(content["advice"], start=1):

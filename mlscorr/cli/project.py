@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from mlscorr.survey import Statement
 
 STATUS_EXAMPLES = ("mlscorr status city", "mlscorr status city --json")
-RESUMPTION = "what was done stays, and the same command with --resume goes on"
+RESUMPTION = "finished work is kept; continue with the same command and --resume"
 
 
 def correct_drives(
@@ -93,13 +93,14 @@ def tell(statement: Statement) -> None:
 
 def status(
     out: Annotated[
-        Path, typer.Argument(help="Folder of a project's results.", parser=terminal.path_or_url)
+        Path,
+        typer.Argument(help="Folder with the results of a project.", parser=terminal.path_or_url),
     ],
     as_json: terminal.Json = False,
     quiet: terminal.Quiet = False,
     verbose: terminal.Verbose = 0,
 ) -> None:
-    """Tell how far the correction of a project has come, while it runs or afterwards."""
+    """Show the progress of the correction of a project, during the run or afterwards."""
     with terminal.exit_code(terminal.Exit.USAGE):
         from mlscorr.pipeline.project import project_status
 
@@ -113,13 +114,13 @@ def status(
     for line in content["failures"]:
         terminal.warn(line)
     if content["is_running"] is not False:
-        terminal.say(f"At work: {content['progress']}")
+        terminal.say(f"Running: {content['progress']}")
     terminal.say(f"Last: {content['log']}")
     if content["is_running"] is False:
         is_done = {stage["stage"]: stage["share"] == 1 for stage in content["all"]}
         is_whole = is_done.get("reports") and all(is_done.values())
         if is_whole:
-            rest = "all is done"
+            rest = "everything is done"
         else:
-            rest = "the same command with --resume goes on"
+            rest = "continue with the same command and --resume"
         terminal.say(f"Not running: {rest}.")

@@ -37,32 +37,35 @@ def render(
     out: Out = None,
     corrected: Annotated[
         Path | None,
-        typer.Option(help="Results of mlscorr correct; without them it is estimated anew."),
+        typer.Option(help="Results of mlscorr correct; if omitted, the correction is estimated."),
     ] = None,
     view: Annotated[list[View], typer.Option(help="May be repeated.")] = tuple(View),
     colour: Annotated[
-        Colour | None, typer.Option(help="Of the points; by default what tells most.")
+        Colour | None,
+        typer.Option(help="Coloring of the points; by default the most informative one."),
     ] = None,
     size: Annotated[str, typer.Option(help="Width x height of each PNG in pixels.")] = "1920x1080",
     azimuth: Annotated[
-        float | None, typer.Option(help="Where to look, in degrees clockwise from north.")
+        float | None, typer.Option(help="Viewing direction, in degrees clockwise from north.")
     ] = None,
     elevation: Annotated[
         float | None,
-        typer.Option(min=-90, max=90, help="From where, in degrees above the horizon."),
+        typer.Option(
+            min=-90, max=90, help="Elevation of the viewpoint, in degrees above the horizon."
+        ),
     ] = None,
     view_angle: Annotated[
-        float, typer.Option(min=0, max=120, help="Width of the view; 0: parallel rays.")
+        float, typer.Option(min=0, max=120, help="Field of view; 0: parallel projection.")
     ] = 0.0,
     engine: Annotated[
-        Engine, typer.Option(help="open3d adds the reference surface to the overview, slowly.")
+        Engine, typer.Option(help="open3d adds the reference surface to the overview, slower.")
     ] = Engine.zbuffer,
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ) -> None:
-    """Draw a survey before and after its correction; neither a display nor a GPU is needed."""
+    """Draw a survey before and after its correction; needs neither display nor GPU."""
     out = chosen_out(out, survey, "render")
     with exit_code(Exit.USAGE), progress_bars():
         pixels = _read_size(size)
@@ -92,7 +95,9 @@ def _read_size(text):
 
     width, times, height = text.lower().partition("x")
     if not (times and width.strip().isdecimal() and height.strip().isdecimal()):
-        raise ValueError(f"The size '{text}' is not width x height in pixels, as 1920x1080.")
+        raise ValueError(
+            f"The size '{text}' is not width x height in pixels. Give it as 1920x1080."
+        )
     page = int(width), int(height)
     check_pictures(PictureOptions(panel_size(page)))  # before the survey is read
     return page

@@ -29,16 +29,18 @@ EXAMPLES = (
 
 
 def simulate(
-    scenario: Annotated[Path, typer.Argument(help="TOML file, as those in examples/scenarios.")],
+    scenario: Annotated[
+        Path, typer.Argument(help="Scenario as a TOML file, such as those in examples/scenarios.")
+    ],
     out: Out = None,
-    seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same bytes.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="The same seed gives identical files.")] = 1,
     effects: Effects = None,
     overwrite: Overwrite = False,
     as_json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ) -> None:
-    """Simulate a survey from a scenario: a survey folder, and the truth beside it."""
+    """Simulate a survey from a scenario: a survey folder with its truth."""
     out = chosen_out(out, scenario, "simulate", is_by_name=True)
     with exit_code(Exit.USAGE), progress_bars():
         from mlscorr.simulate import read_scenario, scenario_files

@@ -115,7 +115,10 @@ def know_effects(path: Path | None) -> Path | None:
 
 
 Effects = Annotated[
-    Path | None, typer.Option(callback=know_effects, help="Python file of your effects; it is run.")
+    Path | None,
+    typer.Option(
+        callback=know_effects, help="Python file that defines your own effects; it is executed."
+    ),
 ]
 Overwrite = Annotated[bool, typer.Option(help="Replace files of the same name in the folder.")]
 Quiet = Annotated[
@@ -128,7 +131,7 @@ Verbose = Annotated[
         "-v",
         count=True,
         callback=be_verbose,
-        help="Print what is found and decided, and why; -vv prints details, too.",
+        help="Print findings and decisions with their reasons; -vv adds details.",
     ),
 ]
 Exclude = Annotated[
@@ -139,7 +142,7 @@ Exclude = Annotated[
         "residuals of check points: they would be control points then.",
     ),
 ]
-NoTies = Annotated[bool, typer.Option("--no-ties", help="Don't use what two passes both saw.")]
+NoTies = Annotated[bool, typer.Option("--no-ties", help="Do not use tie features between passes.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")]
 
 
@@ -163,7 +166,7 @@ def path_or_url(name: str) -> Path:
 SurveyArgument = Annotated[
     Path,
     typer.Argument(
-        help="survey.toml, or the folder that holds it; a path or a URL.", parser=path_or_url
+        help="survey.toml, or the folder that contains it; a path or a URL.", parser=path_or_url
     ),
 ]
 Out = Annotated[
@@ -171,7 +174,7 @@ Out = Annotated[
     typer.Option(
         "-o",
         "--out",
-        help="Folder for the results; FOLDER-COMMAND beside the input's FOLDER if none.",
+        help="Folder for the results. Default: FOLDER-COMMAND next to the input's FOLDER.",
         parser=path_or_url,
         show_default=False,
     ),
@@ -274,7 +277,7 @@ def _tell(error, code):
     if isinstance(error, SystemError):
         raise error
     if isinstance(error, MemoryError):
-        _fail(f"{error or 'No memory is left'}. Ask for less: shorter, coarser or in parts.", code)
+        _fail(f"{error or 'Out of memory'}. Ask for less: shorter, coarser or in parts.", code)
     if isinstance(error, ImportError):
         _fail(f"{error}. Run mlscorr doctor to see what is missing.", Exit.LIBRARY_MISSING)
     from mlscorr.survey import SurveyFileError
@@ -296,7 +299,7 @@ def _stop(has_results):
     """End as interrupted."""
     deafen()
     if has_results:
-        done = "all results were written before"
+        done = "all results were already written"
     else:
         done = "nothing was written"
     warn(f"Interrupted; {has_results if isinstance(has_results, str) else done}.")

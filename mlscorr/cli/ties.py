@@ -29,7 +29,7 @@ def ties(
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ) -> None:
-    """Find walls, roads, poles and paint that two passes both saw, and how far apart they lie."""
+    """Find tie features between passes (walls, roads, poles, paint) and their misclosures."""
     out = chosen_out(out, survey, "ties")
     with work(out, overwrite, survey) as progress:
         recorded = mlscorr.read_survey(survey)
@@ -39,7 +39,8 @@ def ties(
     say(
         f"{counted(content['ties'], 'tie')} between {counted(features['plane'], 'plane')}, "
         f"{counted(features['pole'], 'pole')}, {counted(features['line'], 'painted line')} and "
-        f"{counted(features['dash'], 'dash')}; {content['refused']} more contradict neighbours."
+        f"{counted(features['dash'], 'dash')}; {content['refused']} rejected because they "
+        "contradict their neighbors."
     )
     for pair in content["pairs"]:
         parts = [
@@ -49,8 +50,8 @@ def ties(
         ]
         first, second = pair["passes"]
         if first == second:
-            which = f"Pass {first} by itself"
+            which = f"Within pass {first}"
         else:
-            which = f"Passes {first} and {second}"
-        say(f"{which}: rms {', '.join(parts)}.")
+            which = f"Between passes {first} and {second}"
+        say(f"{which}: RMS {', '.join(parts)}.")
     say_results([("Ties", f"{out / 'ties.csv'} and {out / 'ties.json'}")])

@@ -107,8 +107,8 @@ def _name_older(out, before):
     else:
         more = ""
     warn(
-        f"Not written by this run, and left as they were in {out}: {', '.join(older[:NAMED])}"
-        f"{more}. Delete them if they are results of an earlier run."
+        f"Left unchanged in {out}, not written by this run: {', '.join(older[:NAMED])}{more}. "
+        "Delete them if they are results of an earlier run."
     )
 
 

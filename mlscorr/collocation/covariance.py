@@ -65,9 +65,13 @@ class Covariance:
     def __post_init__(self):
         if self.family not in (*FAMILIES, INTEGRATED):
             known = ", ".join((*FAMILIES, INTEGRATED))
-            raise ValueError(f"Covariance family '{self.family}' is none of {known}.")
+            raise ValueError(
+                f"The covariance family '{self.family}' is unknown; known are {known}."
+            )
         if not self.correlation_time > 0:
-            raise ValueError(f"Correlation time {self.correlation_time} s should be positive.")
+            raise ValueError(
+                f"The correlation time is {self.correlation_time} s; it must be positive."
+            )
 
     def __call__(self, lag: np.ndarray) -> np.ndarray:
         """Return the correlation at time lags of any shape. Units: s."""

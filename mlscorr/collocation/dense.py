@@ -59,9 +59,9 @@ def collocate_rows_dense(
     error = np.finfo(float).eps * (np.diag(total) / np.diag(factor) ** 2).sum()
     if error > LARGEST_ERROR:
         raise LinAlgError(
-            f"Rounding leaves the log-likelihood of {len(total)} misclosures wrong by {error:.1g} "
-            f"(limit {LARGEST_ERROR:g}): their noise is next to nothing beside the signals. Give "
-            "each observation the sigma that it has."
+            f"Rounding makes the log-likelihood of {len(total)} misclosures wrong by {error:.1g} "
+            f"(limit {LARGEST_ERROR:g}): their noise is negligible next to the signals. Give "
+            "each observation its actual sigma."
         )
     covariances = tuple(signal.covariance for signal in rows[0].signals)
     solver = DenseSolver(sides.clocks, sides.mixings, covariances, sides.first, factor)

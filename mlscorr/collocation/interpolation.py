@@ -171,9 +171,9 @@ def predictor_by(
         shapes = [np.shape(values) for values in (design, *mixings)]
         if shapes != [(len(gps_time), r, k) for k in (len(trend), *processes)]:
             raise ValueError(
-                f"{len(gps_time)} epochs are asked with a design and mixings of shapes "
-                f"{shapes}: they should be (epochs, quantities, trend parameters) and (epochs, "
-                f"quantities, processes), of {len(trend)} and {processes} columns."
+                f"{len(gps_time)} epochs were requested with a design and mixings of shapes "
+                f"{shapes}. They must be (epochs, quantities, trend parameters) and (epochs, "
+                f"quantities, processes), with {len(trend)} and {processes} columns."
             )
         mean = np.empty((q, r))
         covariance = np.empty((q, r, r))

@@ -226,8 +226,8 @@ class InformationSolver:
         for side, part, weight in zip(self.sides, self.rows, weights, strict=True):
             if not (weight > 0).all():
                 raise ValueError(
-                    f"{np.sum(~(weight > 0))} of {len(weight)} weights are not positive. Leave "
-                    "these observations out, or give them a millionth."
+                    f"{np.sum(~(weight > 0))} of {len(weight)} weights are not positive. Remove "
+                    "these observations, or give them a weight of 1e-6."
                 )
             sides.append(side.whitened(self.layout, part.noise.separate / weight[:, None, None]))
         return replace(self, sides=tuple(sides))
@@ -394,11 +394,11 @@ class InformationSolver:
                 f"{step:.3g} s after the one before"
             )
         raise np.linalg.LinAlgError(
-            f"Rounding leaves the log-likelihood of {len(error)} states wrong by {error.sum():.1g} "
-            f"(limit {LARGEST_ERROR:g}), most by those {where}: a smooth signal's information "
-            "grows as the step to the power 1 - 2 d. These knots were taken from a solution with "
-            "shorter correlation times, or the noise is next to nothing beside the signals. Let "
-            "the solver place its own, and give each observation the sigma that it has."
+            f"Rounding makes the log-likelihood of {len(error)} states wrong by "
+            f"{error.sum():.1g} (limit {LARGEST_ERROR:g}), most of it {where}. The knots come "
+            "from a solution with shorter correlation times, or the noise is negligible next to "
+            "the signals. Let the solver place its own knots, and give each observation its "
+            "actual sigma."
         )
 
     def _solved(self, columns):

@@ -124,9 +124,9 @@ def check_finite(gps_time: np.ndarray, *arrays: np.ndarray) -> None:
         wrong |= ~np.isfinite(values).all(axis=tuple(range(1, np.ndim(values))))
     if wrong.any():
         raise ValueError(
-            f"{wrong.sum()} of {len(gps_time)} observation epochs have a time, misclosure, noise, "
-            f"design or sigma that is no finite number (first: {gps_time[wrong][0]:.3f} s). "
-            "Leave them out."
+            f"{wrong.sum()} of {len(gps_time)} observation epochs have a time, misclosure, "
+            "noise, design or sigma that is not a finite number (first: "
+            f"{gps_time[wrong][0]:.3f} s). Remove them."
         )
 
 

@@ -15,8 +15,9 @@ from mlscorr.survey import SAME_EPOCH
 SMALLEST_INFORMATION = 1e-9  # smallest share of the trend's information without some rows
 LARGEST_ERROR = 0.01  # of the log-likelihood by rounding; parameters differ by more than that
 NOT_POSITIVE = (
-    "The covariance of the {} misclosures is not positive definite: two observations of one time "
-    "without noise, or a sigma of zero. Give each observation and control point the sigma it has."
+    "The covariance of the {} misclosures is not positive definite: two observations at one "
+    "time have no noise, or a sigma is zero. Give each observation and control point its actual "
+    "sigma."
 )
 
 
@@ -284,7 +285,7 @@ class Collocation:
         """
         if not self.determined_without(rows):
             raise ValueError(
-                f"Without the {len(rows)} observations that are left out the other "
+                f"Without the {len(rows)} observations left out, the remaining "
                 f"{len(self.misclosure) - len(rows)} do not determine the trend."
             )
         covariance = np.linalg.inv(self.precision_of(rows))
@@ -330,8 +331,8 @@ def solve_trend(
     redundancy = len(misclosure) + len(prior_rows) - p
     if redundancy < 0 or (p and values[-1] <= smallest * values[0]):
         raise ValueError(
-            f"{p} trend parameters are not determined by {len(misclosure)} "
-            "misclosures. Lower the order or observe more control points."
+            f"{len(misclosure)} misclosures do not determine {p} trend parameters. Lower the "
+            "order or survey more control points."
         )
     root = np.linalg.inv(triangle)
     trend = root @ (basis.T @ whitened[:, p])

@@ -175,9 +175,9 @@ def check_same(
         same = same and np.array_equal(here.unknown, there.unknown)
     if not same:
         raise ValueError(
-            f"The {sum(len(part.cell) for part in sides)} observations see other epochs, shared "
-            "errors or states than those of the solution whose knots they should use. Leave "
-            "``like`` out."
+            f"The {sum(len(part.cell) for part in sides)} observations refer to other epochs, "
+            "shared errors or states than the solution whose knots they should use. Omit "
+            "``like``."
         )
 
 

@@ -237,8 +237,8 @@ def factor(
     step = np.diff(gps_time, prepend=gps_time[:1])
     if (step < 0).any():
         raise ValueError(
-            f"{(step < 0).sum()} of {n} observations are earlier than the one before: the "
-            "recursion takes them in the order of time."
+            f"{(step < 0).sum()} of {n} observations are earlier than the one before. Sort them "
+            "by time."
         )
     layout = Layout.of(signals)
     mixing = np.concatenate([np.zeros((n, 1, 0)), *(s.mixing for s in signals)], axis=2)

@@ -18,9 +18,7 @@ def require_times(points: int, times: int) -> None:
     ValueError
     """
     if points != times:
-        raise ValueError(
-            f"{points} points came with {times} times; each moves by its own. Give one for each."
-        )
+        raise ValueError(f"{points} points came with {times} times. Give one time for each point.")
 
 
 @loop

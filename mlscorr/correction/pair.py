@@ -68,7 +68,7 @@ class Correction(Summary):
 
     def __post_init__(self):
         if not np.array_equal(self.recorded.gps_time, self.corrected.gps_time):
-            raise ValueError("Recorded and corrected trajectory must have the same epochs.")
+            raise ValueError("The recorded and the corrected trajectory must have the same epochs.")
 
     @classmethod
     def by_pose_error(
@@ -279,9 +279,9 @@ class Correction(Summary):
         distance = box_distance(xyz, self.recorded.position)
         if distance > FARTHEST:
             raise ValueError(
-                f"The points lie {distance / 1000:.0f} km from the trajectory: they are in another "
-                "CRS, or about a local origin. Give them in map coordinates, an Open3D cloud with "
-                "its origin: PointCloud.from_open3d(cloud, origin=...)."
+                f"The points lie {distance / 1000:.0f} km from the trajectory: they are in "
+                "another CRS or relative to a local origin. Give map coordinates; for an Open3D "
+                "cloud, give its origin: PointCloud.from_open3d(cloud, origin=...)."
             )
 
     def _require_inside(self, outside, gps_time):
@@ -296,10 +296,10 @@ class Correction(Summary):
         )
         if outside == len(gps_time):
             raise ValueError(
-                f"{sentence} Cloud and trajectory may use different time systems: add the constant "
-                "between both to the cloud's times."
+                f"{sentence} Cloud and trajectory may use different time systems: add the "
+                "constant difference to the times of the cloud."
             )
-        warnings.warn(f"{sentence} No correction over time moves them.", stacklevel=3)
+        warnings.warn(f"{sentence} No time-dependent correction applies to them.", stacklevel=3)
 
     def shift_integers(
         self,
@@ -381,9 +381,8 @@ def require_fit(overflow: int, scale: np.ndarray, offset: np.ndarray) -> None:
     if overflow:
         raise ValueError(
             f"{counted(overflow, 'corrected point')} can't be stored in 32 bits with the file's "
-            f"scale {scale} m and offset {offset} m. Either the offset is so far from the points "
-            "that they hardly fit as they were (export the file with one near them), or the "
-            "correction is wrong by kilometres."
+            f"scale {scale} m and offset {offset} m. Either the offset is far from the points "
+            "(export the file with a nearer one), or the correction is wrong by kilometers."
         )
 
 

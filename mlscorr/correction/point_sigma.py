@@ -149,8 +149,8 @@ def _pose_covariance(correction):
     corrected = correction.corrected
     if corrected.position_sigma is None or corrected.attitude_sigma is None:
         raise ValueError(
-            "The corrected trajectory has no sigmas of position and attitude, so none of the "
-            "points follow. Estimate the correction from control points."
+            "Point sigmas need a corrected trajectory with sigmas of position and attitude; "
+            "this one has none. Estimate the correction from control points."
         )
     covariance = np.zeros((len(corrected), 6, 6))
     covariance[:, range(3), range(3)] = corrected.position_sigma**2

@@ -23,14 +23,17 @@ class MapRotation(Effect):
     """
 
     stage: ClassVar = "control"
-    title: ClassVar = "Turned frame"
-    meaning: ClassVar = "The frame of the surveyed targets is turned against that of the cloud."
+    title: ClassVar = "Rotated frame"
+    meaning: ClassVar = (
+        "The frame of the surveyed targets is rotated relative to that of the cloud."
+    )
     sentence: ClassVar = (
-        "The frame of the surveyed targets is turned {side} by {size} against that of the cloud."
+        "The frame of the surveyed targets is rotated {side} by {size} relative to that of the "
+        "cloud."
     )
     remedy: ClassVar = (
-        "Check CRS and datum of control and trajectory; where the control's is meant, mlscorr "
-        "apply survey.toml gap.json -o applied moves the cloud to it."
+        "Check CRS and datum of control and trajectory. If the control is right, mlscorr apply "
+        "survey.toml gap.json -o applied moves the cloud into its frame."
     )
     sides: ClassVar = ("counter-clockwise", "clockwise")
     magnitude: float = quantity(
@@ -61,10 +64,10 @@ class MapScale(Effect):
     """
 
     stage: ClassVar = "control"
-    title: ClassVar = "Scale of the map"
-    meaning: ClassVar = "The surveyed targets have another map scale than the cloud."
+    title: ClassVar = "Map scale"
+    meaning: ClassVar = "The scale of the surveyed coordinates differs from that of the cloud."
     sentence: ClassVar = (
-        "The map of the surveyed targets is too {side} by {size}, compared with the cloud."
+        "The scale of the surveyed coordinates is too {side} by {size}, compared with the cloud."
     )
     remedy: ClassVar = "Check CRS and projection scale of control and trajectory."
     sides: ClassVar = ("large", "small")
@@ -92,12 +95,9 @@ class HorizontalDatum(Effect):
 
     stage: ClassVar = "control"
     title: ClassVar = "Horizontal datum"
-    meaning: ClassVar = (
-        "Surveyed targets and cloud are in different frames, moved against each other."
-    )
+    meaning: ClassVar = "Surveyed targets and cloud are in different frames, shifted horizontally."
     sentence: ClassVar = (
-        "The surveyed targets and the cloud are in different frames: the targets lie too far "
-        "{size}."
+        "Surveyed targets and cloud are in different frames: the targets are shifted by {size}."
     )
     remedy: ClassVar = "Check CRS and datum of control and trajectory."
     sides: ClassVar = EAST_NORTH_UP[:2]
@@ -105,7 +105,7 @@ class HorizontalDatum(Effect):
     magnitude: tuple[float, float] = quantity(
         "m",
         1000.0,
-        "classical datums lie some hundred metres from WGS 84, not more",
+        "classical datums differ from WGS 84 by a few hundred meters at most",
         count=2,
         typical=0.05,
         source="plates move 2-7 cm a year (ITRF2014, Altamimi et al. 2016): an epoch not reduced",
@@ -127,14 +127,14 @@ class VerticalDatum(Effect):
 
     stage: ClassVar = "control"
     title: ClassVar = "Vertical datum"
-    meaning: ClassVar = "Heights of the surveyed targets and of the cloud are in different systems."
+    meaning: ClassVar = "The surveyed targets and the cloud have different height systems."
     sentence: ClassVar = (
-        "The surveyed heights of the targets lie {size} {side} those of the cloud: two height "
+        "The surveyed heights of the targets are {size} {side} those of the cloud: two height "
         "systems."
     )
     remedy: ClassVar = (
-        "Check the heights' datum and geoid of control and trajectory; where the control's is "
-        "meant, mlscorr apply survey.toml gap.json -o applied moves the cloud to it."
+        "Check the vertical datum and geoid of control and trajectory. If the control is right, "
+        "mlscorr apply survey.toml gap.json -o applied moves the cloud into its system."
     )
     sides: ClassVar = ("above", "below")
     magnitude: float = quantity(
@@ -142,7 +142,7 @@ class VerticalDatum(Effect):
         120.0,
         "that is more than the geoid's largest height above the ellipsoid",
         typical=0.03,
-        source="estimate: geoid models hold to a few centimetres",
+        source="estimate: geoid models are accurate to a few centimeters",
     )
 
     def _error(self, value, reference, rng):
@@ -167,33 +167,35 @@ class TargetOutlier(Effect):
     """
 
     stage: ClassVar = "control"
-    title: ClassVar = "One wrong target"
+    title: ClassVar = "Wrong target"
     meaning: ClassVar = "The surveyed coordinates of one target are wrong."
-    sentence: ClassVar = "The surveyed coordinates of {where} are wrong: too far {size}."
-    remedy: ClassVar = "Survey that target again, or take it out of the control."
+    sentence: ClassVar = "The surveyed coordinates of {where} are wrong by {size}."
+    remedy: ClassVar = "Survey that target again, or remove it from the control."
     sides: ClassVar = EAST_NORTH_UP
     parts: ClassVar = MAP
     magnitude: tuple[float, float, float] = quantity(
         "m",
         100.0,
-        "a point that far off is another point",
+        "at that distance it is another point",
         count=3,
         typical=0.05,
-        source="estimate: a prism constant of 3-5 cm forgotten",
+        source="estimate: a prism constant of 3-5 cm omitted",
     )
     target: str = field()
 
     def __post_init__(self):
         super().__post_init__()
         if not isinstance(self.target, str):
-            raise ValueError(f"target of {self.name} of {self.target!r} is not a target's name.")
+            raise ValueError(
+                f"target = {self.target!r} of {self.name} is not the name of a target."
+            )
 
     def _error(self, value, reference, rng):
         if self.target not in value.name:
             near = get_close_matches(self.target, value.name, n=1, cutoff=0.0)[0]
             raise ValueError(
-                f"{self.name} names {self.target!r}, which is none of the {len(value)} targets; "
-                f"the nearest name is {near!r}."
+                f"{self.name} names {self.target!r}, which is not among the {len(value)} "
+                f"targets; the nearest name is {near!r}."
             )
         hit = np.array([name == self.target for name in value.name])
         return hit[:, None] * np.array(self.magnitude)

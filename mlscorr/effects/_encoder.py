@@ -24,14 +24,14 @@ class AngleScale(Effect):
 
     stage: ClassVar = "angle"
     title: ClassVar = "Encoder scale"
-    meaning: ClassVar = "Scan angles are wrong in proportion to the angle from the zero beam."
-    sentence: ClassVar = "The scanner's encoder gives scan angles too {side} by {size}."
+    meaning: ClassVar = "Scan angle errors are proportional to the angle from the zero beam."
+    sentence: ClassVar = "The scan angles of the encoder are too {side} by {size}."
     remedy: ClassVar = "Have the scanner's encoder checked."
     sides: ClassVar = ("large", "small")
     magnitude: float = quantity(
         "ratio",
         0.05,
-        "a turn of the mirror would miss 18 deg",
+        "one turn of the mirror would be wrong by 18 deg",
         typical=1e-4,
         source="estimate: 0.3 mm at 3 m and 60 deg; such a term is in Lichti and Licht 2006",
     )
@@ -53,20 +53,19 @@ class AngleEccentricity(Effect):
     """
 
     stage: ClassVar = "angle"
-    title: ClassVar = "Encoder off its axis"
-    meaning: ClassVar = "Scan angles are wrong by a wave that comes once a turn."
+    title: ClassVar = "Encoder eccentricity"
+    meaning: ClassVar = "Scan angle errors repeat once per turn."
     sentence: ClassVar = (
-        "The scanner's encoder sits off its axis: scan angles are wrong by up to {size}, once a"
-        " turn."
+        "The scanner's encoder is eccentric: scan angles are wrong by up to {size}, once per turn."
     )
     remedy: ClassVar = "Have the scanner's encoder checked."
     parts: ClassVar = ("magnitude cos(phase)", "magnitude sin(phase)")
     magnitude: float = quantity(
         "rad",
         0.05,
-        "a disc of 25 mm radius can't be off its axis by more than 1 mm",
+        "a disc of 25 mm radius can't be eccentric by more than 1 mm",
         typical=1e-4,
-        source="derived: 2.5 um off the axis on a disc of 25 mm radius",
+        source="derived: 2.5 um of eccentricity on a disc of 25 mm radius",
     )
     phase: float = quantity("rad", 7.0, "a turn has 6.28 rad (is it in degrees?)", default=0.0)
 
@@ -88,15 +87,15 @@ class AngleNoise(Effect):
     random: ClassVar = True
     title: ClassVar = "Noisy scan angles"
     meaning: ClassVar = "Scan angles are noisier than stated."
-    sentence: ClassVar = "The scan angles are noisier than stated: {size} of scatter come on top."
+    sentence: ClassVar = "The scan angles are noisier than stated: {size} of additional noise."
     remedy: ClassVar = (
-        "State the scanner's angle noise in survey.toml as large as found, or have its encoder "
+        "Set the scanner's angle noise in survey.toml to the value found, or have its encoder "
         "checked."
     )
     magnitude: float = quantity(
         "deg",
         1.0,
-        "encoders of surveying scanners resolve thousandths",
+        "encoders of surveying scanners resolve thousandths of a degree",
         typical=0.002,
         source="twice the resolution of the RIEGL VQ-250's data sheet, 0.001 deg",
         least=0.0,

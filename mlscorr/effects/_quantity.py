@@ -64,7 +64,7 @@ class Quantity:
             numbers = np.array(None)
         shape = () if self.count == 1 else (self.count,)
         if numbers.dtype.kind not in "iuf" or numbers.shape != shape:
-            raise ValueError(f"{label} of {value!r} can't be used: it must be {self._description}.")
+            raise ValueError(f"{label} of {value!r} is invalid: it must be {self._description}.")
         if not np.isfinite(numbers).all():
             raise ValueError(f"{label} of {value!r} is not finite; it must be {self._description}.")
         largest = float(numbers.flat[np.argmax(np.abs(numbers))])

@@ -27,16 +27,16 @@ class TimeOffset(Effect):
     meaning: ClassVar = "The clocks of scanner and POS differ by a constant."
     sentence: ClassVar = "The clock of the scanner is {size} {side} the clock of the POS."
     remedy: ClassVar = (
-        "Have the time synchronisation of the scanner checked; until then, mlscorr apply "
-        "survey.toml gap.json -o applied takes the size found out of the cloud."
+        "Have the time synchronization of the scanner checked. Until then, mlscorr apply "
+        "survey.toml gap.json -o applied removes the offset found from the cloud."
     )
     sides: ClassVar = ("ahead of", "behind")
     magnitude: float = quantity(
         "s",
         1.0,
-        "more than the step of time messages is a wrong time system",
+        "a difference of more than 1 s means a wrong time system",
         typical=1e-3,
-        source="estimate: time messages without the pulse per second hold to about 1 ms",
+        source="estimate: time messages without the pulse per second are accurate to about 1 ms",
     )
 
     def _error(self, value, reference, rng):
@@ -57,14 +57,17 @@ class ClockDrift(Effect):
     title: ClassVar = "Scanner clock drift"
     meaning: ClassVar = "The clock of the scanner runs faster or slower than the clock of the POS."
     sentence: ClassVar = "The clock of the scanner runs {side} by {size}."
-    remedy: ClassVar = "Have the scanner's clock steered by the POS; a drift that stays is a fault."
+    remedy: ClassVar = (
+        "Have the scanner's clock disciplined by the POS; a remaining drift is a fault of the "
+        "device."
+    )
     sides: ClassVar = ("fast", "slow")
     magnitude: float = quantity(
         "s per s",
         1e-3,
-        "no quartz is off by more, and one that is would be replaced",
+        "no quartz oscillator in use is off by more",
         typical=2e-5,
-        source="usual data sheets of quartz oscillators: 20 ppm, running free of GNSS",
+        source="usual data sheets of quartz oscillators: 20 ppm, free-running without GNSS",
     )
 
     def _error(self, value, reference, rng):
@@ -84,20 +87,20 @@ class TimeJitter(Effect):
     stage: ClassVar = "clock"
     random: ClassVar = True
     title: ClassVar = "Noisy time stamps"
-    meaning: ClassVar = "Each laser pulse's time stamp has an error of its own."
+    meaning: ClassVar = "The time stamp of each laser pulse has its own random error."
     sentence: ClassVar = (
-        "The scanner's time stamps scatter by {size}, which the simulator does not know."
+        "The time stamps of the scanner have noise of {size} that the simulator does not include."
     )
     remedy: ClassVar = (
-        "Check how the scanner's pulses are time-stamped: by the POS's second pulse, or by the "
-        "computer that stores them."
+        "Check how the scanner's pulses are time-stamped: by the pulse per second of the POS, "
+        "or by the computer that stores them."
     )
     magnitude: float = quantity(
         "s",
         0.01,
-        "more than the time of a scan line mixes up the lines",
+        "an error longer than the time of a scan line mixes up the lines",
         typical=1e-4,
-        source="estimate: interrupts of an operating system without real time take 0.1 ms",
+        source="estimate: interrupts of an operating system that is not real-time take 0.1 ms",
         least=0.0,
     )
 

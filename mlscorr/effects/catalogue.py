@@ -62,7 +62,7 @@ def effect_class(name: str) -> type[Effect]:
     if name not in by_name:
         near = get_close_matches(str(name), by_name, n=1, cutoff=0.0)[0]
         raise ValueError(
-            f"{name!r} is an unknown effect; the nearest known one is {near}. Is it your own? Then "
+            f"{name!r} is an unknown effect; the nearest known one is {near}. If it is your own, "
             "give its file: --effects FILE."
         )
     return by_name[name]
@@ -90,15 +90,14 @@ def make_effect(name: str, **parameters: Any) -> Effect:
     TimeOffset(magnitude=0.002)
     >>> make_effect("boresight", magnitude=[200, 0, 0])
     Traceback (most recent call last):
-    ValueError: boresight of 200 deg exceeds 10 deg; a mounting is known from its drawing to a
-    degree.
+    ValueError: boresight of 200 deg exceeds 10 deg; drawings give a mounting to a degree.
     """
     kind = effect_class(name)
     known = {field.name: field for field in fields(kind)}
     unknown = [key for key in parameters if key not in known]
     missing = [key for key, f in known.items() if f.default is MISSING and key not in parameters]
     if unknown or missing:
-        fault = f"has no parameter {unknown[0]!r}" if unknown else f"lacks {missing[0]}"
+        fault = f"has no parameter {unknown[0]!r}" if unknown else f"needs {missing[0]}"
         raise ValueError(f"{name} {fault}; its parameters are {_describe(kind)}.")
     return kind(**parameters)
 
@@ -129,8 +128,8 @@ def in_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:
     for name in random:
         if random.count(name) > 1:
             raise ValueError(
-                f"{name} is listed {random.count(name)} times; give one, with the root of the sum "
-                "of squares of the magnitudes."
+                f"{name} is listed {random.count(name)} times. Give it once, with the root of "
+                "the sum of squares of the magnitudes."
             )
     return tuple(ordered)
 
@@ -235,25 +234,25 @@ def register(kind: type[Effect]) -> type[Effect]:
     required = ("name", "stage", "title", "meaning", "sentence", "remedy", "sides")
     missing = [key for key in required if not getattr(kind, key, "")]
     if missing:
-        raise ValueError(f"{kind.__name__} doesn't say its {', '.join(missing)}; see Effect.")
+        raise ValueError(f"{kind.__name__} does not define {', '.join(missing)}; see Effect.")
     size = kind.quantities().get("magnitude")
     if size is None or not size.typical or not size.source:
         raise ValueError(f"{kind.name} has no magnitude with unit, typical size and its source.")
     if not kind.name.isidentifier() or kind.name in ("none", "noise", "unknown"):
         raise ValueError(
-            f"{kind.name!r} can't name an effect: take letters, digits and _, and none of the "
-            "answers none, noise and unknown."
+            f"{kind.name!r} can't be the name of an effect: use letters, digits and _, and not "
+            "none, noise or unknown."
         )
     if kind.name in {known.name for known in EFFECTS}:
-        raise ValueError(f"{kind.name} is an effect of mlscorr already; take another name.")
+        raise ValueError(f"{kind.name} is a built-in effect of mlscorr; choose another name.")
     _known_stage(kind.stage)
     count = 2 if kind.is_wave() else size.count
     if len(kind.parts) != count or (count == size.count and len(kind.sides) != max(count, 2)):
-        raise ValueError(f"{kind.name} names {len(kind.parts)} parts and sides of {count}.")
+        raise ValueError(f"{kind.name} has {len(kind.parts)} parts and sides for {count}.")
     words = ("size", "where", *["side"] * (count == 1))
     if strange := {word for _, word, *_ in Formatter().parse(kind.sentence)} - {None, *words}:
         raise ValueError(
-            f"{kind.name} knows {', '.join(words)} in its sentence, not {min(strange)}."
+            f"The sentence of {kind.name} may contain {', '.join(words)}, not {min(strange)}."
         )
     _registered[kind.name] = kind
     return kind
@@ -282,13 +281,13 @@ def register_file(path: Path | str) -> tuple[type[Effect], ...]:
     path = Path(path)
     before = set(known_effects())
     if not path.is_file():
-        raise FileNotFoundError(f"{path} does not exist; give a file that registers effects.")
+        raise FileNotFoundError(f"{path} does not exist. Give a file that registers effects.")
     run_file(path)
     effects = tuple(kind for kind in known_effects() if kind not in before)
     if not effects:
         raise ValueError(
-            f"{path} registers no effect: call mlscorr.effects.register with a class of yours, as "
-            "docs/own-simulator.md shows."
+            f"{path} registers no effect. Call mlscorr.effects.register with your class, as in "
+            "docs/own-effect.md."
         )
     return effects
 
@@ -307,7 +306,7 @@ def run_file(path: Path) -> ModuleType:
     """
     spec = spec_from_file_location(f"user.{path.stem}", path)
     if spec is None or spec.loader is None:
-        raise ValueError(f"{path} is no Python file: its name must end in .py.")
+        raise ValueError(f"{path} is not a Python file: its name must end in .py.")
     module = sys.modules[spec.name] = module_from_spec(spec)  # dataclasses search for it there
     try:
         spec.loader.exec_module(module)

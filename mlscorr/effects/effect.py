@@ -229,7 +229,7 @@ def _checked_change(effect: Any, change: Callable, value: Any, *given: Any) -> A
             guarded = replace(value, **views)
         changed = change(guarded, *given)
         if not all(hasattr(changed, name) for name in columns):
-            raise TypeError(f"it gives a {type(changed).__name__}")
+            raise TypeError(f"it returns a {type(changed).__name__}")
         same = {name: columns[name] for name in arrays if getattr(changed, name) is views[name]}
         if same:
             changed = replace(changed, **same)
@@ -243,8 +243,8 @@ def _checked_change(effect: Any, change: Callable, value: Any, *given: Any) -> A
         raise ValueError(
             f"The effect {effect.name} ({''.join(lines[-1:])}{file}) can't be applied to the "
             f"{type(value).__name__} of its stage, {effect.stage}: {type(error).__name__}: "
-            f"{str(error).rstrip('.')}. Mend its code, or leave it out; docs/own-simulator.md says "
-            "what it is given and gives."
+            f"{str(error).rstrip('.')}. Fix or remove it; docs/own-effect.md describes its "
+            "input and output."
         ) from error
     return changed
 
@@ -257,7 +257,7 @@ def _check(name, old, new):
     if new.shape != old.shape or not np.can_cast(new.dtype, old.dtype, "same_kind"):
         raise ValueError(f"{name} is {new.dtype} {new.shape}, not {old.dtype} {old.shape}")
     if new.dtype.kind == "f" and (lost := np.isfinite(old) & ~np.isfinite(new)).any():
-        raise ValueError(f"of {name} {lost.sum()} of {lost.size} numbers are not a number")
+        raise ValueError(f"{lost.sum()} of {lost.size} values of {name} are not a number")
 
 
 def _numbers(column):

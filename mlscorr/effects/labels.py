@@ -6,8 +6,8 @@ from mlscorr.effects.catalogue import effects_by_name
 from mlscorr.wording import joined
 
 OTHERS = {
-    "none": ("Nothing", "The simulator describes this survey as it is."),
-    "unknown": ("Something unknown", "An error that none of the known effects explains."),
+    "none": ("Nothing", "The simulator describes this survey correctly."),
+    "unknown": ("Something unknown", "An error that no known effect explains."),
 }
 
 

@@ -26,8 +26,8 @@ class Boresight(Effect):
 
     stage: ClassVar = "mounting"
     title: ClassVar = "Boresight"
-    meaning: ClassVar = "The scanner is turned otherwise than the recorded mounting says."
-    sentence: ClassVar = "The recorded boresight is wrong: the scanner is really turned {size}."
+    meaning: ClassVar = "The scanner's orientation differs from the recorded mounting."
+    sentence: ClassVar = "The recorded boresight is wrong: the scanner is actually rotated {size}."
     remedy: ClassVar = "Run mlscorr calibrate, which estimates the mounting from the targets."
     sides: ClassVar = (
         ("nose up", "nose down"),
@@ -38,7 +38,7 @@ class Boresight(Effect):
     magnitude: tuple[float, float, float] = quantity(
         "deg",
         10.0,
-        "a mounting is known from its drawing to a degree",
+        "drawings give a mounting to a degree",
         count=3,
         typical=0.05,
         source="Mao et al. 2015, Table 6: 0.03, 0.06 and 0.21 deg",
@@ -61,8 +61,8 @@ class LeverArm(Effect):
 
     stage: ClassVar = "mounting"
     title: ClassVar = "Lever arm"
-    meaning: ClassVar = "The scanner sits elsewhere on the vehicle than the recorded mounting says."
-    sentence: ClassVar = "The recorded lever arm is wrong: the scanner really sits {size}."
+    meaning: ClassVar = "The scanner's position on the vehicle differs from the recorded mounting."
+    sentence: ClassVar = "The recorded lever arm is wrong: the scanner is actually {size}."
     remedy: ClassVar = "Run mlscorr calibrate, which estimates the mounting from the targets."
     sides: ClassVar = (
         ("farther right", "farther left"),

@@ -22,13 +22,13 @@ class BeamDivergence(Effect):
 
     stage: ClassVar = "beam"
     title: ClassVar = "Wide beam"
-    meaning: ClassVar = "The laser's footprint is wider than stated."
+    meaning: ClassVar = "The laser footprint is wider than stated."
     sentence: ClassVar = "The laser beam is {size} wider than stated."
-    remedy: ClassVar = "Ask the maker for the width of the scanner's beam."
+    remedy: ClassVar = "Ask the manufacturer for the beam width of the scanner."
     magnitude: float = quantity(
         "mrad",
         20.0,
-        "a footprint of 20 cm at 10 m is no laser scanner's",
+        "no laser scanner has a footprint of 20 cm at 10 m",
         typical=0.35,
         source="RIEGL VQ-250 data sheet: 0.35 mrad",
         least=0.0,
@@ -50,16 +50,16 @@ class RangeScale(Effect):
 
     stage: ClassVar = "range"
     title: ClassVar = "Range scale"
-    meaning: ClassVar = "Distances are wrong in proportion to their length."
-    sentence: ClassVar = "The scanner's distances are too {side} by {size} of their length."
+    meaning: ClassVar = "Range errors are proportional to the range."
+    sentence: ClassVar = "The ranges of the scanner are too {side} by {size} of their length."
     remedy: ClassVar = "Check temperature and pressure in the scanner's range correction."
     sides: ClassVar = ("long", "short")
     magnitude: float = quantity(
         "ratio",
         0.01,
-        "a counter or a refractive index can't be wrong by a hundredth",
+        "the time base or refractive index can't be wrong by a hundredth",
         typical=5e-5,
-        source="estimate: quartz of the counter 20-50 ppm, air 1 ppm/K (Rueeger 1990)",
+        source="estimate: quartz of the time base 20-50 ppm, air 1 ppm/K (Rueeger 1990)",
     )
 
     def _error(self, value, reference, rng):
@@ -78,14 +78,14 @@ class RangeBias(Effect):
 
     stage: ClassVar = "range"
     title: ClassVar = "Range bias"
-    meaning: ClassVar = "All distances that the scanner measures are wrong by a constant."
-    sentence: ClassVar = "Every distance of the scanner is {size} too {side}."
-    remedy: ClassVar = "Have the scanner's zero range checked on a base line."
+    meaning: ClassVar = "All ranges have the same constant error."
+    sentence: ClassVar = "All ranges of the scanner are {size} too {side}."
+    remedy: ClassVar = "Have the zero offset of the scanner's ranges checked on a baseline."
     sides: ClassVar = ("long", "short")
     magnitude: float = quantity(
         "m",
         1.0,
-        "the manufacturer's calibration can't miss a metre",
+        "the manufacturer's calibration can't be wrong by a meter",
         typical=0.010,
         source="RIEGL VQ-250 data sheet: accuracy 10 mm",
     )
@@ -111,19 +111,19 @@ class RangeWalk(Effect):
 
     stage: ClassVar = "range"
     title: ClassVar = "Range walk"
-    meaning: ClassVar = "Distances depend on how bright the return is."
+    meaning: ClassVar = "Ranges depend on the intensity of the return."
     sentence: ClassVar = (
         "Bright surfaces are measured {side} than dark ones: {size} for ten times the intensity."
     )
-    remedy: ClassVar = "Ask the maker for the scanner's range correction by intensity."
+    remedy: ClassVar = "Ask the manufacturer for the intensity-dependent range correction."
     sides: ClassVar = ("farther", "nearer")
     worded_unit: ClassVar = "m"
     magnitude: float = quantity(
         "m per decade",
         0.2,
-        "a pulse of 1 ns is 15 cm long, and its edge can't walk further",
+        "a pulse of 1 ns is 15 cm long, and its edge can't shift further",
         typical=0.005,
-        source="estimate: a thirtieth of the 15 cm of a pulse of 1 ns, left by calibration",
+        source="estimate: a thirtieth of the 15 cm of a pulse of 1 ns, remaining after calibration",
     )
     reference_intensity: float = quantity(
         "counts of 16 bits",
@@ -154,18 +154,16 @@ class IncidenceBias(Effect):
 
     stage: ClassVar = "range"
     title: ClassVar = "Incidence bias"
-    meaning: ClassVar = "Distances depend on the angle at which the beam meets the surface."
-    sentence: ClassVar = (
-        "Where the beam meets a surface at a slant, distances are too {side}: by {size} at 60°."
-    )
+    meaning: ClassVar = "Ranges depend on the incidence angle."
+    sentence: ClassVar = "At oblique incidence, ranges are too {side}: by {size} at 60°."
     remedy: ClassVar = "Check ranges at grazing incidence against a known plane."
     sides: ClassVar = ("long", "short")
     magnitude: float = quantity(
         "m",
         0.1,
-        "it acts ninefold at grazing incidence, and would show to the eye",
+        "the error is nine times as large at grazing incidence and would be visible",
         typical=0.003,
-        source="estimate: millimetres, as the noise that Soudarissanane et al. 2009 find at 60 deg",
+        source="estimate: millimeters, as the noise that Soudarissanane et al. 2009 find at 60 deg",
     )
 
     def _error(self, value, reference, rng):
@@ -185,12 +183,12 @@ class RangeNoise(Effect):
     stage: ClassVar = "range"
     random: ClassVar = True
     title: ClassVar = "Noisy ranges"
-    meaning: ClassVar = "Distances are noisier than stated."
+    meaning: ClassVar = "Ranges are noisier than stated."
     sentence: ClassVar = (
-        "The scanner's distances are noisier than stated: {size} of scatter come on top."
+        "The ranges of the scanner are noisier than stated: {size} of additional noise."
     )
     remedy: ClassVar = (
-        "State the scanner's range noise in survey.toml as large as found, or have the scanner "
+        "Set the scanner's range noise in survey.toml to the value found, or have the scanner "
         "checked."
     )
     magnitude: float = quantity(
@@ -219,13 +217,13 @@ class Dropout(Effect):
     stage: ClassVar = "return"
     random: ClassVar = True
     title: ClassVar = "Lost returns"
-    meaning: ClassVar = "Pulses that should return are lost."
-    sentence: ClassVar = "{size} of the pulses that should come back are lost."
-    remedy: ClassVar = "Look for wet or dark surfaces, or a dirty window of the scanner."
+    meaning: ClassVar = "Expected returns are missing."
+    sentence: ClassVar = "{size} of the expected returns are missing."
+    remedy: ClassVar = "Look for wet or dark surfaces, or a dirty scanner window."
     magnitude: float = quantity(
         "ratio",
         0.99,
-        "nothing to work with would be left",
+        "too few returns would remain",
         typical=0.05,
         source="estimate: dark or wet surfaces return nothing for one pulse in twenty",
         least=0.0,

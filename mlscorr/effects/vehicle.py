@@ -11,7 +11,7 @@ from mlscorr.effects.effect import Effect
 from mlscorr.effects.stages import EAST_NORTH_UP, MAP
 from mlscorr.wording import DASH, joined, known, size
 
-GNSS_LOST = "a GNSS that far off is known to be lost"
+GNSS_LOST = "a GNSS solution that far off is recognized as lost"
 IN_TIME = "no survey is as long"
 
 
@@ -29,19 +29,18 @@ class HeadingDrift(Effect):
 
     stage: ClassVar = "pos"
     title: ClassVar = "Heading drift"
-    meaning: ClassVar = "The heading of the POS drifts away in the course of each pass."
+    meaning: ClassVar = "The heading of the POS drifts during each pass."
     sentence: ClassVar = (
         "The heading of the POS drifts {side} by {size} from start to end of each pass."
     )
     remedy: ClassVar = (
-        "Process the trajectory again: a heading that drifts points to GNSS with too few turns,"
-        " or a gyro's bias."
+        "Reprocess the trajectory: heading drift indicates GNSS with too few turns, or a gyro bias."
     )
     sides: ClassVar = ("to the right", "to the left")
     magnitude: float = quantity(
         "deg",
         10.0,
-        "any GNSS/INS knows the heading of a moving car better",
+        "any GNSS/INS has a more accurate heading in a moving car",
         typical=0.03,
         source="twice the paper's heading sigma of 0.014 deg (Mao et al. 2015, section 3)",
     )
@@ -75,11 +74,11 @@ class PositionStep(Effect):
 
     stage: ClassVar = "pos"
     title: ClassVar = "GNSS jump"
-    meaning: ClassVar = "The recorded position jumps once, and stays off to the end of the pass."
+    meaning: ClassVar = "The recorded position jumps and stays offset until the end of the pass."
     sentence: ClassVar = (
-        "The recorded position jumps {size}{where}, and stays off to the end of the pass."
+        "The recorded position jumps {size}{where} and stays offset until the end of the pass."
     )
-    remedy: ClassVar = "Process the trajectory again; mlscorr correct takes such a drift out."
+    remedy: ClassVar = "Reprocess the trajectory; mlscorr correct removes such a drift."
     sides: ClassVar = EAST_NORTH_UP
     parts: ClassVar = MAP
     magnitude: tuple[float, float, float] = quantity(
@@ -121,10 +120,10 @@ class PositionBump(Effect):
     """
 
     stage: ClassVar = "pos"
-    title: ClassVar = "Passing GNSS error"
-    meaning: ClassVar = "The recorded position is off for a while: multipath, or a short outage."
-    sentence: ClassVar = "The recorded position goes astray for a while{where}: {size} at worst."
-    remedy: ClassVar = "Look at GNSS at that time; mlscorr correct takes such a drift out."
+    title: ClassVar = "Temporary GNSS error"
+    meaning: ClassVar = "The recorded position is temporarily wrong: multipath, or a short outage."
+    sentence: ClassVar = "The recorded position is temporarily wrong{where}, by up to {size}."
+    remedy: ClassVar = "Check GNSS at that time; mlscorr correct removes such a drift."
     sides: ClassVar = EAST_NORTH_UP
     parts: ClassVar = MAP
     magnitude: tuple[float, float, float] = quantity(
@@ -139,7 +138,7 @@ class PositionBump(Effect):
     width: float = quantity(
         "s",
         3600.0,
-        "a bias of an hour is a datum",
+        "a bias of an hour is a datum error",
         least=0.1,
         typical=10.0,
         source="estimate: a house front of 50-100 m passed at 8 m/s",
@@ -168,11 +167,13 @@ class PositionNoise(Effect):
     stage: ClassVar = "pos"
     random: ClassVar = True
     title: ClassVar = "Noisy positions"
-    meaning: ClassVar = "The recorded position is noisier, or drifts more, than its sigmas say."
-    sentence: ClassVar = "The positions of the POS are worse than the simulator assumes: {size}."
+    meaning: ClassVar = "The recorded position is noisier or drifts more than its sigmas state."
+    sentence: ClassVar = (
+        "The positions of the POS are less accurate than the simulator assumes: {size}."
+    )
     remedy: ClassVar = (
-        "Run mlscorr correct, which takes the drift out of the cloud; tell it how well the POS "
-        "is known with the sigmas found."
+        "Run mlscorr correct, which removes the drift from the cloud; give it the sigmas found "
+        "here."
     )
     magnitude: float = quantity(
         "m",
@@ -199,17 +200,17 @@ class PositionNoise(Effect):
         >>> window = {"start": 413205.0, "length": 20.0, "largest sigma over the stated": 12.0}
         >>> window = {name: SizeEstimate(value, None, "") for name, value in window.items()}
         >>> PositionNoise.size_in_words(window)
-        {'size': 'up to 12 times as large between gps_time 413205 s and 413225 s'}
+        {'size': 'errors up to 12 times as large between gps_time 413205 s and 413225 s'}
         """
         if cls.FACTOR in parameters:
             estimate, sigma, _ = parameters[cls.FACTOR]
-            return {"size": f"{size(estimate, sigma, '')} times as large"}
+            return {"size": f"errors {size(estimate, sigma, '')} times as large"}
         if "magnitude" in parameters:
             estimate, sigma, unit = parameters["magnitude"]
             value = None
             if known(estimate):
                 value = abs(estimate)
-            return {"size": f"{size(value, sigma, unit)} of scatter come on top"}
+            return {"size": f"{size(value, sigma, unit)} of additional noise"}
         return {"size": cls._windows_in_words(parameters)}
 
     @classmethod
@@ -230,8 +231,8 @@ class PositionNoise(Effect):
         if left == 1:
             words.append("once more")
         elif left > 1:
-            words.append(f"{left} times more")
-        return f"up to {max(factors):.0f} times as large {joined(words)}"
+            words.append(f"{left} more times")
+        return f"errors up to {max(factors):.0f} times as large {joined(words)}"
 
     def _error(self, value, reference, rng):
         fixes = value.gps_time - value.gps_time[0]  # one per second
@@ -247,7 +248,7 @@ def _moment(effect, trajectory, reference):
     if trajectory.segment(moment) < 0:
         end = trajectory.gps_time[-1] - reference.start
         raise ValueError(
-            f"{effect.name} at {effect.time:g} s lies outside the trajectory, which ends after "
+            f"{effect.name} at {effect.time:g} s is outside the trajectory, which ends after "
             f"{end:.1f} s, or in one of its {len(trajectory.gaps)} gaps between passes."
         )
     return moment

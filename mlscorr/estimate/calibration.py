@@ -392,7 +392,7 @@ class Calibration(Summary):
 def sigma_note(determined: np.ndarray) -> str:
     """Note on the basis of sigmas of a mounting, given its determined components (6,)."""
     parts = ", ".join(compress(MOUNTING_COMPONENTS, ~determined))
-    note = f"not determined: {parts}; its sigma holds only as far as the POS's own do"
+    note = f"not determined: {parts}; its sigma depends on the sigmas stated by the POS"
     if parts:
         return note
     return ""

@@ -29,14 +29,12 @@ def checked_inputs(
         zero for both a control point and its observation.
     """
     if len(matched) == 0:
-        raise ValueError(
-            "There is no observation of a control point to estimate a correction from."
-        )
+        raise ValueError("No control point was observed, so no correction can be estimated.")
     check_order(order)
     _check_noise(matched)
     if pos.position_sigma < 0 or np.any(np.asarray(pos.attitude_sigma) < 0):
         raise ValueError(
-            f"The believed sigmas of the POS are {pos.position_sigma} m and "
+            f"The sigmas of the POS under [pos] are {pos.position_sigma} m and "
             f"{np.degrees(pos.attitude_sigma).tolist()} deg; none may be negative."
         )
     return filled_sigmas(trajectory)
@@ -55,7 +53,8 @@ def check_order(order: int) -> None:
     """
     if not isinstance(order, int | np.integer) or isinstance(order, bool) or order < 0:
         raise ValueError(
-            f"The trend's order is {order!r}; it should be 0 (a shift) or more, a whole number."
+            f"The order of the trend is {order!r}; it must be a whole number of 0 (a shift) or "
+            "more."
         )
 
 
@@ -67,9 +66,9 @@ def _check_noise(matched):
         first = int(np.argmax(wrong))
         raise ValueError(
             f"{wrong.sum()} of {len(matched)} observed control points have a sigma that is "
-            f"negative, not a number, or zero together with that of their observation (first: "
-            f"{matched.name[first]}, {sigma[first].tolist()} m). No survey is free of noise: "
-            "give sigma_horizontal and sigma_vertical, 0.002 m at least with a total station."
+            "negative, not a number, or zero for both survey and observation (first: "
+            f"{matched.name[first]}, {sigma[first].tolist()} m). Set sigma_horizontal and "
+            "sigma_vertical, at least 0.002 m with a total station."
         )
 
 
@@ -97,7 +96,7 @@ def filled_sigmas(trajectory: Trajectory) -> tuple[Trajectory, tuple[Statement, 
         if (sigma < 0).any():
             raise ValueError(
                 f"{(sigma < 0).any(axis=1).sum()} of {len(trajectory)} trajectory epochs have a "
-                f"negative {name}. Is the file's column order right?"
+                f"negative {name}. Check the order of the columns."
             )
         stated = (sigma > 0).all(axis=1)
         if not stated.any():

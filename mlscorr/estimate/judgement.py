@@ -174,14 +174,14 @@ class _Group(NamedTuple):
             inside |= (time > burst.first) & (time < burst.last)
         inside = np.flatnonzero(inside)
         rows = (3 * inside[:, None] + np.arange(3)).ravel()
-        solved_part = solved.weights[rows], solved.precision_of(rows)
-        wrong = _wrong_evidence(solved_part, adjustment.names[inside], names)
+        normal = solved.weights[rows], solved.precision_of(rows)
+        wrong = _wrong_evidence(normal, adjustment.names[inside], names)
         drift = 0.0
         drifts = []
         courses = np.empty((len(inside), 0))
         for burst in bursts:
             tried = [np.column_stack([courses, own]) for own in _courses_of(burst, time[inside])]
-            evidence = [error_evidence(*solved_part, each) for each in tried]
+            evidence = [error_evidence(*normal, each) for each in tried]
             if max(evidence) > drift:
                 drift = max(evidence)
                 courses = tried[int(np.argmax(evidence))]
@@ -212,18 +212,18 @@ def _groups(adjustment, refused):
     names = adjustment.names[order]
     is_out = np.isin(names, list(refused))
     passes = np.flatnonzero(np.diff(adjustment.trajectory.segment(time))) + 1
-    excursions = runs(is_out, passes)
+    spans = runs(is_out, passes)
     number = {name: k for k, name in enumerate(refused)}
-    edges = [(number[name], k) for k, (i, j) in enumerate(excursions) for name in set(names[i:j])]
+    edges = [(number[name], k) for k, (i, j) in enumerate(spans) for name in set(names[i:j])]
     target, run = np.array(edges).T
-    size = len(number) + len(excursions)
+    size = len(number) + len(spans)
     graph = coo_array((np.ones(len(edges)), (target, len(number) + run)), (size, size))
     label = connected_components(graph, directed=False)[1]
     for group in np.unique(label):
         own = tuple(name for name in refused if label[number[name]] == group)
         bursts = [
             _burst(adjustment.trajectory, time, names, *rows)
-            for k, rows in enumerate(excursions)
+            for k, rows in enumerate(spans)
             if label[len(number) + k] == group
         ]
         yield own, [burst for burst in bursts if burst.first < burst.last]
@@ -241,20 +241,20 @@ def _burst(trajectory, time, names, start, end):
     )
 
 
-def _wrong_evidence(solved_part, observed, names):
+def _wrong_evidence(normal, observed, names):
     """Log evidence that targets are wrong: each, in all passes or in one; or all by one setup."""
     courses = [(observed == name).astype(float) for name in names]
-    setup = error_evidence(*solved_part, np.sum(courses, axis=0))
-    evidence = error_evidence(*solved_part, np.column_stack(courses))
+    setup = error_evidence(*normal, np.sum(courses, axis=0))
+    evidence = error_evidence(*normal, np.column_stack(courses))
     for number, course in enumerate(courses):
         passes = np.flatnonzero(course)
         if len(passes) == 1:
             continue
         for single in np.eye(len(observed))[passes]:
             tried = [*courses[:number], single, *courses[number + 1 :]]
-            one_pass = error_evidence(*solved_part, np.column_stack(tried))
-            if one_pass > evidence:
-                evidence = one_pass
+            gain = error_evidence(*normal, np.column_stack(tried))
+            if gain > evidence:
+                evidence = gain
                 courses = tried
     return max(evidence, setup)
 

@@ -172,15 +172,15 @@ def control_fault(matched: Matched, number: int) -> str:
     if count < SETTINGS.smallest_targets:
         return (
             f"{count} control points were found in the cloud; a calibration of lever arm and "
-            f"boresight needs {SETTINGS.smallest_targets} at least, and 8 or more on both sides "
-            "of the way, near and far, to be of use."
+            f"boresight needs at least {SETTINGS.smallest_targets}. For useful results, survey 8 "
+            "or more on both sides of the road, near and far."
         )
     span = np.ptp(matched.gps_time)
     if span < SAME_EPOCH:
         return (
-            f"All {count} control points were seen within {span:.2f} s (at least "
-            f"{SAME_EPOCH:.0f} s are needed): at one time the error of the POS can't be told from "
-            "that of the mounting. Drive past control points in both directions."
+            f"All {count} control points were observed within {span:.2f} s (at least "
+            f"{SAME_EPOCH:.0f} s are needed), so POS error and mounting error are not separable. "
+            "Drive past control points in both directions."
         )
     return ""
 

@@ -197,11 +197,11 @@ def _reason(observed, names, time, drive, share, limit, passes):
     if share[0] == share[1]:
         before = "as before"
     else:
-        before = f"instead of {percent(share[0], 1)}"
+        before = f"up from {percent(share[0], 1)}"
     return (
-        f"{where}{often}: along the drive the 3D sigma falls from {1e3 * drive[0]:.1f} to "
-        f"{1e3 * drive[1]:.1f} mm (RMS), and {percent(share[1], 1)} of it, {before}, are "
-        f"below {1e3 * limit:.1f} mm."
+        f"{where}{often}: the 3D sigma along the drive decreases from {1e3 * drive[0]:.1f} to "
+        f"{1e3 * drive[1]:.1f} mm (RMS). {percent(share[1], 1)} of the drive, {before}, then has "
+        f"less than {1e3 * limit:.1f} mm."
     )
 
 

@@ -14,12 +14,12 @@ from mlscorr.pos import SignalParameters, drift_history, drift_signals
 from mlscorr.survey import SAME_EPOCH, Trajectory
 
 REASONS = (
-    "control points hold it",
-    "its pass has no control point",
-    "before the first control point of its pass",
-    "past the last control point of its pass",
-    "in a GNSS outage, past its last control point",
-    "control points tell less than half of the drift's variance",
+    "constrained by control points",
+    "pass without control point",
+    "before the first control point of the pass",
+    "after the last control point of the pass",
+    "in a GNSS outage, after the last control point",
+    "control points explain less than half of the variance of the drift",
 )
 CONSTRAINED, NO_CONTROL, BEFORE_FIRST, PAST_LAST, IN_OUTAGE, DRIFT = range(len(REASONS))
 
@@ -65,7 +65,7 @@ class Support:
 
     Parameters
     ----------
-    weak : tuple of WeakStretch
+    weak : tuple of WeakInterval
         In time order, without overlap.
     outages : tuple of (float, float)
         Start of the growth of drift, and its restart. Units: s.
@@ -87,7 +87,7 @@ class Support:
 
         Examples
         --------
-        >>> weak = WeakStretch(0.0, 2.0, 9.0, 0.3, "a"), WeakStretch(2.0, 3.0, 5.0, 0.2, "b")
+        >>> weak = WeakInterval(0.0, 2.0, 9.0, 0.3, "a"), WeakInterval(2.0, 3.0, 5.0, 0.2, "b")
         >>> Support(weak).contains(np.array([-1.0, 0.0, 2.0, 3.0, 3.5]))
         array([False,  True,  True,  True, False])
         """
@@ -203,7 +203,7 @@ def _is_drifting(adjustment, parameters):
 
 
 def weak_intervals(codes: np.ndarray, trajectory: Trajectory) -> Iterator[WeakInterval]:
-    """Yield a WeakStretch for each run of epochs with one reason, split at the trajectory's gaps.
+    """Yield a WeakInterval for each run of epochs with one reason, split at the trajectory's gaps.
 
     Parameters
     ----------

@@ -155,8 +155,8 @@ def error_evidence(weights: np.ndarray, precision: np.ndarray, course: np.ndarra
     course : (k,) or (k, q) array
         Fraction of one error vector, or of each of q, in each observation.
     """
-    columns = np.kron(np.reshape(course, (len(weights) // 3, -1)), np.eye(3))
-    return float(_evidence(columns.T @ weights, columns.T @ precision @ columns))
+    design = np.kron(np.reshape(course, (len(weights) // 3, -1)), np.eye(3))
+    return float(_evidence(design.T @ weights, design.T @ precision @ design))
 
 
 def gross_evidence(solved: Collocation, rows_of: dict) -> dict:

@@ -15,30 +15,30 @@ COUNTS = {
     "check.n": "number of observations of check points",
     "control.n": "number of observations of control points",
     "check.n_surveyed": "number of surveyed check points",
-    "check.n_seen": "number of check points that were seen",
-    "check.n_scored": "number of check points that were scored",
-    "check.n_unseen": "number of check points that should have been seen and were not",
+    "check.n_seen": "number of check points that were found",
+    "check.n_scored": "number of check points used for the RMSE",
+    "check.n_unseen": "number of check points that should have been found but were not",
     "control.n_surveyed": "number of surveyed control points",
-    "control.n_seen": "number of control points that were seen",
+    "control.n_seen": "number of control points that were found",
     "control.n_scored": "number of control points that were used",
-    "control.n_unseen": "number of control points that should have been seen and were not",
+    "control.n_unseen": "number of control points that should have been found but were not",
     "model.sigma0": "sigma0",
     "model.outliers": "number of rejected control points",
     "coverage.longest_gap_s": "longest time without control (s)",
     "coverage.points_outside_trajectory": "points outside the trajectory",
     "coverage.points_outside_control": "points outside the control span",
     "coverage.points_corrected": "corrected points",
-    "coverage.points_untouched": "points that were left as they were",
+    "coverage.points_untouched": "points that were not corrected",
     "coverage.points_noise": "points flagged as noise",
     "coverage.points_extrapolated": "points whose correction is extrapolated",
     "coverage.share_extrapolated": "share of the points whose correction is extrapolated (0 to 1)",
     "coverage.seconds_extrapolated": "time whose correction is extrapolated (s)",
-    "coverage.metres_extrapolated": "way whose correction is extrapolated (m)",
+    "coverage.metres_extrapolated": "distance whose correction is extrapolated (m)",
 }
 WEAK = {
-    "weak.n": "number of extrapolated stretches",
-    "weak.sigma": "largest sigma of an extrapolated stretch (m)",
-    "weak.length_m": "longest extrapolated stretch (m)",
+    "weak.n": "number of extrapolated segments",
+    "weak.sigma": "largest sigma of an extrapolated segment (m)",
+    "weak.length_m": "longest extrapolated segment (m)",
 }
 GROUPS = {"check": "check points", "control": "control points", "leave_one_out": "left-out control"}
 
@@ -86,8 +86,8 @@ def read_gate(text: str) -> Gate:
     if quantity not in known:
         near = get_close_matches(quantity, known, n=1, cutoff=0.0)[0]
         raise ValueError(
-            f"The quality gate '{text}' asks for '{quantity}', which the report doesn't have. "
-            f"The nearest it has is '{near}'."
+            f"The quality gate '{text}' uses '{quantity}', which is not in the report. The "
+            f"nearest quantity is '{near}'."
         )
     return gate
 

@@ -21,48 +21,50 @@ def _nearest_effect(effect: str, share: float | None) -> str:
     if share is not None:
         closes = f"closes {percent(share)} of the squared gap, but "
     return (
-        f"The nearest known effect, {lowered(title(effect))}, {closes}does not explain it: don't "
-        "use it."
+        f"The nearest known effect, {lowered(title(effect))}, {closes}does not explain it: do "
+        "not use it."
     )
 
 
 def _addition(labels: Sequence[str], survey: str, why: str) -> str:
     names = dict.fromkeys(lowered(title(label)) for label in labels)
-    return f"To settle what is open ({', '.join(names)}), measure {survey}: {why}"
+    return f"To resolve the open hypotheses ({', '.join(names)}), measure {survey}: {why}"
 
 
 ADVICE: dict[str, Wording] = {
-    "nothing to do": "Nothing needs to be done: what is left agrees with what the simulator says.",
-    "drift of a default": "Run mlscorr correct: what is left looks like drift of the POS, whose "
-    "sigma nobody stated.",
-    "errors above stated": "Errors are larger than stated: run mlscorr correct, or state POS "
-    "sigmas larger.",
-    "gap above chance": "More control points, or a second pass, may show why the two differ.",
-    "unmatched targets": "Find out why the targets of that stretch could not be matched before the "
-    "survey is trusted there: the warnings give each one's reason.",
-    "unstated mounting": "State [mounting] in survey.toml and diagnose again: {effects} kinds of "
-    "error can't be judged without it, and one of them may be the cause.",
-    "unknown error": "Look for what makes a {lead}: no effect that was judged does.",
+    "nothing to do": "No action is needed: the remaining differences agree with the simulator.",
+    "drift of a default": "Run mlscorr correct: the remaining differences look like POS drift, "
+    "and no sigma of the POS was given.",
+    "errors above stated": "The errors are larger than stated: run mlscorr correct, or increase "
+    "the stated sigmas of the POS.",
+    "gap above chance": "More control points or a second pass may show why survey and "
+    "simulation differ.",
+    "unmatched targets": "Find out why the targets of that interval could not be matched before "
+    "using the survey there. The warnings give the reason for each target.",
+    "unstated mounting": "Add [mounting] to survey.toml and diagnose again: {effects} error "
+    "types can't be tested without it, and one of them may be the cause.",
+    "unknown error": "Look for the cause of a {lead}: no tested effect explains it.",
     "nearest effect": _nearest_effect,
     "remedy": lambda effect: effect_class(effect).remedy,
-    "grown gap": "But with that size in the simulator the gap grew (from {before:.1f} to "
-    "{after:.1f} {unit}): trust what was found, not how large it is.",
+    "grown gap": "However, the gap increased with that size in the simulator (from {before:.1f} "
+    "to {after:.1f} {unit}). The cause is reliable, its size is not.",
     "addition": _addition,
-    "channels": "See by what the clouds differ beside geometry: Channels.",
-    "simulator as it was": "simulator.toml is as it was, since no simulator can take that: {why}",
-    "next run": "Run mlscorr diagnose once more with --simulator simulator.toml of this folder: it "
-    "has the cause in it, and the next run finds what is left, or nothing.",
-    "next clouds": "Put the cause into your simulator, and give the clouds that it makes then as a "
-    "second --simulated: they tell how far the gap shrinks, and by themselves what is left.",
-    "second clouds": "Run mlscorr diagnose with your second clouds alone: they tell what is left.",
+    "channels": 'See "Channels" for differences other than geometry.',
+    "simulator as it was": "simulator.toml is unchanged, because no simulator can include this: "
+    "{why}",
+    "next run": "Run mlscorr diagnose again with --simulator simulator.toml from this folder. "
+    "It contains the cause, and the next run finds what remains.",
+    "next clouds": "Add the cause to your simulator, and give its new clouds as a second "
+    "--simulated. They show how far the gap decreases; on their own, they show "
+    "what remains.",
+    "second clouds": "Run mlscorr diagnose with the second clouds alone: they show what remains.",
 }
 
 LEFT_OUT: dict[str, Wording] = {  # reasons why an effect is not judged
     "no mounting": "It acts on the {stage}, and the survey has no [mounting].",
-    "unstated size": "survey.toml does not state how large it is: [scanner] {name}.",
-    "no row": "No row of this survey depends on it.",
-    "noise": "Noise shows in the roughness of surfaces and the spread of residuals, not in a "
-    "shift.",
+    "unstated size": "survey.toml does not give its size: [scanner] {name}.",
+    "no row": "No residual of this survey depends on it.",
+    "noise": "Noise shows in surface roughness and in the scatter of residuals, not in a shift.",
     "not usable": "{why}",
 }
 
@@ -78,10 +80,10 @@ def no_cause(labels: Sequence[str], excess: str) -> str:
         From ``excess_of``.
     """
     if excess:
-        return f"No cause is shown, but the two differ by more than {excess}"
+        return f"No cause is identified, but survey and simulation differ by more than {excess}"
     if list(labels) != ["none"]:
-        return "Nothing is shown to be wrong, but not all is ruled out"
-    return "Nothing is wrong that this survey could show"
+        return "No error was detected, but not all errors are ruled out"
+    return "No error was detected that this survey could show"
 
 
 def sentence_of(inference: Inference, excess: str) -> str:
@@ -97,18 +99,20 @@ def sentence_of(inference: Inference, excess: str) -> str:
     cause = inference.cause
     chance = f"probability {verdict.probability:.2f}"
     if verdict.label == "none":
-        return f"{no_cause(verdict.set, excess)} ({chance} that nothing is wrong)."
+        return f"{no_cause(verdict.set, excess)} ({chance} of no error)."
     if verdict.is_hidden:
         return (
-            f"What was compared shows nothing wrong, but it can't be said that nothing is: there "
-            f"is a {verdict.lead} (probability of something unknown {verdict.probability:.2f})."
+            f"The comparison shows no error, but an error is possible: there is a {verdict.lead} "
+            f"(probability of an unknown error {verdict.probability:.2f})."
         )
     if verdict.label == "unknown":
-        return f"No effect that was judged explains it ({chance}): it looks like a {verdict.lead}."
+        return f"No tested effect explains the differences ({chance}). Hint: {verdict.lead}."
     parameters = distinct_parameters(cause)
     sizes = [f"{p.name} {size(p.estimate, p.sigma, p.unit)}" for p in parameters]
     do = "explain" if "+" in verdict.label else "explains"
-    return f"{title(verdict.label)} {do} it ({chance}): {', '.join(sizes)} (± one sigma)."
+    return (
+        f"{title(verdict.label)} {do} the differences ({chance}): {', '.join(sizes)} (± 1 sigma)."
+    )
 
 
 def advice_sentences(advice: Iterable[Statement]) -> list[str]:
@@ -196,20 +200,20 @@ def headline(where: Where, label: str, lead: str, start: float) -> str:
     """
     low, high = where.null_band
     is_measurable = where.before > high
-    chance = f"{low:.1f} to {high:.1f} mm when nothing is wrong"
-    size = f"All residuals together differ by {where.before:.1f} mm more than simulated ({chance})"
+    chance = f"{low:.1f} to {high:.1f} mm without any error"
+    size = f"The residuals together differ from the simulation by {where.before:.1f} mm ({chance})"
     if not is_measurable:
-        size = f"All residuals together differ by no more than chance makes them ({chance})"
+        size = f"The residuals together agree with the simulation within chance ({chance})"
     is_moved = label != "none"
     if not is_measurable and not is_moved:
-        return f"Nothing stands out. {size}."
-    whole = "what the cause moves" if is_moved else "the gap"
+        return f"There is no significant difference. {size}."
+    whole = "the effect of the cause" if is_moved else "the gap"
     best = _largest(_places(where.splits, _acts_on(label, lead), start))
     if best is None:
-        return f"No part of the survey stands out. {size}."
+        return f"No part of the survey is conspicuous. {size}."
     return (
-        f"{percent(min(best.share, 1.0))} of {whole} lies {best.words}, where "
-        f"{percent(best.rows)} of the residuals are. {size}."
+        f"{percent(min(best.share, 1.0))} of {whole} is {best.words}, with {percent(best.rows)} "
+        f"of the residuals. {size}."
     )
 
 

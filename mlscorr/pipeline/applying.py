@@ -71,12 +71,12 @@ def apply(
     effects = tuple(effect for part in parts for effect in part.effects)
     stubborn = [effect for effect in effects if effect.name not in TAKEN_OUT]
     if not effects:
-        raise ValueError(f"No effect is given: {joined(TAKEN_OUT)} can be taken out.")
+        raise ValueError(f"No effect is given; {joined(TAKEN_OUT)} can be removed.")
     if stubborn:
         names = joined([effect.name for effect in stubborn])
         remedies = " ".join(effect.remedy for effect in stubborn)
         raise ValueError(
-            f"{names} can't be taken out of clouds and trajectory; {joined(TAKEN_OUT)} can. "
+            f"{names} can't be removed from clouds and trajectory; {joined(TAKEN_OUT)} can. "
             f"{remedies}"
         )
     for part in parts:
@@ -88,8 +88,8 @@ def apply(
             raise ValueError(fault)
         if survey.mounting is None:
             raise SurveyFileError(
-                f"{survey.path} has no [mounting], which {joined(MOUNTING, 'or')} could change. "
-                "Add the lever_arm (m) and boresight (deg) that the cloud was georeferenced with."
+                f"{survey.path} has no [mounting], which {joined(MOUNTING, 'or')} needs. Add the "
+                "lever_arm (m) and boresight (deg) with which the cloud was georeferenced."
             )
     correction = _correction(survey, effects)
     mounting = correction.corrected_mounting
@@ -107,8 +107,8 @@ def _effects_together(given) -> list[FoundEffects]:
     for effect in effects:
         if not isinstance(effect, Effect | FoundEffects):
             raise ValueError(
-                f"{effect!r} is no effect: mlscorr.effects.make_effect(name, magnitude=size) makes "
-                f"one; {joined(TAKEN_OUT)} can be taken out."
+                f"{effect!r} is not an effect. Create one with mlscorr.effects.make_effect(name, "
+                f"magnitude=size); {joined(TAKEN_OUT)} can be removed."
             )
     return [e if isinstance(e, FoundEffects) else FoundEffects((e,)) for e in effects]
 
@@ -235,14 +235,14 @@ class AppliedSurvey(Summary):
         if left:
             warnings.warn(
                 f"{left} of {survey.points} points outside the trajectory or in its gaps keep "
-                f"{joined(by_time)}, which goes by time: the clouds are torn there. Export the "
-                "whole trajectory, or clip the clouds to it.",
+                f"{joined(by_time)}, which depends on time, so the clouds have discontinuities "
+                "there. Export the whole trajectory, or clip the clouds to it.",
                 stacklevel=3,
             )
         if survey.reference is not None and correction.datum.any():
             way = ", ".join(f"{a} {v:+.3f}" for a, v in zip("ENH", correction.datum, strict=True))
             warnings.warn(
-                f"The reference surface {survey.reference} stays where the clouds were. Move it by "
-                f"{way} m, too, or remove scene.reference from the new survey.toml.",
+                f"The reference surface {survey.reference} was not moved. Move it by {way} m as "
+                "well, or remove scene.reference from the new survey.toml.",
                 stacklevel=3,
             )

@@ -103,7 +103,7 @@ def run_blind(
     out = Path(out)
     folders = sorted(path for path in (out / "cases").glob("*") if not path.name.startswith("."))
     if not folders:
-        raise ValueError(f"{out} holds no cases: make them first with mlscorr blind make.")
+        raise ValueError(f"{out} has no cases. Create them first with mlscorr blind make.")
     for folder in folders:
         _check_blind(folder)
     answers = out / "answers"
@@ -138,13 +138,13 @@ def score_blind(out: Path) -> dict:
     if broken:
         raise ValueError(
             f"{len(broken)} of {len(seals)} seals of {out} are broken (first: {broken[0]}): a "
-            "label or its salt was changed after it was sealed, so nothing can be scored. Make the "
-            "cases anew."
+            "label or its salt was changed after sealing, so nothing can be scored. Create the "
+            "cases again."
         )
     answers = {path.stem: _read(path) for path in sorted((out / "answers").glob("*.json"))}
     answered = [name for name in sorted(seals) if name in answers]
     if not answered:
-        raise ValueError(f"{out} has no answers yet: run mlscorr blind run first.")
+        raise ValueError(f"{out} has no answers. Run mlscorr blind run first.")
     scored = score({name: (key[name]["label"], answers[name]) for name in answered})
     content = document("score", {"cases": len(seals), "answered": len(answered), **scored})
     write_json(out / "score.json", content)
@@ -153,7 +153,7 @@ def score_blind(out: Path) -> dict:
 
 def _read(path):
     if not path.is_file():
-        raise ValueError(f"{path} is missing: it is made by mlscorr blind make and run.")
+        raise ValueError(f"{path} is missing; mlscorr blind make and run create it.")
     return json.loads(path.read_text(encoding="utf-8"))
 
 
@@ -170,13 +170,13 @@ def _opened(out, plan):
         key = _read(path)
         if key["plan"] != plan:
             raise ValueError(
-                f"{out} holds a blind check of {key['plan']['cases']} cases with seed "
-                f"{key['plan']['seed']} and {len(key['plan']['mechanisms'])} mechanisms, not this "
-                "one: choose another folder."
+                f"{out} has a blind check of {key['plan']['cases']} cases with seed "
+                f"{key['plan']['seed']} and {len(key['plan']['mechanisms'])} mechanisms, not "
+                "this one. Choose another folder."
             )
         return key
     if out.exists() and any(out.iterdir()):
-        raise ValueError(f"{out} holds other files already: choose another folder.")
+        raise ValueError(f"{out} contains other files. Choose another folder.")
     (out / "cases").mkdir(parents=True)
     key = {"plan": plan, "labels": {}}
     _write_key(out, key)
@@ -204,8 +204,8 @@ def _check_blind(folder):
     readable = sorted(p for name in SECRET for p in folder.rglob(name) if p.is_file())
     if readable:
         raise ValueError(
-            f"{readable[0]} can be read by the diagnosis, which must not know the truth: remove "
-            "it, or make the cases anew."
+            f"The diagnosis can read {readable[0]}, but must not know the truth. Remove it, or "
+            "create the cases again."
         )
 
 

@@ -177,9 +177,9 @@ class CalibratedSurvey(CalibrationResult):
             if row["determined"]:
                 doubt = ""
             else:
-                doubt = "not determined by this site: as the POS states"
+                doubt = "not determined by this geometry: equals the sigma stated by the POS"
             rows.append((row["component"], *numbers, row["unit"], doubt))
-        return [(f"{self.survey.name}: what the recorded mounting lacks",), *rows]
+        return [(f"{self.survey.name}: corrections to the recorded mounting",), *rows]
 
     def report(self, with_drift: bool = False) -> dict[str, object]:
         """Return the contents of calibration.json, for one scanner.

@@ -36,10 +36,9 @@ from mlscorr.survey import Matched, Survey, SurveyFileError, TieFeatures, check_
 from mlscorr.ties import tie_mounting
 
 NOTHING_CALIBRATES = (
-    "{} has nothing to calibrate with: {} control points were found (at least 3 are needed, at "
-    "more than one time), and no two passes saw the same planes. A single pass without control "
-    "shows everything once, as its mounting puts it. Drive the way back as well, or survey control "
-    "points on both sides of the way, near and far."
+    "{} can't be calibrated: {} control points were found (at least 3 at different times are "
+    "needed), and no planes were scanned in two passes. Drive the road in both directions, or "
+    "survey control points on both sides of it, near and far."
 )
 
 LOG = logging.getLogger(__name__)
@@ -98,8 +97,8 @@ def calibrate(
     for name, part in survey.by_scanner.items():
         if part.mounting is None:
             raise SurveyFileError(
-                f"{_title(name)}{survey.path} has no [mounting]: a calibration needs the lever_arm "
-                "(m) and boresight (deg) that the cloud was georeferenced with. Add that section."
+                f"{_title(name)}{survey.path} has no [mounting]. Add the lever_arm (m) and "
+                "boresight (deg) with which the cloud was georeferenced."
             )
         warn_of_scanners(part)
     if ties is None:
@@ -127,7 +126,7 @@ def calibrate(
         len(calibration.determined),
     )
     for test in calibration.screening.outliers:
-        LOG.info("%s not used: the others contradict it", test.name)
+        LOG.info("%s not used: contradicted by the others", test.name)
 
     parts = _parts(survey, control, check, finding, calibration)
     for name, part in parts.items():
@@ -293,9 +292,9 @@ def warn_of_scanners(survey: Survey) -> None:
         overlap = min(end, last) - first
         if overlap > SETTINGS.tile_overlap * min(end - start, last - first):
             warnings.warn(
-                f"{name} and {other} were measured at the same time for {overlap:.1f} s. If two "
-                "scanners did so, name them as [[scanner]], each with its files and its mounting: "
-                "these files are taken to be of one.",
+                f"{name} and {other} overlap in time by {overlap:.1f} s. If they come from two "
+                "scanners, list these as [[scanner]], each with its files and mounting; one "
+                "scanner is assumed.",
                 stacklevel=3,
             )
             return

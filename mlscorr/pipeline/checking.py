@@ -101,7 +101,7 @@ def check(path: str | Path) -> CheckedSurvey:
         find_faults(path, faults)
     for fault in first.faults:
         faults.add(fault.where, fault.sentence, fault.number)
-    reason = "Targets in the cloud, time and memory: the faults come first."
+    reason = "Targets in the cloud, time and memory: not checked until the faults are corrected."
     return CheckedSurvey(tuple(faults.faults), tuple(faults.warnings), unchecked=(reason,))
 
 
@@ -122,7 +122,7 @@ def checked_survey(survey: Survey, faults: Faults, needs_control: bool = True) -
     layouts = [read_layout(path) for path in survey.cloud_paths]
     passes, outside = _placed_times(survey)
     if not passes:
-        faults.add("data", "No point of any cloud was measured while the trajectory was.")
+        faults.add("data", "No point of any cloud was measured during the trajectory.")
     uncovered, is_beside = _uncovered(survey, layouts)
     faults.warn(*outside, *_crs_hints(survey, layouts), *uncovered)
     for layout in layouts:
@@ -171,7 +171,7 @@ def _crs_hints(survey, layouts) -> Iterator[str]:
         code = crs_code(stated)
         hint = f': set crs = "{code}".' if code else "."
         yield (
-            f"survey.toml gives no crs, the VLRs of {layouts[0].path.name} state "
+            f"survey.toml has no crs, but the VLRs of {layouts[0].path.name} state "
             f"{crs_name(stated)}{hint}"
         )
 
@@ -200,8 +200,9 @@ def _uncovered(survey, layouts) -> tuple[list[str], bool]:
         covered |= ((place >= low - margin) & (place <= high + margin)).all(axis=1)
     names = [survey.surveyed.name[i] for i in np.flatnonzero(~covered)]
     sentence = (
-        f"{len(names)} of the {len(place)} surveyed points lie more than {survey.search_radius:g} "
-        f"m outside the clouds by their headers (first: {next(iter(names), None)})."
+        f"{len(names)} of the {len(place)} surveyed points are more than "
+        f"{survey.search_radius:g} m outside the clouds, by their headers (first: "
+        f"{next(iter(names), None)})."
     )
     return [sentence] * bool(names), not covered[: len(survey.control)].any()
 
@@ -221,7 +222,7 @@ def _looked(
     if not len(survey.surveyed):
         return None, None, False, [], ("Targets in the cloud: the survey has no control.",)
     if parts := [file.path.name for file in survey.clouds if read_in_part(file.path)]:
-        reason = f"Targets in the cloud: {', '.join(parts)} was read by its first points only."
+        reason = f"Targets in the cloud: only the first points of {', '.join(parts)} were read."
         return None, None, False, [], (reason,)
     problems = Faults()
     probe = problems.of("data", look_near_control, survey)
@@ -258,13 +259,13 @@ def _found_notes(
     names = set(matched.name)
     lost = [name for name in points.name if name not in names]
     missing = f", not {', '.join(lost)}" if lost else ""
-    notes = [f"{len(names)} of {len(points)} targets that were looked at are found{missing}."]
+    notes = [f"{len(names)} of {len(points)} tested targets were found{missing}."]
     if len(matched):
         middle = ", ".join(
             f"{axis} {value:+.3f}"
             for axis, value in zip("ENH", np.median(matched.misclosure, axis=0), strict=True)
         )
-        notes.append(f"Median misclosure at these targets: {middle} m.")
+        notes.append(f"Median misclosure at the {len(names)} targets found: {middle} m.")
     if len(points) == len(survey.surveyed):
         return notes, ()
-    return notes, (f"Targets: {len(points)} of {len(survey.surveyed)} were looked at.",)
+    return notes, (f"Targets: only {len(points)} of {len(survey.surveyed)} were tested.",)

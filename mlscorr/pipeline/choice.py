@@ -58,8 +58,8 @@ def choose_control(
             apart[path] = str(error)
     if len(points) + len(problems) > 1:
         states = {path: str(error) for path, error in problems.items()}
-        question = ambiguous("control", dict.fromkeys(points, "can be used") | states)
-        sentence = f"{question} Join those that belong together, with a column role."
+        question = ambiguous("control", dict.fromkeys(points, "usable") | states)
+        sentence = f"{question} Combine those that belong together, with a column role."
         raise OpenQuestion(sentence, question.places)
     if points:
         path, read = next(iter(points.items()))
@@ -72,8 +72,8 @@ def choose_control(
     if tables:
         raise ValueError(
             f"{tables[0].path.name} is neither a trajectory nor a list of control points: "
-            f"{tables[0].reason}. Name its columns name, easting, northing, height, or move it out "
-            "of the folder, if there is no control."
+            f"{tables[0].reason}. Name its columns name, easting, northing, height; if it is not "
+            "control, move it out of the folder."
         )
     return None, None, {}
 
@@ -121,7 +121,7 @@ def choose_crs(clouds: list[Cloud], drive: Drive, given: str | None) -> tuple[st
         except UserWarning as warning:
             raise ValueError(
                 f"The crs {crs_name(projected)} ({reason}) and the trajectory {drive.name} "
-                f"disagree. {warning} Say which is right, as --set 'crs = \"EPSG:...\"'."
+                f"disagree. {warning} Set the right one with --set 'crs = \"EPSG:...\"'."
             ) from None
     _check_clouds(clouds, trajectory, crs, reason)
     return crs, f"{projected.name}, {reason}"
@@ -133,6 +133,6 @@ def _check_clouds(clouds, trajectory, crs, reason):
         sentence, _ = far_cloud(cloud.name, cloud_box(cloud.layout)[:, :2], trajectory)
         if sentence:
             raise ValueError(
-                f"{sentence} The trajectory is taken in {crs} ({reason}); if it is not, say so, as "
+                f"{sentence} The trajectory is assumed to be in {crs} ({reason}); if not, add "
                 "--set 'crs = \"EPSG:...\"'."
             )

@@ -100,7 +100,7 @@ def read_result(path: str | Path) -> ResultFolder:
         report = json.loads(read_bytes(path / "report.json"))
     except ValueError as error:
         raise ValueError(
-            f"{path / 'report.json'} is no JSON document: {error}. Its copying may have been "
+            f"{path / 'report.json'} is not a JSON document: {error}. Copying may have been "
             "interrupted; copy the folder again, or run mlscorr correct."
         ) from None
     schema = report.get("schema") if isinstance(report, dict) else None
@@ -112,8 +112,8 @@ def read_result(path: str | Path) -> ResultFolder:
     needed = {"name", "targets", "control", "check", "model", "coverage", *FILE_LISTS}
     if missing := sorted(needed - report.keys()):
         raise ValueError(
-            f"{path / 'report.json'} lacks {', '.join(missing)}: it was edited or cut. Run "
-            "mlscorr correct again."
+            f"{path / 'report.json'} has no {', '.join(missing)}: it was edited or truncated. "
+            "Run mlscorr correct again."
         )
     return ResultFolder(path, report, read_trajectory(path / "trajectory.csv"))
 
@@ -126,8 +126,8 @@ def _no_result(path, name):
             f"such as {path}/NAME."
         )
     return (
-        f"{path} is no result of mlscorr correct: it holds no {name}. Give two folders that "
-        "mlscorr correct -o wrote."
+        f"{path} is not a result of mlscorr correct: it has no {name}. Give two folders written "
+        "by mlscorr correct -o."
     )
 
 
@@ -394,9 +394,9 @@ def compare_results(first: str | Path, second: str | Path) -> ComparedResults:
             "[{:.3f}, {:.3f}] s".format(*result.trajectory.gps_time[[0, -1]]) for result in results
         ]
         raise ValueError(
-            f"The trajectories have no common time: {spans[0]} in {results[0].path}, {spans[1]} "
-            f"in {results[1].path}. Compare two results of one survey; where their time systems "
-            "differ, correct both with the same one."
+            f"The trajectories do not overlap in time: {spans[0]} in {results[0].path}, "
+            f"{spans[1]} in {results[1].path}. Compare two results of one survey; if their time "
+            "systems differ, correct both with the same one."
         )
     return compared
 
@@ -408,7 +408,7 @@ def _check_crs(first, second):
         return
     raise ValueError(
         f"The results are in different CRS: {codes[0]} in {first.path}, {codes[1]} in "
-        f"{second.path}. Correct the survey twice in the same crs of survey.toml."
+        f"{second.path}. Correct both with the same crs in survey.toml."
     )
 
 

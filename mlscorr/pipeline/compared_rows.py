@@ -21,9 +21,7 @@ from mlscorr.survey import Matched, Statement, Survey, TargetObservations
 NEXT_RUN = Statement("next run")
 NEXT_CLOUDS = Statement("next clouds")
 SECOND_CLOUDS = Statement("second clouds")
-LINEAR = (
-    "How far the gap would shrink is reckoned to the first order: your simulator ran only once."
-)
+LINEAR = "The decrease of the gap is a first-order estimate: your simulator ran only once."
 
 
 @dataclass(frozen=True)
@@ -176,8 +174,8 @@ def _check_simulated(rows, folder):
     """Refuse clouds that are not simulated."""
     if not np.nan_to_num(rows.residual).any():
         raise ValueError(
-            f"The clouds of {folder} are the survey's own: none of {len(rows)} differences is "
-            "other than zero. Give those that your simulator made."
+            f"The clouds of {folder} are those of the survey: all {len(rows)} differences are "
+            "zero. Give the clouds from your simulator."
         )
 
 
@@ -195,7 +193,7 @@ def _simulated_clouds(simulated, patches, correction, progress):
         finding, _ = find_or_compare_surfaces(simulated, read, None, progress)
     if finding.warnings:
         raise ValueError(
-            f"{simulated.path} was simulated with other beams than the survey's. "
+            f"{simulated.path} was simulated with other beams than those of the survey. "
             f"{finding.warnings[0]}"
         )
     flat = collector.patches()

@@ -25,15 +25,15 @@ def check_control(survey: Survey | ProjectParts) -> None:
         if is_named:
             kind = ValueError
         raise kind(
-            f"{survey.path} gives no control points: it has no section [control], or the file "
-            "named there is empty. A correction needs surveyed points, or passes that overlap with "
-            "--ties-only; mlscorr extract lists the targets of a cloud without them."
+            f"{survey.path} has no control points: it has no [control], or the file given there "
+            "is empty. A correction needs surveyed points, or overlapping passes with "
+            "--ties-only; mlscorr extract lists targets of a cloud without any."
         )
     if len(survey.control) == 0:
         raise ValueError(
-            f"{survey.path} names {counted(len(survey.check), 'check point')} and no control "
-            "point: check points never enter an estimate. Give some of them the role control, or "
-            "bring passes that overlap together without any: mlscorr correct --ties-only."
+            f"{survey.path} has {counted(len(survey.check), 'check point')} and no control "
+            "point, and check points are never used in an estimate. Give some of them the role "
+            "control, or align overlapping passes without any: mlscorr correct --ties-only."
         )
 
 
@@ -48,11 +48,11 @@ def reuse_warnings(survey: Survey) -> Iterator[str]:
     names = [name for name in survey.control.name if name in survey.corrected_by]
     if names:
         yield (
-            f"{len(names)} of {len(survey.control)} control points (first: {names[0]}) have "
-            f"corrected the trajectory of {survey.path} before (calibrate --with-drift), and count "
-            "twice: sigmas, and what remains at points left out in turn, are too small. Check "
-            "points alone can judge the result. Give calibrate --clouds without --with-drift and "
-            "correct that survey, or other control points."
+            f"{len(names)} of {len(survey.control)} control points (first: {names[0]}) were "
+            f"already used to correct the trajectory of {survey.path} (calibrate --with-drift), "
+            "so that sigmas and leave-one-out residuals are too small. Judge the result by "
+            "check points only, or correct the survey that calibrate --clouds writes without "
+            "--with-drift."
         )
 
 
@@ -66,9 +66,8 @@ def remounting_fault(survey: Survey) -> str:
     if not survey.is_remounted:
         return ""
     return (
-        f"The clouds of {survey.path} are still as the recorded mounting put them, not as its "
-        "calibrated one does ([cloud] mounting): a correction takes the difference for drift, and "
-        "a further calibration would count it twice. Run mlscorr calibrate --clouds on the survey "
-        "before, and take what that writes; where the clouds were georeferenced anew since, remove "
-        "that line."
+        f"The clouds of {survey.path} use the recorded mounting, not its calibrated one ([cloud] "
+        "mounting). A correction would treat the difference as drift: use the survey written by "
+        "mlscorr calibrate --clouds, or remove that line if the clouds were georeferenced again "
+        "since."
     )

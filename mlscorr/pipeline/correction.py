@@ -40,8 +40,8 @@ from mlscorr.survey import Matched, Survey, TieFeatures, check_survey
 TieUse = Literal["auto", "off", "only"]
 
 NOTHING_TIED = (
-    "No two passes of {} saw the same thing, so ties alone correct nothing. Drive the street "
-    "twice, or survey control points."
+    "No two passes of {} overlap, so ties alone can't correct them. Drive the road twice, or "
+    "survey control points."
 )
 
 
@@ -142,7 +142,7 @@ def tie_use(survey: Survey, ties: TieUse | None) -> TieUse:
         return "off"
     if ties not in get_args(TieUse):
         known = ", ".join(map(repr, get_args(TieUse)))
-        raise ValueError(f"ties = {ties!r} is no use of ties: give one of {known}, or None.")
+        raise ValueError(f"ties = {ties!r} is invalid: give one of {known}, or None.")
     return ties
 
 

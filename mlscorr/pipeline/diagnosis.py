@@ -109,7 +109,7 @@ def diagnose(
     check_rng(rng)
     costs = Costs() if costs is None else costs
     if not all(0 <= cost < np.inf for cost in vars(costs).values()):
-        raise ValueError(f"{costs} can't be used: each cost is a finite number from 0 on.")
+        raise ValueError(f"{costs} is invalid: each cost must be a finite number of 0 or more.")
     survey.check_one_scanner("a diagnosis")
     library = known_effects() if library is None else library
     progress = progress or silent
@@ -127,7 +127,7 @@ def diagnose(
     observed = compared.rows
     used = compared.used
     absence = compared.absence
-    step = progress("Weighing the causes", STEPS)
+    step = progress("Comparing the hypotheses", STEPS)
     signs, left_out = signatures(observed, believed, library, rng)
     part = observed.select(used)
     signs_of_part = select(signs, observed, used)
@@ -182,10 +182,10 @@ def _looks_again(absence):
     """Advice on surveyed targets without a residual."""
     return [
         NextData(
-            f"the stretch from {run.gps_time[0]:.1f} to {run.gps_time[-1]:.1f} s again, and its "
-            f"targets {', '.join(run.distinct)}",
-            f"{len(run.distinct)} neighbours within sight have no residual: nothing is known "
-            "there.",
+            f"the interval from {run.gps_time[0]:.1f} to {run.gps_time[-1]:.1f} s again, with "
+            f"its targets {', '.join(run.distinct)}",
+            f"{len(run.distinct)} neighboring targets in range have no residual, so errors there "
+            "are unknown.",
         )
         for run in absence.runs
     ]
@@ -379,14 +379,14 @@ class DiagnosedRounds(KnownResult):
             if excess:
                 left = lowered(no_cause((), excess))
             else:
-                left = "nothing is left to find"
+                left = "nothing more was found"
             return f"Round {number}: {whole}{left}."
         if label == "unknown":
-            return f"Round {number}: no effect that was judged explains what is left."
+            return f"Round {number}: no tested effect explains the remaining gap."
         words = lowered(title(label))
         if number < SETTINGS.diagnosis_rounds:
-            return f"Round {number}: {words} can't be put into the simulator once more."
-        return f"After {number} rounds {words} is still found: the simulator has what was named."
+            return f"Round {number}: {words} can't be added to the simulator again."
+        return f"After {number} rounds {words} is still found, although it is in the simulator."
 
     def _content(self):
         rounds = [_round_document(*numbered) for numbered in enumerate(self.rounds, start=1)]

@@ -188,9 +188,9 @@ def _overlaps(drives):
     for first, second in pairwise(drives):
         if (end := min(first.span[1], second.span[1])) >= second.span[0]:
             yield (
-                f"{first.name} and {second.name} overlap by {end - second.span[0]:.1f} s "
-                "and may be of two vehicles: move what is of another survey out of the folder, or "
-                "name both under [[trajectory]] in survey.toml (docs/survey.md)."
+                f"{first.name} and {second.name} overlap by {end - second.span[0]:.1f} s and may "
+                "come from two vehicles. Move the files of another survey out of the folder, or "
+                "list both under [[trajectory]] in survey.toml (docs/survey.md)."
             )
 
 
@@ -242,12 +242,12 @@ def _no_trajectory(roles):
     """Sentence on requirements for a trajectory, and on candidate tables."""
     tables = [f"{role.path.name} ({role.reason})" for role in roles if role.role == "table"]
     hint = (
-        f" If it is {' or '.join(tables)}, say so, as --set 'trajectory.file = ...' and "
-        "--set 'trajectory.columns.gps_time = ...' with the other columns (numbers from 1 where "
+        f" If it is {' or '.join(tables)}, add --set 'trajectory.file = ...' and --set "
+        "'trajectory.columns.gps_time = ...', also for the other columns (numbers from 1 if "
         "they have no names)."
     )
     return (
-        "No file looks like a trajectory: add an SBET, or a table with the columns gps_time (s), "
+        "No trajectory was recognized. Add an SBET, or a table with the columns gps_time (s), "
         f"easting, northing, height, roll, pitch, heading.{hint if tables else ''}"
     )
 
@@ -281,13 +281,13 @@ def ambiguous(
         Clouds covered by them.
     """
     if clouds:
-        fit = f", which cover the {len(clouds)} cloud files alike"
+        fit = f", which all cover the {len(clouds)} cloud files"
     else:
         fit = ""
     listed = "; ".join(f"{path.name}{': ' * bool(why)}{why}" for path, why in candidates.items())
     keys = tuple(what.split(".")) if "." in what else (what, "file")
     return OpenQuestion(
-        f"{len(candidates)} files may be the {what}{fit} ({listed.rstrip('.')}). Say which, or "
+        f"{len(candidates)} files may be the {what}{fit} ({listed.rstrip('.')}). Choose one, or "
         "move the others out of the folder.",
         [OpenPlace(keys, tuple(map(str, candidates)), "file that is meant")],
     )

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 LOG = logging.getLogger(__name__)
 LEFT_OUT = (
-    'What two passes both saw was left out, as asked: --no-ties, or use = "off" of [ties] in '
+    'Tie features were not used, as requested: --no-ties, or use = "off" under [ties] in '
     "survey.toml."
 )
 
@@ -110,13 +110,13 @@ class PosErrorEstimate(Estimate):
         rows = [
             ("control observations", f"{int(self.used.sum())} of {len(self.used)} used"),
             ("correction, 3D (m)", f"median {np.median(length):.3f}, largest {length.max():.3f}"),
-            ("its sigma, 3D (m)", f"median {np.median(sigma):.3f}, largest {sigma.max():.3f}"),
+            ("sigma, 3D (m)", f"median {np.median(sigma):.3f}, largest {sigma.max():.3f}"),
             ("order of the trend", self.order),
             ("sigma0", f"{self.sigma0:.2f}"),
         ]
         if self.ties is not None:
             rows.append(("ties", f"{int(self.ties.used.sum())} of {len(self.ties.used)} used"))
-        rows += [("contradicted by the others", test.name) for test in self.outliers]
+        rows += [("rejected", test.name) for test in self.outliers]
         return [*rows, *((sentence,) for sentence in self.warnings)]
 
 
@@ -173,8 +173,8 @@ def estimate_pos_error(
     control = matches.control
     if len(control) == 0 and ties is None:
         raise ValueError(
-            "No control point is among the matched targets, and no ties are given: nothing tells "
-            "the POS error. Match some control points, or give what mlscorr.find_ties returns."
+            "No control point was matched and no ties are given, so the POS error can't be "
+            "estimated. Match some control points, or give the result of mlscorr.find_ties."
         )
     features = ties.features if isinstance(ties, TiedSurvey) else ties
     scanned = matches.as_scanned(survey)
@@ -245,7 +245,7 @@ def _log_estimate(estimate):
         LOG.info("covariance, probability %.3f: %s", probability, ", ".join(numbers))
     for test in estimate.outliers:
         LOG.info(
-            "%s not used: the others contradict it, statistic %.1f above %.1f",
+            "%s not used: contradicted by the others, statistic %.1f, critical value %.1f",
             test.name,
             test.statistic,
             test.critical,
@@ -401,8 +401,8 @@ def score(estimate: Estimate, matches: MatchedTargets) -> Scores:
     check = matches.check
     if len(control) != len(estimate.used):
         raise ValueError(
-            f"The estimate rests on {len(estimate.used)} control observations, and the matches "
-            f"hold {len(control)}: give those by which mlscorr.estimate_pos_error made it."
+            f"The estimate uses {len(estimate.used)} control observations, but the matches have "
+            f"{len(control)}. Give the matches that were passed to mlscorr.estimate_pos_error."
         )
     by_kind = {}
     for kind in dict.fromkeys(control.surveyed.kind):

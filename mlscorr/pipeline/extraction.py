@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 BRIGHT_KINDS = ("circle", "square", "checkerboard")  # kinds found without a surveyed position
-NO_CONTROL = "No control point is known: every object was taken as it looks."
+NO_CONTROL = "No control point is given: objects were classified by their appearance only."
 
 
 def extract(
@@ -132,15 +132,15 @@ def _sentences(survey, intensities, targets):
     if why_useless(intensities) is not None:
         values = ", ".join(f"{value}" for value in intensities)
         sentences.append(
-            f"The cloud has no useful intensity (values: {values}), so that only plates that "
-            "stand free, told by their edges, were looked for. Export the cloud with intensity."
+            f"The cloud has no useful intensity (values: {values}), so that only free-standing "
+            "plates were searched, by their edges. Export the cloud with intensity."
         )
     if len(targets) == 0:
         points = survey.points
         sentences.append(
             f"No target-like object was found among {points} points. Flat circles, squares and "
-            "checkerboards, brighter than what surrounds them and with 25 points or more, are "
-            "found: check intensity and density of the cloud, and that targets were set up."
+            "checkerboards with 25 or more points, brighter than their surroundings, can be "
+            "found: check intensity, point density and that targets were set up."
         )
     return tuple(sentences)
 

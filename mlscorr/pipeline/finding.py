@@ -366,10 +366,10 @@ class NearPoints:
         for file, survey in self.of_file.items():
             if survey.mounting is None and survey.beam_origin is None:
                 yield (
-                    f"{survey.path} gives no [mounting], and the beams of {file.name} don't show "
-                    "where the scanner was: it is taken to be at the navigation centre. Plates "
-                    "that stand free may be missed or found centimetres off; give lever_arm and "
-                    "boresight under [mounting]."
+                    f"{survey.path} has no [mounting], and the beams of {file.name} do not show "
+                    "the scanner position, so the navigation center is assumed. Free-standing "
+                    "plates may be missed or found centimeters off: set lever_arm and boresight "
+                    "under [mounting]."
                 )
 
     def add(self, cloud: PointCloud) -> None:
@@ -395,9 +395,8 @@ class NearPoints:
             reason = None
         if reason is not None and not set(self.survey.surveyed.kind) <= set(BY_EDGES):
             warnings.warn(
-                f"{reason} Bright targets can't be told by it: only plates that stand free are "
-                "found, by their edges, and painted ones are not. Export the cloud with its "
-                "intensity.",
+                f"{reason} Without it, bright targets can't be detected: only free-standing plates "
+                "are found, by their edges. Export the cloud with its intensity.",
                 stacklevel=3,
             )
 
@@ -445,9 +444,9 @@ def check_found_control(matches: MatchedTargets) -> None:
     survey = matches.survey
     if len(matches.control) == 0:
         raise ValueError(
-            f"None of the {counted(len(survey.control), 'control point')} was found in the cloud, "
-            f"only {counted(len(matches.check), 'check point')}, which must not take part in the "
-            "estimate."
+            f"None of the {counted(len(survey.control), 'control point')} was found in the "
+            f"cloud, only {counted(len(matches.check), 'check point')}, which must not be used "
+            "in the estimate."
         )
 
 
@@ -610,7 +609,7 @@ def fit_while_reading(
         of_pass[candidates.passes[key]].append(target)
     targets = tuple((number, t) for number, some in of_pass.items() for t in distinct(some))
     LOG.info(
-        "%d targets found in %d passes, of %d fits near %d surveyed points; %d points looked at",
+        "%d targets found in %d passes, of %d fits near %d surveyed points; %d points used",
         len(targets),
         len(of_pass),
         len(fits),
@@ -688,10 +687,13 @@ def match_silently(targets: FoundTargets, survey: Survey) -> MatchedTargets:
         reasons = " ".join(refusal.reason for refusal in matches.matches.refusals[:3])
         places = len(np.unique(survey.surveyed.position, axis=0))
         is_twice = 2 * places <= len(survey.surveyed)  # and then the CRS is not the cause
-        questions = "Are control and cloud in the same CRS?", "Is each point named twice?"
+        questions = (
+            "Check that control and cloud are in the same CRS.",
+            "Check whether each point is listed twice.",
+        )
         raise ValueError(
-            f"None of the {len(survey.surveyed)} surveyed targets is among the {len(targets)} that "
-            f"were found ({near.intensity_range} there). {reasons} {questions[is_twice]}"
+            f"None of the {len(survey.surveyed)} surveyed targets is among the {len(targets)} "
+            f"found ({near.intensity_range} there). {reasons} {questions[is_twice]}"
         )
     return replace(
         matches,
@@ -715,19 +717,19 @@ def nothing_found(survey: Survey, candidates: Candidates, near: NearPoints) -> s
     if len(candidates.unplaced) > near.points:
         return (
             f"No target was found: {len(candidates.unplaced)} of the points near surveyed points "
-            "were measured in gaps of the trajectory or outside it. Export the whole trajectory."
+            "were measured outside the trajectory or in its gaps. Export the whole trajectory."
         )
     if near.points == 0:
         return (
-            f"No point of the cloud lies within {radius:.1f} m of any of the {len(surveyed)} "
-            "surveyed points. Are control and cloud in the same CRS and of the same street?"
-            f"{_other_heights(survey, radius)}"
+            f"No point of the cloud is within {radius:.1f} m of any of the {len(surveyed)} "
+            "surveyed points. Check that control and cloud are in the same CRS and from the "
+            f"same street.{_other_heights(survey, radius)}"
         )
     return (
         f"None of the {len(surveyed)} surveyed targets was found among {near.points} points "
-        f"within {radius:.1f} m of them ({near.intensity_range}). Targets are circles or squares "
-        "of the surveyed size, brighter than what surrounds them: check kind and size in the "
-        "control file, and the intensity."
+        f"within {radius:.1f} m of them ({near.intensity_range}). Targets must be circles or "
+        "squares of the surveyed size, brighter than their surroundings: check kind and size in "
+        "the control file, and the intensity."
     )
 
 
@@ -741,8 +743,8 @@ def _other_heights(survey, radius):
         return ""
     side = "above" if above > 0 else "below"
     return (
-        f" In the median the surveyed points lie {abs(above):.1f} m {side} the trajectory: their "
-        "heights may be of another geoid or over an ellipsoid, or in feet."
+        f" The surveyed points are {abs(above):.1f} m {side} the trajectory (median): their "
+        "heights may refer to another geoid or an ellipsoid, or be in feet."
     )
 
 

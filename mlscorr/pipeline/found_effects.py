@@ -61,10 +61,10 @@ class FoundEffects:
         if known and known.isdisjoint((row["bytes"], row["digest"]) for row in here):
             names = joined([effect.name for effect in self.effects])
             raise ValueError(
-                f"None of the {len(here)} clouds of {survey.path} is one of the {len(known)} in "
-                f"which {names} was found (first: {self.clouds[0]['name']}): they are of another "
-                "survey, or it was taken out of them already, and once more would put it in again. "
-                "Give the survey in which it was found, or NAME=SIZE if these are as wrong."
+                f"None of the {len(here)} clouds of {survey.path} is among the {len(known)} in "
+                f"which {names} was found (first: {self.clouds[0]['name']}). They belong to "
+                "another survey, or it was already removed from them. Give the survey in which "
+                "it was found, or NAME=SIZE if these clouds have the same error."
             )
 
 
@@ -100,11 +100,13 @@ def read_effects(source: str | Path) -> FoundEffects:
         try:
             values = [float(value) for value in size.split(",")]
         except ValueError:
-            raise ValueError(f"{source}: {size!r} is no number, nor several with commas.") from None
+            raise ValueError(
+                f"{source}: {size!r} is neither a number nor several with commas."
+            ) from None
         return FoundEffects(_effects({name: values}))
     if not Path(source).is_file():
         raise ValueError(
-            f"There is no file {source}: neither a gap.json or calibration.json nor NAME=SIZE with "
+            f"There is no file {source}. Give a gap.json, a calibration.json, or NAME=SIZE with "
             f"one of {joined(TAKEN_OUT, 'or')}, as time_offset=0.005 (s)."
         )
     try:
@@ -114,8 +116,8 @@ def read_effects(source: str | Path) -> FoundEffects:
         return replace(effects, clouds=tuple(content.get("clouds", ())))
     except (KeyError, TypeError, json.JSONDecodeError):
         raise ValueError(
-            f"{source} is no gap.json or calibration.json of mlscorr, or not one of a single "
-            "scanner; calibrate --clouds writes the clouds of several anew."
+            f"{source} is not a gap.json or calibration.json of mlscorr, or it has several "
+            "scanners; for these, calibrate --clouds writes the clouds."
         ) from None
 
 
@@ -124,12 +126,16 @@ def _of_gap(content):
     label = content["verdict"]["label"]
     cause = content["causes"][0] if content["causes"] else None
     if label in ("none", "unknown") or cause is None or cause["effect"] != label:
-        raise ValueError(f"The diagnosis names no cause but {label}: nothing can be taken out.")
+        raise ValueError(
+            f"The only cause that the diagnosis names is {label}, so nothing can be removed."
+        )
     sizes = {}
     for name in label.split("+"):
         kind = effect_class(name)
         if name not in TAKEN_OUT:
-            raise ValueError(f"{name}, a cause, can't be taken out of the cloud. {kind.remedy}")
+            raise ValueError(
+                f"{name}, one of the causes, can't be removed from the cloud. {kind.remedy}"
+            )
         rows = {row["name"].removeprefix(f"{name} "): row for row in cause["parameters"]}
         sizes[name] = [rows[part]["estimate"] for part in kind.parts]
     return FoundEffects(_effects(sizes))

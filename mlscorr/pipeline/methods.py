@@ -88,7 +88,7 @@ def _over_time(name, about, fit):
 
 
 def _polynomial(order):
-    about = f"Polynomials of time of order {order}, one for each axis, by least squares."
+    about = f"Polynomials of order {order} over time, one per axis, by least squares."
     return _over_time(f"ls-{order}", about, partial(baselines.fit_polynomial, order=order))
 
 
@@ -98,7 +98,7 @@ def _literal(order):
         return baselines.fit_literal(survey.trajectory, matched, survey.pos, order)
 
     about = (
-        f"Collocation as the paper prints it: order {order}, variances that the POS states, a "
+        f"Collocation as printed in the paper: order {order}, variances as stated by the POS, a "
         "correlation time of 4 control intervals."
     )
     return Method(f"lsc-{order}", "collocation", about, fit)
@@ -132,42 +132,47 @@ def _with_details(estimate):
 
 
 METHODS = (
-    Method("raw", "none", "The cloud as it was recorded.", lambda *_: (baselines.RAW, {})),
+    Method("raw", "none", "The recorded cloud.", lambda *_: (baselines.RAW, {})),
     _one_move("shift", "One shift of the whole cloud.", baselines.fit_shift),
     _one_move(
         "transformation",
-        "Plan and height solved apart: shift, turn and scale in plan, an inclined plane in height.",
+        "Plan and height separately: shift, rotation and scale in plan, an inclined plane in "
+        "height.",
         baselines.fit_horizontal_and_height,
     ),
-    _one_move("rigid", "One shift and one turn in space.", baselines.fit_rigid),
-    _one_move("affine", "Shift, turn, scale and shear: 12 parameters.", baselines.fit_affine),
+    _one_move("rigid", "One shift and one rotation in space.", baselines.fit_rigid),
+    _one_move("affine", "Shift, rotation, scale and shear: 12 parameters.", baselines.fit_affine),
     Method(
-        "icp", "one move", "Iterative closest points: targets laid on their surveyed faces.", _icp
+        "icp",
+        "one move",
+        "Iterative closest points: targets aligned with their surveyed surfaces.",
+        _icp,
     ),
     *(_polynomial(order) for order in SETTINGS.orders),
     _over_time("linear", "Straight lines between control points.", baselines.fit_linear),
     _over_time("pchip", "Monotone cubics between control points.", baselines.fit_pchip),
     _over_time(
         "linear-steps",
-        "Straight lines between control points, apart on both sides of each step of the path.",
+        "Linear interpolation between control points, separately on both sides of each step of "
+        "the trajectory.",
         partial(baselines.fit_linear, cut=True),
     ),
     _over_time(
         "gp",
-        "A Gaussian process of scikit-learn: Matern 3/2 and white noise, by likelihood.",
+        "A Gaussian process of scikit-learn: Matern 3/2 and white noise, by maximum likelihood.",
         baselines.fit_gaussian_process,
     ),
     *(_literal(order) for order in SETTINGS.orders),
     Method(
         "lsc",
         "collocation",
-        "Collocation with parameters that the control points themselves make likely.",
+        "Collocation with parameters estimated from the control points.",
         _lsc,
     ),
     Method(
         "correct",
         "collocation",
-        "What mlscorr correct does: lsc, with ties between passes where they overlap.",
+        "The method of mlscorr correct: lsc, with ties where passes overlap.",
         _correct,
     ),
 )
@@ -185,6 +190,7 @@ def method_named(name: str) -> Method:
     if name not in known:
         near = get_close_matches(name, known, n=1, cutoff=0.0)[0]
         raise ValueError(
-            f"There is no method '{name}'. The nearest is '{near}'; all are {', '.join(known)}."
+            f"There is no method '{name}'. The nearest is '{near}'; available are "
+            f"{', '.join(known)}."
         )
     return known[name]

@@ -96,7 +96,7 @@ def amounts_read(survey: Survey, sampled: int) -> tuple[Amount, ...]:
         Amount("passes", sampled, "", f"{IO.sampled_points} times of each file"),
         Amount("trajectory", trajectory.duration, "s", driven),
         Amount("control points", len(survey.control), "", "role control"),
-        Amount("check points", len(survey.check), "", "role check; they take no part"),
+        Amount("check points", len(survey.check), "", "role check; not used in the estimate"),
     )
 
 
@@ -151,7 +151,7 @@ def amounts_needed(
     points = SETTINGS.decodings * decoding
     seconds = points + fitting + SETTINGS.report_seconds
     return (
-        Amount("time", seconds, "s", "the sum of the next three, on this machine as it is now"),
+        Amount("time", seconds, "s", "sum of the next three, on this machine in its present state"),
         Amount(
             "reading and writing points",
             points,
@@ -165,7 +165,7 @@ def amounts_needed(
             "s",
             "no target was fitted"
             if probe is None
-            else f"{probe.seconds:.2f} s a surveyed point, measured here on {len(probe.points)}",
+            else f"{probe.seconds:.2f} s per surveyed point, measured here on {len(probe.points)}",
         ),
         Amount(
             "report and pictures",

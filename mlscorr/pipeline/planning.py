@@ -176,16 +176,16 @@ class PlannedSurvey(KnownResult):
         if self.accuracy is not None and self.accuracy.next_control:
             place = self.accuracy.next_control[0]
             advice.append(
-                f"Put one more control point near {place.easting:.0f} E, {place.northing:.0f} N. "
+                f"Add a control point near {place.easting:.0f} E, {place.northing:.0f} N. "
                 f"{place.why}"
             )
         if hidden:
             advice.append(
-                f"Don't expect to see {lowered(titles(hidden))}: only more than {LARGE:.0f} times "
+                f"Not detectable: {lowered(titles(hidden))}. Only more than {LARGE:.0f} times "
                 "the usual size would show."
             )
         if not self.separability.classes:
-            advice.append("All effects that show can be told apart.")
+            advice.append("All detectable effects are separable.")
         return advice
 
     def to_frame(self) -> pandas.DataFrame:
@@ -255,9 +255,9 @@ def check_enough(
     if items >= len(COMPONENTS):  # of the pose: fewer do not allow any conclusion
         return
     sentence = (
-        f"{survey.path} shows {items} things with a residual in m, and the POS's error alone has 6 "
-        "unknowns: no cause can be told from it. Survey at least 12 targets along the way, better "
-        "on two passes, or give a [scene] reference."
+        f"{survey.path} has {items} residuals in m, too few to identify a cause: the error of "
+        "the POS alone has 6 unknowns. Survey at least 12 targets along the road, preferably on "
+        "two passes, or set scene.reference."
     )
     sentence = " ".join([*notes, sentence])
     if survey.mounting is None or items == 0:
@@ -271,7 +271,6 @@ def check_enough(
         )
     ]
     raise ValueError(
-        f"{sentence} As it is, the smallest effects that could be seen, were nothing else wrong, "
-        f"are: {', '.join(sizes[:6])}. mlscorr plan tells the same of any survey before "
-        "it is driven."
+        f"{sentence} The smallest errors detectable with the present data, if they were the only "
+        f"ones: {', '.join(sizes[:6])}. mlscorr plan predicts this before a survey is driven."
     )

@@ -179,9 +179,9 @@ def _with_sizes_doubled(survey, windows, matched):
     if not _is_better(refit, matched, points):
         return ""
     return (
-        f"The sizes of the control look like radii: of {len(points)} surveyed points that were "
-        f"looked at {_count(matched)} are found as they stand, {_count(refit)} with sizes doubled. "
-        "A size is a circle's diameter, or a square's edge."
+        f"The sizes in the control seem to be radii: {_count(matched)} of {len(points)} tested "
+        f"points are found with these sizes, {_count(refit)} with sizes doubled. The size is the "
+        "diameter of a circle or the edge of a square."
     )
 
 
@@ -197,12 +197,12 @@ def _with_other_heights(survey, windows, matched):
         return ""
     shift = above + refit.misclosure[:, 2]
     return (
-        f"The heights of control and cloud differ: {_count(refit)} of {len(points)} surveyed "
-        f"points that were looked at are found {abs(np.median(shift)):.2f} m "
-        f"{'below' if np.median(shift) > 0 else 'above'} their own heights (scatter "
-        f"{np.std(shift):.3f} m), {_count(matched)} as they stand. A geoid undulation (heights "
-        "over an ellipsoid beside heights over a geoid), another vertical datum, or feet: bring "
-        "both into one system of heights."
+        f"The height systems of control and cloud differ: {_count(refit)} of {len(points)} "
+        f"tested points are found {abs(np.median(shift)):.2f} m "
+        f"{'below' if np.median(shift) > 0 else 'above'} their heights (scatter "
+        f"{np.std(shift):.3f} m), {_count(matched)} at their heights. Likely cause: ellipsoidal "
+        "and geoid heights mixed, another vertical datum, or feet. Convert both to one height "
+        "system."
     )
 
 
@@ -237,7 +237,7 @@ def _doubt(survey, matched, near_control):
     if not len(matched):
         return nothing_found(survey, near_control.candidates, near)
     return (
-        f"A quick look finds {_count(matched)} of the {len(survey.control)} surveyed points that "
-        f"it looks at, among {near.points} points ({near.intensity_range}) near them: check kind, "
-        "size and place in the control file, and the intensity of the cloud."
+        f"A quick search found {_count(matched)} of the {len(survey.control)} surveyed points "
+        f"tested, among {near.points} points ({near.intensity_range}) near them. Check kind, "
+        "size and position in the control file, and the intensity of the cloud."
     )

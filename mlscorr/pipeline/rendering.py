@@ -113,22 +113,22 @@ def read_correction(survey: Survey, folder: str | Path) -> tuple[Correction, lis
     missing = [file.name for file in files if not file.is_file()]
     if missing:
         raise ValueError(
-            f"{folder} holds no {' and no '.join(missing)}. Give a folder that mlscorr correct "
-            "wrote, or leave it out, and the correction is estimated anew."
+            f"{folder} has no {' and no '.join(missing)}. Give a folder written by mlscorr "
+            "correct, or omit it to estimate the correction."
         )
     trajectory = read_trajectory(files[0])
     time = survey.trajectory.gps_time
     if len(time) != len(trajectory) or np.abs(time - trajectory.gps_time).max() > TIME_DIGITS:
         raise ValueError(
-            f"{files[0]} has {len(trajectory)} epochs from {trajectory.gps_time[0]:.3f} s on, the "
-            f"survey {len(time)} from {time[0]:.3f} s on: it is the correction of another survey."
+            f"{files[0]} has {len(trajectory)} epochs from {trajectory.gps_time[0]:.3f} s, the "
+            f"survey {len(time)} from {time[0]:.3f} s: it is the correction of another survey."
         )
     rows = json.loads(files[1].read_text(encoding="utf-8"))["targets"]
     rows = [TargetRow.read(row) for row in rows]
     points = survey.surveyed
     if strange := [row.name for row in rows if row.name not in points.name]:
         raise ValueError(
-            f"{files[1]} names {len(strange)} targets that {survey.path} does not know (first: "
-            f"{strange[0]}): it is the report on another survey."
+            f"{files[1]} has {len(strange)} targets that are not in {survey.path} (first: "
+            f"{strange[0]}): it is the report of another survey."
         )
     return Correction(survey.trajectory, replace(trajectory, gps_time=time)), rows

@@ -122,11 +122,11 @@ def init(
     folder = Path(folder)
     given = given or {}
     if not folder.is_dir():
-        raise ValueError(f"{folder} is no folder; give the one that holds the clouds.")
+        raise ValueError(f"{folder} is not a folder. Give the one with the clouds.")
     path = folder / FILE_NAME if out is None else Path(out)
     _check_free(path)
     if not path.parent.is_dir():
-        raise OSError(f"{path.parent} is no folder, so {path.name} can't be written there.")
+        raise OSError(f"{path.parent} is not a folder, so {path.name} can't be written there.")
     _validate(given)
     answers = _Answers(folder, given)
     with glance():
@@ -189,7 +189,7 @@ class _Answers:
             return f"{error} Nothing was written."
         options = " ".join(place.option for place in self.places)
         others = " ".join(self.questions)
-        return f"{error} To be said besides: {others} {options} Nothing was written."
+        return f"{error} Also needed: {others} {options} Nothing was written."
 
     def _in_folder(self, place):
         """Open value with example files, named relative to the folder."""
@@ -214,8 +214,8 @@ def _put_nested(document, keys, value):
 def _check_free(path):
     if path.exists():
         raise ValueError(
-            f"{path} is there already. Fill in what is open in it, move it, or write another with "
-            "-o FILE."
+            f"{path} already exists. Fill in its open values, move it, or write another file "
+            "with -o FILE."
         )
 
 
@@ -246,7 +246,7 @@ def _text(folder, path, answers, roles):
         _roles(folder, given, "trajectory", roles), clouds, given.get("trajectory", {})
     )
     crs = None
-    why_crs = "to be given"
+    why_crs = "open"
     if not answers.is_crs_open:
         crs, why_crs = choose_crs(clouds, drive, given.get("crs"))
     copies = find_copies(cloud.layout.cloud for cloud in sorted(clouds, key=_preference))
@@ -263,15 +263,14 @@ def _text(folder, path, answers, roles):
     )
     refusals = late | apart
     refusals |= {
-        copy: f"the same points as {first.name}, which would count twice"
-        for copy, first in copies.items()
+        copy: f"a copy of {first.name}, which would count twice" for copy, first in copies.items()
     }
     roles = [
         replace(role, role="none", reason=refusals[role.path]) if role.path in refusals else role
         for role in roles
     ]
     text = SurveyText(given, answers.places)
-    text.put("", "name", folder.resolve().name, "of the folder")
+    text.put("", "name", folder.resolve().name, "name of the folder")
     if crs is not None or answers.is_crs_open:
         text.put("", "crs", crs or "", why_crs)
     else:
@@ -299,10 +298,12 @@ def _validate(given):
     document: dict[str, Any] = {"trajectory": {"file": ""}, **given}
     for section, key in (("trajectory", "file"), ("control", "file"), ("cloud", "files")):
         if section in given and isinstance(given[section], list):
-            raise ValueError(f"[[{section}]] can't be given: init names the files of several.")
+            raise ValueError(
+                f"[[{section}]] can't be given with --set: init finds the files itself."
+            )
         if section in given:
             document[section] = {key: [""] if key == "files" else "", **given[section]}
-    validate("What is given", document, PlannedSurveyFile)
+    validate("--set", document, PlannedSurveyFile)
 
 
 def _roles(folder, given, key, roles):
@@ -310,7 +311,7 @@ def _roles(folder, given, key, roles):
     name = given.get(key, {}).get("file")
     if name is not None:
         if not (folder / name).is_file():
-            raise ValueError(f"{key}.file = {name} is given, and {folder / name} does not exist.")
+            raise ValueError(f"{key}.file = {name} was given, but {folder / name} does not exist.")
         return [FileRole(folder / name, key, "as given")]
     return [role for role in roles if role.role in (key, "table")]
 
@@ -331,7 +332,7 @@ def _clouds(folder, given, roles):
     clouds = [Cloud(read_layout(role.path)) for role in roles if role.role == "cloud"]
     reasons = [role.reason for role in roles if role.role == "none" and is_foreign(role.path)]
     reasons += [
-        f"{folder} holds no cloud of its own, and {role.path} is {SIMULATED}: give that folder."
+        f"{folder} has no cloud of its own, and {role.path} is {SIMULATED}: give that folder."
         for role in roles
         if role.reason == SIMULATED
     ]
@@ -347,7 +348,7 @@ def _preference(cloud):
 def _no_cloud(folder, reasons=()):
     raise ValueError(
         " ".join(reasons)
-        or f"{folder} holds no LAS, LAZ, E57 or PLY cloud: add the clouds with their gps_time."
+        or f"{folder} has no LAS, LAZ, E57 or PLY cloud. Add the clouds with their gps_time."
     )
 
 
@@ -373,16 +374,18 @@ def _put_clouds(text, path, clouds, trajectory):
     text.put("cloud", "gps_time", "auto", "; ".join(systems))
     start, end = np.array(sorted(spans)).T
     if (end[:-1] - start[1:] > SETTINGS.tile_overlap * (end - start)[:-1]).any():
-        text.note("cloud", "Files overlap in time. Where two scanners wrote them, say which wrote")
-        text.note("cloud", "which under [[scanner]] (docs/survey.md), each with its own mounting.")
+        text.note(
+            "cloud", "Files overlap in time. If they come from two scanners, list the files of each"
+        )
+        text.note("cloud", "under [[scanner]] (docs/survey.md), with its own mounting.")
 
 
 def _note_sources(text, clouds):
     """Note if the IDs of points may be those of scanners."""
     mixed = [cloud.name for cloud in clouds if cloud.takes_turns]
     if mixed:
-        text.note("cloud", f"Ids of points (point_source_id) take turns in {', '.join(mixed)}.")
-        text.note("cloud", "Where each is a scanner, name them under [[scanner]] (docs/survey.md).")
+        text.note("cloud", f"The ids of points (point_source_id) alternate in {', '.join(mixed)}.")
+        text.note("cloud", "If each is a scanner, list them under [[scanner]] (docs/survey.md).")
 
 
 def _put_sessions(text, path, drive, accuracy):

@@ -9,32 +9,34 @@ import tomlkit
 from mlscorr.io.store import MARK, OpenPlace
 
 COLUMN = 40  # characters, after which comments start
-HEAD = "# Made by mlscorr init. Lines behind # are not known, or need not be: docs/survey.md."
-OPEN = f'# Replace each "{MARK}" with its value: until then check and correct refuse this file.'
+HEAD = "# Made by mlscorr init. Lines starting with # are unknown or optional: docs/survey.md."
+OPEN = f'# Replace each "{MARK}" with its value; check and correct refuse the file until then.'
 TABLES = ("control.words",)  # keys whose value is a table, not a section
 OPTIONAL = {
     "trajectory": ['# accuracy = "smrmsg.out"       # of an SBET, or a POQ of a POF'],
     "control": [
-        '# file = "control.csv"          # surveyed targets; without them passes are only tied'
+        '# file = "control.csv"          # surveyed targets; without them passes are only aligned'
     ],
     "mounting": [
-        "# How the scanner stands on the POS, by drawing or calibration. calibrate and plan need",
-        "# it, diagnose judges fewer effects without, and a correction does without.",
+        "# Mounting of the scanner on the POS, from drawings or calibration. calibrate and plan",
+        "# need it, diagnose tests fewer effects without it, and correct works without it.",
         "# lever_arm = [0.0, 0.0, 0.0]   # m: right, forward, up; from the POS to the scanner",
         "# boresight = [0.0, 0.0, 0.0]   # deg, [a, b, c]: Rz(c) Ry(b) Rx(a), scanner to body",
     ],
     "scanner": [
-        "# range_noise = 0.005           # m, one sigma, of the data sheet",
-        "# angle_noise = 0.002           # deg, likewise",
+        "# range_noise = 0.005           # m, 1 sigma, from the data sheet",
+        "# angle_noise = 0.002           # deg, 1 sigma, from the data sheet",
         "# lines_per_second = 100        # of the mirror",
     ],
     "pos": [
-        "# What is believed where the trajectory has no sigmas: one sigma, of the data sheet.",
+        "# Assumed if the trajectory has no sigmas: 1 sigma, from the data sheet.",
         "# position_sigma = 0.02         # m",
         "# attitude_sigma = [0.0063, 0.0063, 0.014]  # deg: roll, pitch, heading",
         "# correlation_time = 30.0       # s",
     ],
-    "matching": ["# search_radius = 10.0          # m, how far a target may lie from its point"],
+    "matching": [
+        "# search_radius = 10.0          # m, largest distance of a target from its point"
+    ],
     "scene": ['# reference = "reference.ply"   # a surface in the same coordinates, for diagnose'],
 }
 

@@ -70,7 +70,7 @@ def find_ties(
     check_survey(survey)
     if features is None:
         features = _read_features(survey, progress)
-    (progress or silent)("Pairing what two passes both saw")
+    (progress or silent)("Pairing tie features")
     tied = TiedSurvey(survey, features, search_ties(survey, features))
     LOG.info("%d ties between %d planes, poles and markings", len(tied.search.ties), len(features))
     for sentence in tied.warnings:
@@ -168,7 +168,7 @@ class TiedSurvey(KnownResult):
     def _overview(self):
         """Return the rows that a notebook shows."""
         kinds = ("planes", "poles", "lines", "dashes")
-        rows = [("passes", *kinds, "apart across, along, up (m, RMS)")]
+        rows = [("passes", *kinds, "misclosure across, along, up (m, RMS)")]
         for pair in self.pairs:
             apart = (pair["misfit"][axis]["rms"] for axis in AXES)
             numbers = ", ".join("-" if rms is None else f"{rms:.3f}" for rms in apart)
@@ -205,16 +205,16 @@ class TiedSurvey(KnownResult):
         if len(ties) == 0:
             return (
                 f"No tie was found: none of {len(self.features)} planes, poles and markings was "
-                f"seen twice within {self.search.radius:.2f} m. "
-                "Drive the street twice, best in both directions; where that was done, passes lie "
-                "farther apart than the POS states: raise its sigmas, or [matching] search_radius.",
+                f"scanned twice within {self.search.radius:.2f} m. Drive the road twice, "
+                "preferably in both directions; if you did, increase the sigmas of the POS or "
+                "[matching] search_radius.",
             )
         sentences = []
         if len(refused) > len(ties):
             sentences.append(
-                f"{len(refused)} of {len(ties) + len(refused)} pairs contradict their neighbours "
-                "in time: most of them are no ties. Passes may lie farther apart than the POS "
-                "states, or the mounting be wrong by degrees: run mlscorr calibrate."
+                f"{len(refused)} of {len(ties) + len(refused)} pairs contradict their neighbors "
+                "in time, so most are not ties. The POS may be less accurate than it states, or "
+                "the mounting wrong by degrees: run mlscorr calibrate."
             )
         sentences += [unconstrained_sentence(*each) for each in unconstrained_directions(ties)]
         return tuple(sentences)

@@ -19,11 +19,11 @@ from mlscorr.survey import Severity, Statement
 
 PARTS = ("lever_arm", "boresight")
 SECTIONS = {
-    "mounting": "What it lacks",
-    "misclosures": "How far off",
-    "targets": "Every target",
-    "correlation": "What looks alike",
-    "notes": "What was used",
+    "mounting": "Corrections",
+    "misclosures": "Misclosures",
+    "targets": "Targets",
+    "correlation": "Correlation",
+    "notes": "Input",
 }
 
 
@@ -219,7 +219,7 @@ def _ties(content) -> Iterator[StatementRow]:
         "after": ties["after"]["median"],
         "without_drift": without_drift,
     }
-    yield StatementRow.of("Two passes", Statement("two passes", values=values))
+    yield StatementRow.of("Tie features", Statement("two passes", values=values))
 
 
 def calibration_page(content: dict[str, Any]) -> Page:

@@ -11,7 +11,7 @@ from mlscorr.wording import length_in_words
 SIDES = ("first", "second")
 SCORES = {
     "check": "check points",
-    "leave_one_out": "control points left out in turn",
+    "leave_one_out": "control points (leave-one-out)",
     "control": "control points (fit)",
 }
 
@@ -156,7 +156,7 @@ def _use(rows):
     for row in differing:
         side = SIDES[not row["used"]["first"]]
         other = SIDES[bool(row["used"]["first"])]
-        why = row["reason"][other] or "it is not among its targets"
+        why = row["reason"][other] or "not among its targets"
         items.append((_name(row), f"used in the {side} only; {other}: {why}"))
     statement = Statement("targets used in one", "warning", {"count": len(differing)})
     return StatementRow.of("Use", statement, items=capped(items))

@@ -165,7 +165,7 @@ def show(
     layers = _distinct([*_layers(what, {}), *_layers((), named)])
     origin = _common_origin(layers)
     if points < 1:
-        raise ValueError(f"points = {points} shows none: give 1 or more.")
+        raise ValueError(f"points = {points} shows nothing: give 1 or more.")
     if page is None and _has_display():
         _open_window(layers, origin, title)
         return None
@@ -174,7 +174,7 @@ def show(
     else:
         path = as_path(page)
         if is_there(path) and not overwrite:
-            raise ValueError(f"{path} exists: give another name, or overwrite=True.")
+            raise ValueError(f"{path} already exists. Give another name, or overwrite=True.")
     content = _page_content(layers, origin, title, points)
     with output_file(path) as part:
         Page(
@@ -217,8 +217,8 @@ def _layers_of(value, name) -> Iterator[Layer]:
             yield _geometry_layer(geometry, name)
     else:
         raise TypeError(
-            f"{name}: a {type(value).__name__} can't be shown. Give a PointCloud, a point cloud or "
-            "line set of Open3D, or a result that has to_open3d()."
+            f"{name}: a {type(value).__name__} can't be shown. Give a PointCloud, a point cloud "
+            "or line set of Open3D, or a result that has to_open3d()."
         )
 
 
@@ -245,7 +245,7 @@ def _geometry_layer(geometry, name):
         return Layer(name, map_places(geometry), pairs, colors)
     raise TypeError(
         f"{name}: Open3D's {type(geometry).__name__} can't be shown here. Give point clouds and "
-        "line sets; open3d.visualization.draw shows the others."
+        "line sets; open3d.visualization.draw shows others."
     )
 
 
@@ -277,13 +277,13 @@ def _common_origin(layers):
     there = [layer for layer in layers if len(layer)]
     if not there:
         names = ", ".join(layer.name for layer in layers)
-        raise ValueError(f"There is no point and no line to show: {names} are empty.")
+        raise ValueError(f"There is nothing to show: {names} are empty.")
     for layer in there:
         bad = np.flatnonzero(~np.isfinite(layer.xyz).all(axis=1))
         if len(bad):
             raise ValueError(
-                f"{layer.name}: {len(bad)} of {counted(len(layer.xyz), 'point')} have coordinates "
-                f"that are not finite (first: point {bad[0]}). Leave them out: nothing places them."
+                f"{layer.name}: {len(bad)} of {counted(len(layer.xyz), 'point')} have "
+                f"coordinates that are not finite (first: point {bad[0]}). Remove them."
             )
     ends = np.array([[layer.xyz.min(axis=0), layer.xyz.max(axis=0)] for layer in there])
     middles = ends.mean(axis=1)
@@ -292,11 +292,11 @@ def _common_origin(layers):
     if extent > SETTINGS.shown_extent:
         first, second = np.unravel_index(apart.argmax(), apart.shape)
         raise ValueError(
-            f"What is to be shown extends over {extent / 1000:.0f} km, and one view holds "
+            f"The layers extend over {extent / 1000:.0f} km; one view can show "
             f"{SETTINGS.shown_extent / 1000:.0f} km ({there[first].name} and "
-            f"{there[second].name} are {apart.max() / 1000:.0f} km apart). "
-            "One of them may be about a local origin or in another CRS: an Open3D geometry in the "
-            "map needs its attribute origin."
+            f"{there[second].name} are {apart.max() / 1000:.0f} km apart). One may be in another "
+            "CRS or relative to a local origin: an Open3D geometry in map coordinates needs its "
+            "attribute origin."
         )
     return chosen_origin(ends.reshape(-1, 3), None)
 
@@ -314,7 +314,7 @@ def _open_window(layers, origin, title):
     """Show all points and lines in Open3D's viewer until it is closed."""
     import open3d
 
-    place = f"map axes about {origin[0]:.0f} E, {origin[1]:.0f} N, {origin[2]:.0f} H"
+    place = f"map axes relative to {origin[0]:.0f} E, {origin[1]:.0f} N, {origin[2]:.0f} H"
     shown = [
         {"name": layer.name, "geometry": viewer_geometry(layer, origin, _color_of(number))}
         for number, layer in enumerate(layers)

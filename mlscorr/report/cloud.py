@@ -86,7 +86,7 @@ def view_cloud(
     near = _close_up_rows(rows)
     facades = _facades(ties)
     if sample is None:
-        done = progress("Looking at the cloud", sum(file.points for file in survey.clouds))
+        done = progress("Sampling the cloud", sum(file.points for file in survey.clouds))
         stream = chain.from_iterable(map(read_chunks, survey.clouds))
         sample = gather(_watched(stream, done), near, facades)
     rows_near = near_rows(sample.cloud.xyz, near)

@@ -11,18 +11,22 @@ from mlscorr.report._comparison_screen import ranking, undetermined
 from mlscorr.report.pages import Page, data_uri
 
 SECTIONS = {  # in order; empty ones are omitted
-    "scores": "What remains",
-    "check": "Check points alone",
+    "scores": "Residuals",
+    "check": "Check points only",
     "absent": "Not determined",
-    "figure": "As a picture",
-    "methods": "The methods",
-    "unseen": "Not seen",
+    "figure": "Chart",
+    "methods": "Methods",
+    "unseen": "Not found",
 }
 KINDS = {  # color, mark and words
     "none": (style.GREY, "x", "as recorded"),
-    "one move": (style.VERMILLION, "s", "one move of the whole cloud, blind to time"),
+    "one move": (
+        style.VERMILLION,
+        "s",
+        "one transformation of the whole cloud, independent of time",
+    ),
     "over time": (style.GREEN, "^", "polynomials and interpolation over time"),
-    "collocation": (style.BLUE, "o", "collocation: polynomials and the POS's own error over time"),
+    "collocation": (style.BLUE, "o", "collocation: polynomials plus the POS error over time"),
 }
 
 
@@ -90,7 +94,7 @@ def comparison_figure(document: dict) -> Figure:
         _ticks_in_words(panel)
     panels[0].set_yticks(places, [row["name"] for row in ranked])
     panels[0].set_ylim(len(ranked) - 0.4, -0.6)
-    figure.supxlabel("RMSE (logarithmic scale; dotted: the least on this axis)", fontsize=8.5)
+    figure.supxlabel("RMSE (logarithmic scale; dotted: the smallest on this axis)", fontsize=8.5)
     handles = [
         style.mark_handle(mark, color, words)
         for name, (color, mark, words) in KINDS.items()

@@ -28,25 +28,25 @@ from mlscorr.targets import FittedTarget
 from mlscorr.wording import number, percent, thousands
 
 SECTIONS = {  # in order; empty ones are omitted
-    "statistics": "How far off",
+    "statistics": "Misclosures",
     "sigmas": "Stated sigmas",
     "accuracy": "Accuracy",
     "pictures": "Before and after",
     "turn": "3D view",
     "correction": "Over time",
     "map": "Map",
-    "ties": "Two passes",
-    "residuals": "Every target",
-    "targets": "As found",
+    "ties": "Tie features",
+    "residuals": "Residuals",
+    "targets": "Extracted targets",
     "model": "Model",
-    "used": "What was used",
+    "used": "Input",
     "conventions": "Conventions",
 }
 TABLES = {  # of the model: title, and meaning of columns
     "alternatives": (
         "Covariance functions compared",
-        "The correction averages over them by their probability. Correlation times in s; scales "
-        "are factors on the stated sigmas.",
+        "The correction is their average, weighted by probability. Correlation times in s; "
+        "scales are factors on the stated sigmas.",
     ),
     "orders": (
         "Orders of the trend compared",
@@ -54,9 +54,9 @@ TABLES = {  # of the model: title, and meaning of columns
     ),
     "tests": (
         "Leave-one-out test of each control point",
-        "w: residual over its sigma once the other points alone have corrected it. Redundancy: "
-        "share of an error that would show, 0 to 1. Detectable: smallest error that the test "
-        "finds, in m. A point is rejected where its statistic exceeds the critical value.",
+        "w: residual over its sigma, predicted from the other points. Redundancy: share of an "
+        "error that shows in the residual, 0 to 1. Detectable: smallest error that the test "
+        "finds, in m. A point is rejected if its statistic exceeds the critical value.",
     ),
 }
 
@@ -223,13 +223,13 @@ def key_figures(correction: Correction, report: CorrectionReport) -> list[tuple[
     change = np.linalg.norm(correction.corrected.position - correction.recorded.position, axis=1)
     figures = []
     deeds = {
-        "control": ("made the correction", "took part"),
-        "check": ("tested it", "were there to test it"),
+        "control": ("used for the correction", "used"),
+        "check": ("used to test it", "available to test it"),
     }
     for role, (what, nothing) in deeds.items():
         points, n = report.count(role)
         deed = what if points else nothing
-        often = "" if n == points else f", seen {n} times"
+        often = "" if n == points else f", {n} observations"
         surveyed = report.points(role).surveyed
         if points < surveyed:
             share = f"{points} of {surveyed}"
@@ -245,8 +245,8 @@ def key_figures(correction: Correction, report: CorrectionReport) -> list[tuple[
 
 
 FRAMES = {
-    "Frame: map": "easting, northing, height in m, as the files have them",
-    "Frame: body": "X right, Y forward, Z up, at the trajectory's navigation centre",
+    "Frame: map": "easting, northing, height in m, as in the files",
+    "Frame: body": "X right, Y forward, Z up, at the navigation center of the trajectory",
     "Frame: attitude": "heading clockwise from grid north, pitch nose up, roll right side down; "
     "R = Rz(−heading) Rx(pitch) Ry(roll)",
 }
@@ -257,28 +257,28 @@ def systems(survey: Survey) -> list[tuple[str, str]]:
     """Pairs (name, value) on systems, frames, and assumed accuracies of the instruments."""
     trajectory = survey.trajectory
     time = survey.trajectory.gps_time
-    crs = survey.crs or "not stated in survey.toml; coordinates are taken as E, N, H in m"
+    crs = survey.crs or "not stated in survey.toml; coordinates are assumed to be E, N, H in m"
     pairs = [("Coordinate reference system", crs), *FRAMES.items()]
     if trajectory.weeks is None:
         week_end = ""
     else:
-        week_end = ", counted on over the end of the GPS week"
+        week_end = ", continued past the end of the GPS week"
     span = f"gps_time {time[0]:.3f} to {time[-1]:.3f} s{week_end}"
     pairs.append(("Time of the trajectory", span))
     pairs += dict.fromkeys((f"Time of {cloud.path.name}", _time(cloud)) for cloud in survey.clouds)
     rate = 1 / np.median(np.diff(time))
     pairs.append(("Epochs of the trajectory", f"{thousands(len(time))} at {rate:.4g} Hz"))
-    sigma = "its own at each epoch"
+    sigma = "stated for each epoch"
     if trajectory.position_sigma is None:
         if survey.has_assumed_position:
             origin = "a default"
         else:
-            origin = "as survey.toml states"
+            origin = "from survey.toml"
         sigma = f"{survey.pos.position_sigma:g} m at all times, {origin}"
     kind = "Assumed" if survey.has_assumed_position else "Stated"
     pairs.append((f"{kind} sigma of the trajectory's position", sigma))
     for name, part in survey.by_scanner.items():
-        text = "not given (not needed: it cancels where only the trajectory is corrected)"
+        text = "not given (not needed when only the trajectory is corrected)"
         if part.mounting is not None:
             text = f"right, forward, up {', '.join(f'{v:g}' for v in part.mounting.lever_arm)} m"
         scanner = "the scanner"
@@ -291,10 +291,10 @@ def systems(survey: Survey) -> list[tuple[str, str]]:
 def _time(cloud):
     system = TIMES.get(cloud.time_system, cloud.time_system)
     if cloud.new_week > -np.inf:
-        system += f", counted on where they start again (+{WEEK:.0f} s)"
+        system += f", continued where they restart (+{WEEK:.0f} s)"
     if not cloud.time_constant:
-        return f"{system}, as the trajectory's"
-    return f"{system}; {cloud.time_constant:+.3f} s gives the trajectory's"
+        return f"{system}, as in the trajectory"
+    return f"{system}; {cloud.time_constant:+.3f} s converts to the trajectory's"
 
 
 def files(report: CorrectionReport) -> dict[str, list[tuple[str, str, str, str]]]:
@@ -341,7 +341,7 @@ def coverage(correction: Correction, report: CorrectionReport) -> list[tuple[str
     if report.control.n:
         control = span(*covered.control_span)
     else:
-        control = "no control point takes part"
+        control = "no control point was used"
     seconds = number(report.seconds_extrapolated, 1)
     metres = number(report.metres_extrapolated, 0)
     outside = covered.points_outside_trajectory
@@ -352,16 +352,16 @@ def coverage(correction: Correction, report: CorrectionReport) -> list[tuple[str
     values = {
         "Trajectory": span(time[0], time[-1]),
         "Control span (first to last control epoch)": control,
-        "Longest time without control inside a pass": f"{number(covered.longest_gap_s)} s",
-        "Points outside the trajectory (left as they were)": points(outside),
-        "Points before the first or past the last control point": points(beyond),
-        "Points whose correction is extrapolated: no control point holds them": points(
-            extrapolated
+        "Longest time without control within a pass": f"{number(covered.longest_gap_s)} s",
+        "Points outside the trajectory (not corrected)": points(outside),
+        "Points before the first or after the last control point": points(beyond),
+        "Points with extrapolated correction (outside the control)": points(extrapolated),
+        "Points flagged as noise (not used for measurements, corrected like all others)": points(
+            noise
         ),
-        "Points flagged as noise (not measured, corrected like all others)": points(noise),
-        "Time and way whose correction is extrapolated": f"{seconds} s, {metres} m",
+        "Time and distance with extrapolated correction": f"{seconds} s, {metres} m",
         "Gaps of the trajectory (nothing is interpolated across them)": len(gaps),
-        "Jumps of the correction, where the recorded position jumps": _jumps(report),
+        "Jumps of the correction at jumps of the recorded position": _jumps(report),
     }
     return list(values.items())
 

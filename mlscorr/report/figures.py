@@ -41,7 +41,7 @@ PICTURES = ("correction", "map", "residuals", "ties")  # all figures; the page s
 LEGEND = {
     "control": "Control point: misclosure before, 1 sigma",
     "check": "Check point: misclosure before, 1 sigma",
-    "unused": "Not used (triangle: beyond the axis)",
+    "unused": "Not used (triangle: outside the axis)",
 }
 
 
@@ -243,7 +243,7 @@ def _legend(trajectory, groups, report):
     handles.append(Patch(**BAND, label="1 sigma of the corrected value"))
     handles += mark_handles(LEGEND, groups)
     if support.weak:
-        handles.append(Patch(**OUTSIDE, label="Extrapolated: no control point holds it"))
+        handles.append(Patch(**OUTSIDE, label="Extrapolated, outside the control"))
     if support.outages:
         handles.append(Patch(**OUTAGE, label="GNSS outage: the position drifts"))
     if support.steps:
@@ -258,7 +258,7 @@ def _legend(trajectory, groups, report):
 
 WORDS = {
     "control": "Control point, 1 sigma",
-    "check": "Check point (no part in the estimate), 1 sigma",
+    "check": "Check point (not used in the estimate), 1 sigma",
 }
 
 
@@ -319,9 +319,9 @@ def _name_targets(panel, rows):
     """Write names under the axis, in order of time."""
     panel.set_xlim(-0.7, max(len(rows), 1) - 0.3)
     if len(rows) > SETTINGS.axis_names:
-        panel.set_xlabel("Targets in the order of time")
+        panel.set_xlabel("Targets in time order")
         return
     several_passes = len({row.pass_number for row in rows}) > 1
     names = [label(row.name) + f" · {row.pass_number}" * several_passes for row in rows]
     panel.set_xticks(range(len(rows)), names, rotation=90, fontsize=7, parse_math=False)
-    panel.set_xlabel("Target" + " · pass" * several_passes + ", in the order of time")
+    panel.set_xlabel("Target" + " · pass" * several_passes + ", in time order")

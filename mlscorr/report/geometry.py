@@ -115,10 +115,10 @@ def correction_lines(correction: Correction, origin: np.ndarray | None, color: s
         values = np.linalg.norm(corrected.position - correction.recorded.position, axis=1)
     elif color == "sigma":
         if corrected.position_sigma is None:
-            raise ValueError("The corrected trajectory has no sigma: take color='correction'.")
+            raise ValueError("The corrected trajectory has no sigma. Use color='correction'.")
         values = np.linalg.norm(corrected.position_sigma, axis=1)
     else:
-        raise ValueError(f"color = {color!r} is none of 'correction', 'sigma'.")
+        raise ValueError(f"color = {color!r} must be 'correction' or 'sigma'.")
     return path_lines(corrected, origin, {color: values})
 
 

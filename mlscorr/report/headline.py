@@ -116,7 +116,7 @@ def statements(report: CorrectionReport) -> list[StatementRow]:
         _extrapolated(report),
         *_left_out(report),
         *_sigma(report),
-        *assumed_statement(assumed, " until control points show better", "green"),
+        *assumed_statement(assumed, " until control points give an estimate", "green"),
         *warning_statements(report.model.get("warnings") or ()),
     ]
 
@@ -357,9 +357,9 @@ def _left_out(report) -> Iterator[StatementRow]:
         return
     if left_out.n and report.judgement[2] == "check":
         values = {"rmse": left_out.rmse[:3], "rmse_3d": left_out.rmse[4]}
-        yield StatementRow.of("Left out in turn", Statement("left out", values=values))
+        yield StatementRow.of("Leave-one-out", Statement("left out", values=values))
     elif not left_out.n and report.points("control").scored == 1:
-        yield StatementRow.of("Left out in turn", Statement("single control point", "warning"))
+        yield StatementRow.of("Leave-one-out", Statement("single control point", "warning"))
 
 
 def _sigma(report) -> Iterator[StatementRow]:

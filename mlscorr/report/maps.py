@@ -65,7 +65,7 @@ def search_figure(trajectory: Trajectory, ties: Ties, refused: Ties) -> Figure:
     """
     both = Ties.concatenate([ties, refused])
     used = np.arange(len(both)) < len(ties)
-    states = {f"{len(ties)} ties, {len(refused)} pairs refused": both.misclosure}
+    states = {f"{len(ties)} ties, {len(refused)} pairs rejected": both.misclosure}
     return _tie_plan(trajectory, both.place, used, states, "Trajectory (recorded)")
 
 
@@ -96,7 +96,7 @@ def _tie_plan(trajectory, place, used, states, words):
         panel.set_title(title)
         panel.label_outer()
     bar = figure.colorbar(dots, ax=panels, pad=0.01, extend="min", format="%g")
-    bar.set_label("How far apart both views lie (mm)")
+    bar.set_label("Misclosure of tie features (mm)")
     legend_above(figure, _kinds_legend(used, words))
     return figure
 
@@ -106,9 +106,9 @@ def _kinds_legend(used, words):
     handles = [Line2D([], [], label=words, **TRACK)]
     dot = {"linestyle": "none", "marker": "o", "markersize": 3, "color": "#5b2a86"}
     if used.any():
-        handles.append(Line2D([], [], label="Seen twice", **dot))
+        handles.append(Line2D([], [], label="Used", **dot))
     if not used.all():
-        words = "Not used: contradicts the others"
+        words = "Rejected: contradicts the others"
         handles.append(Line2D([], [], linestyle="none", label=words, **MARKS["unused"]))
     return handles
 
@@ -116,7 +116,7 @@ def _kinds_legend(used, words):
 WORDS = {"control": "Control point", "check": "Check point", "unused": "Not used"}
 NEXT: dict[str, Any] = {"color": "#009e73", "marker": "*", "markersize": 11.0}
 NEXT |= {"linestyle": "none", "zorder": 6}
-NEXT_WORDS = "Where another control point helps most"
+NEXT_WORDS = "Best positions for another control point"
 
 
 @styled
@@ -163,10 +163,10 @@ def map_figure(correction: Correction, report: CorrectionReport) -> Figure:
     frame(axes, low, high)
     far = f" (far outside: {outside})" if outside else ""
     if report.targets:
-        title = "Where the targets lie"
+        title = "Map of the targets"
     else:
         title = "The trajectory"
-    axes.set_title(f"{title}{', and their horizontal residuals' * bool(times)}{far}")
+    axes.set_title(f"{title}{', with horizontal residuals' * bool(times)}{far}")
     _key(axes, low, high, strip, times)
     handles = _legend(rows, len(arrows), times, short)
     handles += [Line2D([], [], label=NEXT_WORDS, **NEXT)] * bool(report.next_control)

@@ -73,7 +73,7 @@ def project_map(tracks: dict[str, np.ndarray]) -> Figure:
     bar.ax.xaxis.set_major_formatter(FormatStrFormatter("%g"))
     bar.ax.minorticks_off()
     bar.ax.set_xlim(colours.vmin, colours.vmax)
-    bar.set_label("Error to expect: 3D sigma of the corrected position (mm)")
+    bar.set_label("Expected error: 3D sigma of the corrected position (mm)")
     frame(axes, low, high)
-    axes.set_title("Where the drives went, and how well each place is known")
+    axes.set_title("Drives and expected error")
     return figure

@@ -13,11 +13,11 @@ from mlscorr.report import style
 from mlscorr.report.pages import Page, data_uri
 
 SECTIONS = {  # in order; empty ones are omitted
-    "time": "Over time",
+    "time": "Trajectories",
     "scores": "RMSE",
-    "targets": "Every target",
+    "targets": "Targets",
     "model": "Model and coverage",
-    "only": "Warnings of one",
+    "only": "Warnings",
     "files": "Files",
 }
 AXES = ("Easting", "Northing", "Height")

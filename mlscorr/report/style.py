@@ -167,7 +167,7 @@ def draw(figures: Figures, name: str) -> Figure:
         If there is none.
     """
     if name not in figures:
-        raise ValueError(f"There is no figure '{name}' here: {', '.join(figures)}.")
+        raise ValueError(f"There is no figure '{name}' here; available are {', '.join(figures)}.")
     return figures[name]()
 
 

@@ -60,7 +60,7 @@ def rmse_rows(report: CorrectionReport) -> list[RmseRow]:
         ("Check points, before", False, check.before),
         ("Check points, after", True, check.after),
         ("Control points, before", False, control.before),
-        ("Control points, left out in turn", True, control.left_out),
+        ("Control points, leave-one-out", True, control.left_out),
         ("Control points, after (fit)", False, control.after),
     ]
     required = control.before, control.after
@@ -89,7 +89,7 @@ def statistics_rows(
     control = report.control
     blocks = [
         ("Check points", check.before, check.after),
-        ("Control points, after: left out in turn", control.before, control.left_out),
+        ("Control points, after: leave-one-out", control.before, control.left_out),
         ("Control points, after: fit", control.before, control.after),
     ]
     return [

@@ -200,7 +200,7 @@ def _legend():
         Line2D([], [], linestyle="", **{**MARKS[name], "markersize": 4}, label=f"beam: {name}")
         for name in ("bright", "dark", "went by")
     ]
-    ellipse = f"1 sigma of the centre, {SETTINGS.ellipse_scale:g} times enlarged"
+    ellipse = f"1 sigma of the center, enlarged {SETTINGS.ellipse_scale:g} times"
     return [
         *marks,
         Line2D([], [], color=BLUE, label="fitted outline"),

@@ -24,14 +24,14 @@ ASSUMED_NAMES = {  # of a key of survey.toml
     "scanner.angle_noise": "Angle noise",
 }
 JUDGES = {  # basis of a verdict on a correction
-    "check": "as independent check points tell",
-    "leave-one-out": "as control points tell that were left out in turn",
-    "fit": "but only at the points that it was made from: nothing independent can judge it",
+    "check": "independent check points",
+    "leave-one-out": "control points (leave-one-out)",
+    "fit": "the points used for the correction (fit only, no independent check)",
 }
-PLACES = {True: "only another scanner saw the target", False: "nothing was scanned"}
+PLACES = {True: "scanned by another scanner only", False: "outside the scanned area"}
 OTHERS = {  # kinds of methods other than our own
-    "one move": "Best of those that move the whole cloud as one",
-    "over time": "Best of polynomials and interpolation over time",
+    "one move": "Best single transformation of the whole cloud",
+    "over time": "Best polynomial or interpolation over time",
 }
 
 
@@ -64,7 +64,7 @@ def interval_in_words(
         Units: m.
     """
     return (
-        f"{start:.1f} to {end:.1f} s, {chainage:.0f} to {chainage + length:.0f} m of the way",
+        f"{start:.1f} to {end:.1f} s, chainage {chainage:.0f} to {chainage + length:.0f} m",
         f"{why}; sigma up to {length_in_words(sigma)}",
     )
 
@@ -81,7 +81,7 @@ def assumed_in_words(row: Mapping[str, Any], use: str | None = None) -> tuple[st
     """
     text = f"{_assumed_size(row['value'], row['unit'])} assumed"
     if row.get("estimate") is not None:
-        text += f"; about {_assumed_size(row['estimate'], row['unit'])} by this survey"
+        text += f"; estimated from this survey: {_assumed_size(row['estimate'], row['unit'])}"
     elif use is not None:
         text += f"; {use}"
     return ASSUMED_NAMES.get(row["key"], row["key"]), text
@@ -111,22 +111,25 @@ def _verb(count, singular, plural):
 # A correction: its result
 
 
-def _off(before, after):
-    return f"from {length_in_words(before)} to {length_in_words(after)} off the surveyed places"
+def _change(before, after, kind):
+    return (
+        f"3D RMSE at {JUDGES[kind]}: {length_in_words(before)} before, {length_in_words(after)} "
+        "after the correction"
+    )
 
 
 def _improved(before, after, kind, times, holds_everywhere):
     """Sentence on the improvement; without a factor if a part of the cloud may be as wrong as
     before.
     """
-    where = ""
+    addition = ""
     if not holds_everywhere and kind == "check":
-        where = " at the points that were seen"
+        addition = ". Not every check point was found, so this may not hold for the whole cloud"
     elif not holds_everywhere:
-        where = " where control holds it"
+        addition = ". This holds only where control points constrain the cloud"
     elif times is not None:
-        where = f" ({times:.0f} times closer)"
-    return f"The correction brought the cloud {_off(before, after)}{where}, {JUDGES[kind]}."
+        addition = f" ({times:.0f} times smaller)"
+    return f"{_change(before, after, kind)}{addition}."
 
 
 def points_in_words(points: int, observations: int) -> str:
@@ -156,34 +159,34 @@ def _rmse(before, after):
 
 def _rmse_of_checks(before, after, points, observations):
     return (
-        f"Check points: {_rmse(before, after)}, {points_in_words(points, observations)} that took "
-        "no part in the estimate."
+        f"Check points, not used in the estimate: {_rmse(before, after)}, "
+        f"{points_in_words(points, observations)}."
     )
 
 
 def _rmse_left_out(before, after, points, observations, has_checks):
     none = "There are no check points."
     if has_checks:
-        none = "No check point was seen."
+        none = "No check point was found in the cloud."
     return (
-        f"{none} Control points, each left out in turn and predicted from the others: "
-        f"{_rmse(before, after)}, {points_in_words(points, observations)}."
+        f"{none} Control points, leave-one-out: {_rmse(before, after)}, "
+        f"{points_in_words(points, observations)}."
     )
 
 
 def _rmse_of_fit(before, after, points, observations):
     return (
-        "There is no independent check: every target used "
-        f"({points_in_words(points, observations)}) made the correction. The fit, "
-        f"{_rmse(before, after)}, does not tell how good the correction is elsewhere."
+        f"Fit to the points used for the correction: {_rmse(before, after)}, "
+        f"{points_in_words(points, observations)}. No independent point shows the accuracy "
+        "elsewhere."
     )
 
 
 def _worse_axes(rises, points, observations):
     axes = ", ".join(f"{axis} by {number(rise)} m" for axis, rise in rises.items())
     return (
-        f"After the correction it is worse than before: {axes} (RMS of "
-        f"{points_in_words(points, observations)})."
+        f"The RMSE of {points_in_words(points, observations)} increased after the correction: "
+        f"{axes}."
     )
 
 
@@ -192,40 +195,37 @@ def _worse_axes(rises, points, observations):
 
 def _scored(scored, surveyed):
     were = _verb(scored, "was", "were")
-    return f"{scored} of {surveyed} surveyed check points {were} seen and scored."
+    return f"{scored} of {surveyed} surveyed check points {were} found and used for the RMSE."
 
 
 def _lost(names, words):
     points = _verb(len(names), "check point was", "check points were")
-    return (
-        f"{len(names)} {points} {words} ({names_in_words(names)}): the error there is unknown, and "
-        "counts against this result."
-    )
+    return f"{len(names)} {points} {words} ({names_in_words(names)}). The error there is unknown."
 
 
 def _elsewhere(count, by_others):
-    return f"{count} {_verb(count, 'stands', 'stand')} where {PLACES[by_others]}."
+    return f"{count} {_verb(count, 'was', 'were')} {PLACES[by_others]}."
 
 
 def _control(scored, surveyed, refused, hidden, elsewhere):
     parts = [f"{scored} of {surveyed} surveyed points used"]
-    for names, words in ((refused, "refused"), (hidden, "not seen")):
+    for names, words in ((refused, "rejected"), (hidden, "not found")):
         if names:
             parts.append(f"{len(names)} {words} ({names_in_words(names)})")
-    parts += [f"{count} where {PLACES[by_others]}" for by_others, count in elsewhere.items()]
+    parts += [f"{count} {PLACES[by_others]}" for by_others, count in elsewhere.items()]
     return f"{', '.join(parts)}."
 
 
 def _uncontrolled(is_tied, sigma):
     """Sentence on the reference of a result without control points."""
-    result = "No control point takes part: nothing but the POS says where the cloud lies."
+    result = "No control point was used: the absolute position of the cloud is that of the POS."
     if is_tied:
         result += (
-            " Passes are fitted to one another by what two of them both saw: accuracy is relative "
-            "only, and an error that all of them share stays in the cloud."
+            " Tie features align the passes with one another. The accuracy is relative only, and "
+            "an error that all passes share remains."
         )
     if sigma > 0:
-        result += f" An error of up to {length_in_words(sigma)} is to be expected (one sigma)."
+        result += f" Expected error up to {length_in_words(sigma)} (1 sigma)."
     return result
 
 
@@ -233,53 +233,55 @@ def _moved(held, extrapolated, left):
     """Sentence on the share of corrected points, and the basis."""
     total = max(held + extrapolated + left, 1)
     sentence = (
-        f"{percent(held / total)} of the points corrected where control holds them, "
-        f"{percent(extrapolated / total)} by extrapolation, {percent(left / total)} left as they "
-        "were."
+        f"{percent(held / total)} of the points are constrained by control, "
+        f"{percent(extrapolated / total)} extrapolated, {percent(left / total)} not corrected."
     )
     if left:
-        sentence += f" {left} of {total} points lie outside the trajectory or in its gaps."
+        sentence += (
+            f" {left} of {total} points were measured outside the trajectory or in its gaps."
+        )
     return sentence
 
 
 def _datum(lengths):
     terms = ", ".join(f"{term} {length_in_words(length)}" for term, length in lengths.items())
     return (
-        f"Control and cloud differ by one linear term each ({terms}), which check points of the "
-        "same survey cannot show."
+        f"Control and cloud differ systematically ({terms}). Check points from the same survey "
+        "cannot show this."
     )
 
 
 def _extrapolated(seconds, metres, share, sigma):
     return (
-        f"No control holds {seconds:.1f} s ({metres:.0f} m) of the drive, {percent(share)} of the "
-        "points: the correction is extrapolated there, and an error of up to "
-        f"{length_in_words(sigma)} is to be expected (one sigma)."
+        f"{seconds:.1f} s ({metres:.0f} m, {percent(share)} of the points) are outside the "
+        "control. The correction is extrapolated there; expected error up to "
+        f"{length_in_words(sigma)} (1 sigma)."
     )
 
 
 def _left_out(rmse, rmse_3d):
     axes = ", ".join(map(length_in_words, rmse))
     return (
-        f"RMSE {length_in_words(rmse_3d)} in 3D ({axes} in E, N, H) at control points that the "
-        "others alone correct."
+        f"3D RMSE at control points, each predicted from the others: {length_in_words(rmse_3d)} "
+        f"({axes} in E, N, H)."
     )
 
 
 def _sigma(largest, time, median):
     return (
-        f"Up to {length_in_words(largest)} (at {time:.1f} s), {length_in_words(median)} at half of "
-        "the epochs: one sigma in 3D of the corrected position."
+        f"3D sigma of the corrected position: median {length_in_words(median)}, largest "
+        f"{length_in_words(largest)} (at {time:.1f} s)."
     )
 
 
 def _assumed(count, purpose, sections, has_sigma):
     columns = ""
     if has_sigma:
-        columns = ", or give the trajectory sigma columns"
+        columns = ", or add sigma columns to the trajectory"
     return (
-        f"{counted(count, 'accuracy')} that nobody stated {_verb(count, 'is', 'are')} assumed"
-        f"{purpose}. State what you know under {joined(sections)} in survey.toml{columns}."
+        f"{counted(count, 'accuracy')} {_verb(count, 'was', 'were')} not given and "
+        f"{_verb(count, 'is', 'are')} assumed{purpose}. Set known values under {joined(sections)} "
+        f"in survey.toml{columns}."
     )
 
 
@@ -287,45 +289,45 @@ def _assumed(count, purpose, sections, has_sigma):
 
 
 def _unused_ties(n, has_control):
-    outcome = "passes stay apart."
+    outcome = "The passes were not aligned with each other."
     if has_control:
-        outcome = "control points alone made the correction."
+        outcome = "The correction is based on the control points alone."
     return (
-        f"None of the {thousands(n)} places that were seen twice is used, since more than half of "
-        f"them contradict the others: {outcome}"
+        f"None of the {thousands(n)} tie features was used, because more than half of them "
+        f"contradict the others. {outcome}"
     )
 
 
 def _ties_apart(n, before, after):
     return (
-        "The same wall, road surface, pole or painted line was seen twice in "
-        f"{thousands(n)} places: there both views lay {length_in_words(before)} apart before the "
-        f"correction and lie {length_in_words(after)} apart after it (median)."
+        f"Median misclosure of {thousands(n)} tie features (walls, road surfaces, poles and "
+        f"painted lines scanned twice): {length_in_words(before)} before, "
+        f"{length_in_words(after)} after the correction."
     )
 
 
 def _wrong_ties(wrong):
     return (
-        f"{thousands(wrong)} of these places {_verb(wrong, 'is', 'are')} not used, as the others "
-        "contradict them: cars that moved, people, leaves, or one row of windows taken for the "
-        "next."
+        f"{thousands(wrong)} of these tie features {_verb(wrong, 'was', 'were')} rejected because "
+        "the others contradict them. Likely causes: moving cars, people, foliage, or repeated "
+        "facade elements matched wrongly."
     )
 
 
 def _share(control):
     return (
-        f"Of what the result knows of the drive, {percent(control)} comes from control points and "
-        f"{percent(1 - control)} from these places."
+        f"Information on the drift: {percent(control)} from control points, "
+        f"{percent(1 - control)} from tie features."
     )
 
 
 def _sufficient(control, sufficient):
-    points = f"{sufficient} of them, evenly spread,"
+    points = f"{sufficient} of them, evenly spaced,"
     if sufficient == 1:
         points = "1 of them"
     return (
-        f"{control} control points took part; {points} would have sufficed to know the drive about "
-        "as well (to a tenth of its sigma)."
+        f"{control} control points were used; {points} would give a sigma within 10 % of the "
+        "present one."
     )
 
 
@@ -333,23 +335,23 @@ def _all_needed(control):
     points = f"All {control}"
     if control == 2:
         points = "Both"
-    return f"{points} control points were needed: with fewer the drive is known less well."
+    return f"{points} control points are needed: with fewer, the sigma of the correction increases."
 
 
 # A calibration
 
 
 def _relative(first, name, fit, lever_arm, boresight):
-    both = f"No wall that scanners {first} and {name} both saw holds them."
+    both = f"No wall was scanned by both scanner {first} and scanner {name}."
     if fit is not None:
         both = (
-            f"Scanners {first} and {name} put a wall that both saw in one place to "
+            f"Walls scanned by both scanner {first} and scanner {name} agree to "
             f"{millimetres(fit)} mm."
         )
     return (
-        f"{both} Scanner {name} beside scanner {first}: lever arm to "
-        f"{'/'.join(map(millimetres, lever_arm))} mm right/forward/up, boresight to "
-        f"{'/'.join(f'{sigma:.3f}' for sigma in boresight)} deg about them (one sigma)."
+        f"{both} Sigma of scanner {name} relative to scanner {first}: lever arm "
+        f"{'/'.join(map(millimetres, lever_arm))} mm (right/forward/up), boresight "
+        f"{'/'.join(f'{sigma:.3f}' for sigma in boresight)} deg about the same axes."
     )
 
 
@@ -369,14 +371,14 @@ def _lacks(components):
         if not row["determined"]:
             text += " (not determined)"
         words.append(text)
-    return f"The recorded mounting lacks {', '.join(words)}."
+    return f"Corrections to the recorded mounting: {', '.join(words)}."
 
 
 def _undetermined(components, count):
     return (
-        f"{count - len(components)} of {count} parts by this geometry. Not determined, and changed "
-        "only as far as the accuracy of the POS tells it from what looks the same: "
-        f"{', '.join(map(_component, components))}."
+        f"This geometry determines {count - len(components)} of {count} components. Not "
+        f"determined: {', '.join(map(_component, components))}. Their sigmas rest on the stated "
+        "accuracy of the POS."
     )
 
 
@@ -384,7 +386,10 @@ def _calibrated(end: str) -> Callable[..., str]:
     """Wording of the errors of targets of a role before and after."""
 
     def sentence(role, before, after):
-        return f"3D RMSE of {role} points {length_in_words(before)} → {length_in_words(after)}{end}"
+        return (
+            f"3D RMSE at {role} points: {length_in_words(before)} before, {length_in_words(after)} "
+            f"after the calibration{end}"
+        )
 
     return sentence
 
@@ -400,8 +405,8 @@ def _scanner(end: str) -> Callable[..., str]:
                 words = " (not determined)"
             undetermined.append(words)
         return (
-            f"Ranges lack {millimetres(range_offset['correction'])} ± "
-            f"{millimetres(range_offset['sigma'])} mm{undetermined[0]}, scan angles "
+            f"Range offset {millimetres(range_offset['correction'])} ± "
+            f"{millimetres(range_offset['sigma'])} mm{undetermined[0]}, scale of the scan angles "
             f"{1e3 * encoder_scale['correction']:.2f} ± {1e3 * encoder_scale['sigma']:.2f} mrad "
             f"per rad{undetermined[1]}{end}"
         )
@@ -410,15 +415,15 @@ def _scanner(end: str) -> Callable[..., str]:
 
 
 def _two_passes(used, n, is_between_scanners, before, after, without_drift):
-    views = "two passes"
+    views = "between passes"
     if is_between_scanners:
-        views = "two passes, or two scanners of one,"
+        views = "between passes or scanners"
     sentence = (
-        f"{used} of {n} places that {views} both saw are used: {length_in_words(before)} apart "
-        f"before, {length_in_words(after)} after (median)"
+        f"{used} of {n} tie features {views} were used. Median misclosure: "
+        f"{length_in_words(before)} before, {length_in_words(after)} after the calibration"
     )
     if without_drift is not None:
-        sentence += f", {length_in_words(without_drift)} without the drift"
+        sentence += f", {length_in_words(without_drift)} with the drift removed"
     return f"{sentence}."
 
 
@@ -427,31 +432,31 @@ def _two_passes(used, n, is_between_scanners, before, after, without_drift):
 
 def _no_method(least, raw):
     return (
-        f"No method improves this cloud by {1000 * least:.0f} mm or more. The cloud as recorded, "
-        f"with {number(raw)} m, is as good as any."
+        f"No method reduces the 3D RMSE by {1000 * least:.0f} mm or more. The recorded cloud has "
+        f"{number(raw)} m."
     )
 
 
 def _best(name, about, rmse, raw):
     return (
-        f"Best is {name}: 3D RMSE {number(rmse)} m, against {number(raw)} m without any "
-        f"correction. {about}"
+        f"Best method: {name}, 3D RMSE {number(rmse)} m; {number(raw)} m without correction. "
+        f"{about}"
     )
 
 
 def _several_best(names, rmse, raw, least):
     return (
-        f"Best are {joined(names)}: 3D RMSE {number(rmse)} m, against {number(raw)} m without any "
-        f"correction. They differ by less than {1000 * least:.0f} mm, which can't be told apart."
+        f"Best methods: {joined(names)}, 3D RMSE {number(rmse)} m; {number(raw)} m without "
+        f"correction. They differ by less than {1000 * least:.0f} mm, which is not significant."
     )
 
 
 def _best_of_kind(kind, name, rmse):
-    return f"{OTHERS[kind]}: {name}, with {number(rmse)} m."
+    return f"{OTHERS[kind]}: {name}, {number(rmse)} m."
 
 
 def _behind(name, rmse, behind):
-    return f"{name}, with {number(rmse)} m, is {number(behind)} m behind."
+    return f"{name} has {number(rmse)} m, {number(behind)} m more than the best."
 
 
 def _fitted(control):
@@ -459,13 +464,11 @@ def _fitted(control):
 
 
 def _scored_by_checks(control, check):
-    return f"{_fitted(control)} and scored by {counted(check, 'check point')} that took no part."
+    return f"{_fitted(control)} and tested at {counted(check, 'check point')} not used in the fit."
 
 
 def _scored_by_fit(control):
-    return (
-        f"{_fitted(control)}. Nothing independent is left to score them by: this is the mere fit."
-    )
+    return f"{_fitted(control)}. No independent point is left: the scores show the fit only."
 
 
 def _cross_validated(control, check, groups):
@@ -473,26 +476,25 @@ def _cross_validated(control, check, groups):
     others = ""
     if check:
         too_few = f"only {counted(check, 'check point')}"
-        others = "; each check point from all control points"
-    left = f"left out in {groups} groups in turn"
+        others = " Each check point is predicted from all control points."
+    left = f"in {groups} groups"
     if groups == control:
-        left = "each left out in turn"
+        left = "leave-one-out"
     return (
-        f"{_fitted(control)}. There {_verb(check, 'is', 'are')} {too_few}, so the scores are "
-        f"cross-validated over all points: control points, {left}, are predicted from the "
-        f"others{others}."
+        f"{_fitted(control)}. As there {_verb(check, 'is', 'are')} {too_few}, the scores are "
+        f"cross-validated ({left}): control points are predicted from the others.{others}"
     )
 
 
 def _tied(name, count):
     return (
-        f"{name} also uses {counted(count, 'tie')}: planes, poles and paint that two passes both "
-        "saw. All other methods use the control points alone."
+        f"{name} also uses {counted(count, 'tie')} between passes (planes, poles and paint). All "
+        "other methods use the control points only."
     )
 
 
 def _untied(name, other, why):
-    sentence = f"{name} equals {other} here, for no ties were used."
+    sentence = f"{name} equals {other} here because no ties were used."
     if why:
         sentence += f" {why}"
     return sentence
@@ -518,13 +520,13 @@ def _epochs_differ(interpolated, first, second):
     if interpolated:
         words.append(
             f"{counted(interpolated, 'epoch')} of the first result "
-            f"{'has' if interpolated == 1 else 'have'} no partner in the second, which is "
+            f"{'has' if interpolated == 1 else 'have'} no counterpart in the second, which was "
             "interpolated there."
         )
     if first or second:
         words.append(
-            f"Not compared, as the other trajectory does not cover them: {counted(first, 'epoch')} "
-            f"of the first, {second} of the second."
+            f"Not covered by the other trajectory and therefore not compared: "
+            f"{counted(first, 'epoch')} of the first, {second} of the second."
         )
     return " ".join(words)
 
@@ -563,8 +565,8 @@ def _inputs_differ(count, all):
 
 
 CORRELATED = (
-    "The residuals of neighboring check points are correlated, which the test disregards: a narrow "
-    "miss proves little."
+    "The test disregards the correlation between neighboring check points: a value just outside "
+    "the limits proves little."
 )
 
 
@@ -576,10 +578,9 @@ def _check_sigmas(relation: str, consequence: str) -> Callable[..., str]:
         if consequence:
             inside = "outside"
         return (
-            f"The residuals of {counted(points, 'check point')} {relation} their stated sigmas: "
-            f"chi-squared is {statistic:.1f} with {degrees_of_freedom} degrees of freedom, "
-            f"{inside} its limits {limits[0]:.1f} and {limits[1]:.1f} "
-            f"({percent(1 - significance)}). "
+            f"The residuals at {counted(points, 'check point')} {relation} their stated sigmas: "
+            f"chi-squared {statistic:.1f} with {degrees_of_freedom} degrees of freedom, {inside} "
+            f"the limits {limits[0]:.1f} and {limits[1]:.1f} ({percent(1 - significance)}). "
             f"{consequence.format(factor=factor)}{CORRELATED}"
         )
 
@@ -587,17 +588,16 @@ def _check_sigmas(relation: str, consequence: str) -> Callable[..., str]:
 
 
 SENTENCES: dict[str, Wording] = {
-    "nothing to judge by": "There is no surveyed point that could tell how good the correction is.",
-    "no target to judge by": "No target was found that could tell how good the correction is.",
+    "nothing to judge by": "The accuracy of the correction is unknown: no point was surveyed.",
+    "no target to judge by": "The accuracy of the correction is unknown: no target was found.",
     "hardly changed": lambda before, after, kind: (
-        f"The correction changed next to nothing, {JUDGES[kind]}: {_off(before, after)}."
+        f"The correction hardly changed the cloud. {_change(before, after, kind)}."
     ),
     "changed within sigma": lambda before, after, kind: (
-        f"The correction changed less than these targets tell, {JUDGES[kind]}: "
-        f"{_off(before, after)}."
+        f"The change is smaller than the accuracy of these targets. {_change(before, after, kind)}."
     ),
     "made worse": lambda before, after, kind: (
-        f"The correction made the cloud worse, {JUDGES[kind]}: {_off(before, after)}. Don't use it."
+        f"The correction made the cloud worse; don't use it. {_change(before, after, kind)}."
     ),
     "improved": _improved,
     "rmse of check points": _rmse_of_checks,
@@ -605,31 +605,34 @@ SENTENCES: dict[str, Wording] = {
     "rmse of the fit": _rmse_of_fit,
     "worse axes": _worse_axes,
     "points": _moved,
-    "no check point": "No check point was surveyed, so nothing independent tests this result.",
+    "no check point": "No check point was surveyed: there is no independent test of this result.",
     "check points": _scored,
     "hidden check points": lambda names: _lost(
-        names, "not seen although the cloud covers the surroundings"
+        names, "not found although the cloud covers the surroundings"
     ),
     "refused check points": lambda names: _lost(
-        names, "found, but refused, as place, kind or size does not fit"
+        names, "found but rejected, because position, kind or size does not fit"
     ),
     "check points elsewhere": _elsewhere,
     "control points": _control,
     "no control point": _uncontrolled,
-    "control of other drives": "No point of its own takes part: those of other drives hold it, "
-    "through ties.",
+    "control of other drives": "This drive has no control point of its own. Control points of "
+    "other drives constrain it through ties.",
     "datum": _datum,
-    "held by other drives": "Control points of other drives hold the whole drive, through ties.",
-    "held": "Control points hold the whole drive.",
+    "held by other drives": "Control points of other drives constrain the whole drive through "
+    "ties.",
+    "held": "Control points constrain the whole drive.",
     "extrapolated": _extrapolated,
     "between control points": lambda sigma: (
-        f"Between control points it is up to {length_in_words(sigma)}."
+        f"Between control points, expected error up to {length_in_words(sigma)}."
     ),
     "left out": _left_out,
-    "single control point": "A single control point has no others: the POS's own sigmas alone "
-    "check it.",
+    "single control point": "No leave-one-out test is possible with a single control point: only "
+    "the stated sigmas of the POS check it.",
     "sigma": _sigma,
-    "stated sigma": lambda sigma: f"The POS states {length_in_words(sigma)} of the recorded one.",
+    "stated sigma": lambda sigma: (
+        f"The POS states {length_in_words(sigma)} for the recorded position."
+    ),
     "assumed": _assumed,
     "warnings": lambda count: f"{counted(count, 'warning')}:",
     "check sigmas hold": _check_sigmas("agree with", ""),
@@ -640,35 +643,37 @@ SENTENCES: dict[str, Wording] = {
     ),
     "check sigmas too large": _check_sigmas(
         "are smaller than",
-        "The sigmas are pessimistic: residuals are about {factor:.2f} times as large. ",
+        "The sigmas are pessimistic: the residuals are only {factor:.2f} times as large. ",
     ),
     "no ties": "{reason}",
     "unused ties": _unused_ties,
     "ties": _ties_apart,
     "contradicting ties": _wrong_ties,
-    "relative ties": "This is relative only; nothing is claimed in absolute terms: no control "
-    "point takes part, and an error that all passes share stays in the cloud.",
+    "relative ties": "The accuracy is relative only: no control point was used, and an error "
+    "that all passes share remains in the cloud.",
     "share of control": _share,
     "sufficient control": _sufficient,
     "all control needed": _all_needed,
     "scanners together": _relative,
-    "mounting not told": "This geometry does not tell whether the recorded mounting holds.",
-    "mounting holds": "The recorded mounting holds: it lacks nothing beyond {sigmas:g} sigmas.",
-    "determined parts hold": "The recorded mounting holds in the parts that are determined: it "
-    "lacks nothing beyond {sigmas:g} sigmas.",
+    "mounting not told": "This geometry can't confirm the recorded mounting.",
+    "mounting holds": "The recorded mounting is confirmed: no correction exceeds {sigmas:g} sigma.",
+    "determined parts hold": "The determined components of the recorded mounting are confirmed: no "
+    "correction exceeds {sigmas:g} sigma.",
     "mounting lacks": _lacks,
-    "all parts determined": "All {count} parts by this geometry.",
+    "all parts determined": "This geometry determines all {count} components.",
     "parts not determined": _undetermined,
-    "no target": "No target tells how good the calibration is.",
-    "fit of a calibration": _calibrated(": the fit alone, which proves little."),
-    "calibration tested": _calibrated("; they took no part."),
+    "no target": "The accuracy of the calibration is unknown: no target was found.",
+    "fit of a calibration": _calibrated(" (fit only, no independent check)."),
+    "calibration tested": _calibrated(" (not used in the estimate)."),
     "worse by the scanner": _calibrated(
-        "; they took no part, and keep what the scanner itself lacks."
+        " (not used in the estimate; errors of the scanner itself remain)."
     ),
-    "worse by chance": _calibrated("; they took no part. No part changed significantly."),
-    "scanner is off": _scanner("; the mounting is free of it."),
-    "scanner is right": _scanner(": nothing significant."),
-    "scanner hardly told": _scanner("; this geometry hardly tells it."),
+    "worse by chance": _calibrated(
+        " (not used in the estimate). No component changed significantly."
+    ),
+    "scanner is off": _scanner("; the mounting is free of these errors."),
+    "scanner is right": _scanner(": not significant."),
+    "scanner hardly told": _scanner("; this geometry hardly determines them."),
     "two passes": _two_passes,
     "no method improves": _no_method,
     "best method": _best,
@@ -688,16 +693,17 @@ SENTENCES: dict[str, Wording] = {
     "residuals differ": _residuals_differ,
     "surveyed differently": lambda count: (
         f"{counted(count, 'surveyed point')} "
-        f"{'has' if count == 1 else 'have'} other coordinates in the second result:"
+        f"{'has' if count == 1 else 'have'} different coordinates in the second result:"
     ),
     "same targets used": "Both results use the same {n} observations of targets.",
     "targets used in one": lambda count: (
-        f"{counted(count, 'observation')} {'is' if count == 1 else 'are'} used in one result only:"
+        f"{counted(count, 'observation')} "
+        f"{'was' if count == 1 else 'were'} used in one result only:"
     ),
     "values differ": _values_differ,
     "inputs differ": _inputs_differ,
     "warnings of one": lambda count: (
-        f"{counted(count, 'warning')} {'stands' if count == 1 else 'stand'} in one result only:"
+        f"{counted(count, 'warning')} {'appears' if count == 1 else 'appear'} in one result only:"
     ),
 }
 

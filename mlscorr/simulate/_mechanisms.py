@@ -204,13 +204,13 @@ def load_mechanisms(path: Path) -> Described:
     """
     path = Path(path)
     if not path.is_file():
-        raise FileNotFoundError(f"{path} does not exist; it should hold MECHANISMS.")
+        raise FileNotFoundError(f"{path} does not exist. It should define MECHANISMS.")
     module = run_file(path)
     for name in ("MECHANISMS", "LEADS", "UNITS"):
         if set(getattr(module, name, {})) != set(getattr(module, "MECHANISMS", {"": None})):
             raise ValueError(
-                f"{path} has no {name} with the names of its MECHANISMS: a file of mechanisms "
-                "needs MECHANISMS (functions), LEADS (words) and UNITS (unit and largest size)."
+                f"{path} has no {name}. A file of mechanisms needs MECHANISMS (functions), LEADS "
+                "(words) and UNITS (unit and largest size)."
             )
     return {
         name: (function, module.UNITS[name], module.LEADS[name])

@@ -43,7 +43,7 @@ class SceneScenario(_Part):
     @model_validator(mode="after")
     def _has_a_file(self):
         if (self.kind == "mesh") != (self.file is not None):
-            raise ValueError('a file is needed for kind = "mesh", and for no other kind')
+            raise ValueError('kind = "mesh" needs a file, and no other kind takes one')
         return self
 
 
@@ -169,7 +169,7 @@ class Scenario(_Part):
         events += [(f"{e.name} at", e.time, e.time) for e in self.imperfections if e.moment()]
         for what, start, end in events:
             if self.end is not None and end > self.end:
-                raise ValueError(f"{what} {start:g} s lies outside the drive of {self.end:g} s")
+                raise ValueError(f"{what} {start:g} s is outside the drive of {self.end:g} s")
         return self
 
 

@@ -273,7 +273,7 @@ REFERENCE = "reference.ply"
 CREATED = date(2015, 1, 1)  # in the LAS header, so that a seed gives the same bytes on any day
 
 
-NOTHING_MET = "No pulse of {} met anything: look at drive, scene, max_range and field_of_view."
+NOTHING_MET = "No pulse of {} hit anything: check drive, scene, max_range and field_of_view."
 
 
 def write_survey(
@@ -299,7 +299,7 @@ def write_survey(
                 points[file] = _write_cloud(part / file, survey, blocks, truth, done)
             for name, array in _truth_arrays(survey).items():
                 truth.put(name, array)
-            truth.watch = progress("Writing their truth", truth.growing)
+            truth.watch = progress("Writing the truth", truth.growing)
         for file in set(survey.files) - set(points):  # its field of view has no beam
             raise ValueError(NOTHING_MET.format(file))
         write_trajectory_csv(part / "trajectory.csv", survey.trajectory)
@@ -317,7 +317,7 @@ def _disk_errors(folder):
         yield
     except OSError as error:
         raise OSError(
-            f"the survey can't be written to {folder}, and nothing is left of it: "
+            f"the survey can't be written to {folder}, and partial files were removed: "
             f"{error.strerror or error}."
         ) from error
 

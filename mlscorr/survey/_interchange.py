@@ -96,8 +96,8 @@ def copied_las(points: Any) -> tuple[Any, Any]:
     point_format = given.point_format
     if "gps_time" not in point_format.dimension_names:
         raise ValueError(
-            f"Points of format {point_format.id} have no gps_time: without times nothing tells "
-            "where the vehicle was. Export the cloud as format 1, 3 or 6 to 8."
+            f"Points of format {point_format.id} have no gps_time, which locates them on the "
+            "trajectory. Export the cloud as format 1, 3 or 6 to 8."
         )
     record = type(given)(given.array.copy(), point_format, given.scales, given.offsets)
     if given is points:

@@ -103,7 +103,7 @@ def chosen_origin(xyz: np.ndarray, origin: np.ndarray | None) -> np.ndarray:
     place = np.asarray(origin, float)
     if place.shape != (3,) or not np.isfinite(place).all():
         raise ValueError(
-            f"origin = {origin!r} is no place: give three finite numbers, E, N, H in m."
+            f"origin = {origin!r} is invalid: give three finite numbers, E, N, H in m."
         )
     return place
 
@@ -132,8 +132,8 @@ def geometry_columns(geometry: Any, origin: np.ndarray | None) -> tuple[np.ndarr
     point = getattr(geometry, "point", None)
     if point is None or not hasattr(geometry, "voxel_down_sample"):
         raise ValueError(
-            f"An open3d.t.geometry.PointCloud belongs where {type(geometry).__name__} was given: a "
-            "legacy cloud has no gps_time. Give a tensor cloud with the point attribute gps_time."
+            f"Expected an open3d.t.geometry.PointCloud, not {type(geometry).__name__}: a legacy "
+            "cloud has no gps_time. Give a tensor cloud with the point attribute gps_time."
         )
     others = [name for name in point if name not in ("positions", "origin")]
     return map_places(geometry, origin), {name: _array(point[name]) for name in others}
@@ -155,8 +155,8 @@ def map_places(geometry: Any, origin: np.ndarray | None = None) -> np.ndarray:
     """
     if "positions" not in geometry.point:
         raise ValueError(
-            f"The {type(geometry).__name__} of Open3D has no positions: it is empty. Give it "
-            "points first, as geometry.point.positions."
+            f"The {type(geometry).__name__} of Open3D is empty: it has no positions. Set "
+            "geometry.point.positions first."
         )
     positions = geometry.point["positions"].cpu().numpy()
     if origin is not None:
@@ -213,14 +213,14 @@ def _check_attributes(further):
     if taken:
         raise ValueError(
             f"The attributes {', '.join(taken)} of the cloud have names that its Open3D geometry "
-            "needs itself. Rename them."
+            "uses itself. Rename them."
         )
     for name, values in further.items():
         dtype = np.asarray(values).dtype
         if dtype.kind not in "biuf" or dtype.itemsize > 8 or dtype == np.float16:
             raise ValueError(
-                f"The attribute {name} is of type {dtype}, which Open3D has not: it knows bool, "
-                "integers, float32 and float64. Convert it, or leave it out."
+                f"The attribute {name} has the type {dtype}, but Open3D supports only bool, "
+                "integers, float32 and float64. Convert or remove it."
             )
 
 

@@ -154,8 +154,8 @@ class PointCloud(Columns):
         if "gps_time" not in columns:
             known = ", ".join(columns) or "none"
             raise ValueError(
-                f"The Open3D cloud of {counted(len(xyz), 'point')} has no point attribute gps_time "
-                f"(it has: {known}): without times nothing tells where the vehicle was. Set "
+                f"The Open3D cloud of {counted(len(xyz), 'point')} has no point attribute "
+                f"gps_time (it has: {known}), which locates points on the trajectory. Set "
                 "cloud.point.gps_time to a float64 tensor (n, 1), in s."
             )
         _warn_of_rounding(cloud.point["positions"].numpy())
@@ -182,7 +182,7 @@ def _require_numbers(what, is_number):
     if len(bad):
         raise ValueError(
             f"{len(bad)} of {counted(len(is_number), 'point')} have {what} that are not finite "
-            f"(first: point {bad[0]}). Leave them out: nothing places them."
+            f"(first: point {bad[0]}). Remove them."
         )
 
 
@@ -194,9 +194,9 @@ def _warn_of_rounding(xyz):
     step = float(np.spacing(largest))
     if step > COORDINATE_ROUNDING:
         warnings.warn(
-            f"Coordinates are float32: at {largest:.0f} m they are rounded to steps of {step:.3g} "
-            f"m, so that up to {step / 2:.3g} m is lost. Give float64, or subtract an origin "
-            "before they become float32.",
+            f"Coordinates are float32: at {largest:.0f} m they are rounded to steps of "
+            f"{step:.3g} m, with errors of up to {step / 2:.3g} m. Give float64, or subtract an "
+            "origin before conversion to float32.",
             stacklevel=4,
         )
 

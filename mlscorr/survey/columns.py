@@ -73,8 +73,8 @@ def check_lengths(record: Any) -> None:
     if len(set(rows.values())) > 1:
         counts = ", ".join(f"{name} {count}" for name, count in rows.items())
         raise ValueError(
-            f"The columns of {type(record).__name__} have unlike numbers of rows ({counts}): "
-            "a row of each belongs to the same thing. Give all of them the same length."
+            f"The columns of {type(record).__name__} have different numbers of rows ({counts}). "
+            "Give all columns the same length."
         )
 
 

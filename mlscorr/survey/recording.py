@@ -304,9 +304,10 @@ class Survey(Summary):
             if not inside.any():
                 first, last = trajectory.gps_time[[0, -1]]
                 raise ValueError(
-                    f"None of the {counted(len(cloud), 'point')} of cloud {number} has a gps_time "
-                    f"within the trajectory [{first:.3f}, {last:.3f}] s. Cloud and trajectory may "
-                    "use different time systems: add the constant between both to the times."
+                    f"None of the {counted(len(cloud), 'point')} of cloud {number} has a "
+                    f"gps_time within the trajectory [{first:.3f}, {last:.3f}] s. Cloud and "
+                    "trajectory may use different time systems: add the constant difference to "
+                    "the times."
                 )
             stem = name if len(parts) == 1 else f"{name}-{number}"
             files.append(
@@ -507,9 +508,9 @@ class Survey(Summary):
         if self.scanners:
             names = ", ".join(mounted.name for mounted in self.scanners)
             raise ValueError(
-                f"{self.path} has {len(self.scanners)} scanners ({names}), and {verb} rests on one "
-                "mounting. Give it a survey.toml of each scanner: its files under [cloud] (split "
-                "one with points of several), its [mounting] and its [scanner]."
+                f"{self.path} has {len(self.scanners)} scanners ({names}), but {verb} needs a "
+                "single mounting. Make a survey.toml for each scanner with its files under "
+                "[cloud] (split files with points of several), its [mounting] and its [scanner]."
             )
 
 
@@ -522,7 +523,7 @@ def _clouds_of(clouds):
     else:
         parts = [PointCloud.from_arrays(*clouds)]
     if not parts or not all(map(len, parts)):
-        raise ValueError("A survey needs clouds, each with a point at least.")
+        raise ValueError("A survey needs clouds with at least one point each.")
     return parts
 
 
@@ -545,8 +546,8 @@ def check_survey(value: object) -> None:
     """
     if not isinstance(value, Survey):
         raise TypeError(
-            f"A Survey belongs where {str(value)[:60]!r} ({type(value).__name__}) was given: read "
-            "one with mlscorr.read_survey(path), and give that."
+            f"Expected a Survey, not {str(value)[:60]!r} ({type(value).__name__}). Read one with "
+            "mlscorr.read_survey(path)."
         )
 
 
@@ -565,8 +566,8 @@ def check_rng(value: object) -> None:
     """
     if not isinstance(value, np.random.Generator):
         raise ValueError(
-            f"rng = {str(value)[:60]!r} is no random generator: numpy.random.default_rng(seed) "
-            "makes one of a seed."
+            f"rng = {str(value)[:60]!r} is not a random generator. Create one with "
+            "numpy.random.default_rng(seed)."
         )
 
 

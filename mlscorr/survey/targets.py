@@ -95,16 +95,16 @@ class ControlPoints(Columns):
         values = np.column_stack([places, sigmas, sizes])
         if bad := [n for n, row in zip(names, values, strict=True) if not np.isfinite(row).all()]:
             raise ValueError(
-                f"{len(bad)} of {count} surveyed points have a place, sigma or size that is not "
-                f"finite (first: {bad[0]}). Leave them out, or give the numbers."
+                f"{len(bad)} of {count} surveyed points have a position, sigma or size that is "
+                f"not finite (first: {bad[0]}). Correct or remove them."
             )
         if twice := [n for n, times in Counter(names).items() if times > 1]:
             raise ValueError(
-                f"{len(twice)} names stand twice among {count} surveyed points (first: "
-                f"{twice[0]}): give each point a name of its own."
+                f"{len(twice)} names occur twice among {count} surveyed points (first: "
+                f"{twice[0]}). Give each point its own name."
             )
         if strange := [k for k in kinds if k not in KINDS]:
-            raise ValueError(f"kind = {strange[0]!r} is none of {', '.join(KINDS)}.")
+            raise ValueError(f"kind = {strange[0]!r} is invalid; valid are {', '.join(KINDS)}.")
         return points
 
     @classmethod

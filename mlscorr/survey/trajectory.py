@@ -67,7 +67,7 @@ class Trajectory(Summary):
     def __post_init__(self):
         check_lengths(self)
         if len(self.gps_time) < 2:
-            raise ValueError(f"A trajectory needs at least 2 epochs, this one has {len(self)}.")
+            raise ValueError(f"A trajectory needs at least 2 epochs; this one has {len(self)}.")
         for name in ("gps_time", "position", "position_sigma", "attitude_sigma"):
             values = getattr(self, name)
             if values is not None and not np.isfinite(values).all():
@@ -80,8 +80,8 @@ class Trajectory(Summary):
             raise ValueError(
                 f"The trajectory's gps_time must increase: {int((steps == 0).sum())} epochs are "
                 f"duplicates and {int((steps < 0).sum())} go back in time (first after "
-                f"{self.gps_time[np.argmax(steps <= 0)]:.3f} s). Sort the file and remove repeated "
-                "epochs."
+                f"{self.gps_time[np.argmax(steps <= 0)]:.3f} s). Sort the file and remove "
+                "repeated epochs."
             )
 
     @classmethod
@@ -391,7 +391,7 @@ class Trajectory(Summary):
         outside = self.segment(gps_time) < 0
         if outside.any():
             raise ValueError(
-                f"{outside.sum()} of {len(gps_time)} times lie outside the trajectory "
+                f"{outside.sum()} of {len(gps_time)} times are outside the trajectory "
                 f"[{self.gps_time[0]:.3f}, {self.gps_time[-1]:.3f}] s or in one of its "
                 f"{len(self.gaps)} gaps (first: {gps_time[np.argmax(outside)]:.3f} s)."
             )

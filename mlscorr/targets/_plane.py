@@ -129,7 +129,7 @@ def fit_plane(xyz: np.ndarray, tolerance: float) -> Plane:
     (``benchmarks/bench_libraries.py``).
     """
     if len(xyz) < 3:
-        raise ValueError(f"A plane needs 3 points, there are {len(xyz)}.")
+        raise ValueError(f"A plane needs at least 3 points; there are {len(xyz)}.")
     triples = (quasi_random(SETTINGS.plane_trials, 3) * len(xyz)).astype(int)
     return Plane(*_fit_plane(xyz, triples, tolerance))
 

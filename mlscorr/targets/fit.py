@@ -192,11 +192,11 @@ def why_useless(intensity: np.ndarray) -> str | None:
     """
     values = np.unique(intensity)
     if len(values) == 0:
-        return "The intensity of all points is missing."
+        return "No point has an intensity."
     if len(values) == 1:
         return f"The intensity of all points is {values[0]:g}."
     if len(values) < SETTINGS.smallest_levels:
-        return f"The intensity takes only {len(values)} values."
+        return f"The intensity has only {len(values)} different values."
     return None
 
 

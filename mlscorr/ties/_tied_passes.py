@@ -89,19 +89,19 @@ def _untied(estimate: Estimate, features: TieFeatures, radius: float) -> Estimat
     first, last = time_spans(cell, features.gps_time)
     near = int(np.count_nonzero((last - first)[cell] > SETTINGS.pause))  # at two visits
     what = (
-        f"{near} of {len(features)} planes, poles and markings lie within about {radius:.1f} m of "
-        "what was scanned at another time"
+        f"{near} of {len(features)} planes, poles and markings are within about {radius:.1f} m "
+        "of points scanned at another time"
     )
     if near < SETTINGS.neighbours:
         reason = (
-            f"Nothing was scanned twice, or hardly: {what}. A second pass, best in the opposite "
-            "direction, carries what control points tell to where there are none."
+            f"Passes hardly overlap: {what}. A second pass, preferably in the opposite "
+            "direction, extends the effect of control points to where there are none."
         )
         return replace(estimate, untied=reason)
     reason = (
-        f"Nothing that two passes both saw agrees: {what}, yet none is parallel and near enough. "
-        "Passes may lie farther apart than the POS states (raise its sigmas, or search_radius of "
-        "[matching]), or the mounting be wrong by degrees (mlscorr calibrate)."
+        f"No overlapping features agree: {what}, but none is parallel and near enough. The POS "
+        "may be less accurate than it states (increase its sigmas, or search_radius under "
+        "[matching]), or the mounting wrong by degrees (run mlscorr calibrate)."
     )
     return replace(estimate, untied=reason, notes=(*estimate.notes, _noted(reason)))
 

@@ -132,9 +132,9 @@ def unconstrained_sentence(ties: Ties, axis: np.ndarray) -> str:
     first, second = ties.pass_number[0]
     words = ", ".join(f"{value:.2f}" for value in axis + 0.0)
     return (
-        f"Most of the way that passes {first} and {second} share, {len(ties)} ties leave the "
-        f"direction E, N, H = {words} unheld: all walls are parallel there, as in a tunnel. Only "
-        "control in both passes, or poles and walls across the way, hold it."
+        f"Along most of the overlap of passes {first} and {second}, {len(ties)} ties leave the "
+        f"direction E, N, H = {words} unconstrained: all walls are parallel there, as in a "
+        "tunnel. Only control in both passes, or poles and walls across the road, constrain it."
     )
 
 

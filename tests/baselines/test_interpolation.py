@@ -76,7 +76,7 @@ def test_nothing_to_interpolate_is_refused():
     "No control point, or too few epochs for three parameters: a sentence with the number"
     error = np.zeros((len(TIME), 3))
     trajectory = drive(error)
-    with pytest.raises(Undetermined, match="no control point"):
+    with pytest.raises(Undetermined, match="control point"):
         fit_linear(trajectory, control(trajectory, error, EVEN)[[]])
     with pytest.raises(Undetermined, match="here are 2"):
         fit_gaussian_process(trajectory, control(trajectory, error, EVEN[:2]))

@@ -495,7 +495,7 @@ FOLDERS = (
     OthersFolder(
         "E57 without times",
         others(timeless, trajectory_csv, control_csv),
-        "no time of its points in scan 1 of 1.* export it with the field timeStamp, or as LAS",
+        "have no times in scan 1 of 1.* export it with the field timeStamp, or as LAS",
         mend=others(remove("scan.e57"), las),
     ),
     OthersFolder(
@@ -507,7 +507,7 @@ FOLDERS = (
     OthersFolder(
         "check points in a file of their own",
         others(las, trajectory_csv, apart),
-        "2 files may be the control .*check.csv.* Join those that belong together",
+        "2 files may be the control .*check.csv.* Combine those that belong together",
         mend=together,
     ),
     OthersFolder("pictures, PDF and clutter", others(*OURS, clutter, photographs)),
@@ -542,14 +542,14 @@ FOLDERS = (
     OthersFolder(
         "dates in place of seconds",
         others(las, dated, control_csv),
-        "'2026-05-07 .*where a number belongs.* a date or a time of day: give seconds",
+        "'2026-05-07 .*where a number is expected.* a date or time of day: give seconds",
         mend=trajectory_csv,
     ),
     OthersFolder("control in feet", others(las, trajectory_csv, in_feet), "feet", mend=control_csv),
     OthersFolder(
         "each point surveyed twice",
         others(las, trajectory_csv, surveyed_twice),
-        fault="Is each point named twice",
+        fault="each point is listed twice",
     ),
     OthersFolder("LAS beside LAZ", others(in_two_encodings, trajectory_csv, control_csv)),
     OthersFolder("uppercase endings", uppercase, clouds=("PASS-1.LAS", "PASS-2.LAS")),

@@ -114,7 +114,8 @@ def gap_document(label="time_offset", probability=0.9817, rows=300, rng=None, **
         "next_data": [
             {
                 "survey": "the same road at twice the speed",
-                "why": "time_offset and lever_arm: squared correlation falls from 0.97 to 0.31.",
+                "why": "time_offset and lever_arm: squared correlation decreases from 0.97 to "
+                "0.31.",
                 "before": 0.97,
                 "after": 0.31,
             }
@@ -143,9 +144,9 @@ def gap_document(label="time_offset", probability=0.9817, rows=300, rng=None, **
             }
             for channel, figure in (("points", "chamfer"), ("surface", "energy_distance"))
         ],
-        "left_out": {"beam_divergence": "No row of this survey depends on it."},
+        "left_out": {"beam_divergence": "No residual of this survey depends on it."},
         "mendable": [],
-        "warnings": ["No plane was seen twice."],
+        "warnings": ["No plane was scanned twice."],
     }
     return document | changes
 

@@ -52,15 +52,15 @@ def test_results_go_into_a_folder_once(pair, tmp_path):
 def test_what_is_neither_a_survey_nor_two_results_is_refused(pair, street, tmp_path):
     "One result alone, a survey among them, methods of results: exit code 2"
     for arguments, part in (
-        ([pair[0]], "one alone has nothing to be compared with"),
-        ([pair[0], "-o", tmp_path / "out"], "one alone has nothing to be compared with"),
-        ([pair[0], street], "is no result of mlscorr correct"),
-        ([street, pair[0]], "is no result of mlscorr correct"),
-        ([*pair, "--clouds", "lsc"], "--clouds is of the methods on one survey"),
+        ([pair[0]], "a comparison needs two"),
+        ([pair[0], "-o", tmp_path / "out"], "a comparison needs two"),
+        ([pair[0], street], "is not a result of mlscorr correct"),
+        ([street, pair[0]], "is not a result of mlscorr correct"),
+        ([*pair, "--clouds", "lsc"], "--clouds applies to the methods on one survey"),
     ):
         ended = run(*arguments)
         assert ended.exit_code == 2 and part in ended.stderr, ended.stderr
     assert not (tmp_path / "out").exists()
     (pair[1] / "trajectory.csv").unlink()
     ended = run(*pair)
-    assert ended.exit_code == 3 and "holds no trajectory.csv" in ended.stderr
+    assert ended.exit_code == 3 and "it has no trajectory.csv" in ended.stderr

@@ -43,7 +43,7 @@ def test_a_folder_is_corrected_by_one_command(folder):
     ended = run("correct", folder, "--no-report")
     assert ended.exit_code == 0, ended.stderr
     out = folder.parent / "street-correct"
-    assert f"Results go to {out}" in ended.stderr.replace("\n", "")
+    assert f"Results: {out}" in ended.stderr.replace("\n", "")
     assert content(folder) == before
     inferred = read_survey(out / "survey.toml")
     assert len(inferred.control) == 4 and len(inferred.check) == 1

@@ -264,7 +264,7 @@ def test_rows_that_carry_the_trend_cannot_be_left_out():
     design = np.array([[1, 0], [1, 0], [1, 1.0]])
     solved = collocate_correlated(gps_time, np.zeros(3), 1e-4 * np.eye(3), design, [])
     assert [solved.determined_without([row]) for row in range(3)] == [True, True, False]
-    with pytest.raises(ValueError, match=r"Without the 1 observations .* the other 2 do not"):
+    with pytest.raises(ValueError, match=r"Without the 1 observations.*2 do not"):
         solved.leave_out([2])
 
 
@@ -306,7 +306,7 @@ def test_prediction_in_parts_equals_the_whole():
 def test_a_trend_without_enough_observations_is_refused():
     "Three observations at two epochs do not determine a parabola"
     gps_time = START + np.array([0.0, 100.0, 100.0])
-    with pytest.raises(ValueError, match="3 trend parameters are not determined by 3 misclosures"):
+    with pytest.raises(ValueError, match="3 misclosures do not determine 3 trend parameters"):
         collocate_correlated(gps_time, np.zeros(3), 1e-4 * np.eye(3), legendre(gps_time, 2), [])
 
 
@@ -315,5 +315,5 @@ def test_contradicting_observations_without_noise_are_refused():
     gps_time = START + np.array([0.0, 50.0, 50.0])
     one = np.ones((3, 1))
     signal = Signal(one, Covariance("matern32", 30.0))
-    with pytest.raises(ValueError, match="not positive definite: two observations of one time"):
+    with pytest.raises(ValueError, match="not positive definite: two observations at one time"):
         collocate_correlated(gps_time, np.zeros(3), np.zeros((3, 3)), one, [signal])

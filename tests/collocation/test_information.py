@@ -78,7 +78,7 @@ def test_knots_too_close_are_refused_in_a_sentence():
         return [SparseRows(gps_time, np.zeros((n, 1)), Noise(1e-4 * unit), unit, [signal])]
 
     fine = collocate_by_knots(rows(1.0))
-    with pytest.raises(ValueError, match=r"Rounding leaves .* signal 1 \(matern52, 3600 s\) at a"):
+    with pytest.raises(ValueError, match=r"signal 1 \(matern52, 3600 s\) at a"):
         collocate_by_knots(rows(3600.0), fine.solver)
     assert np.isfinite(collocate_by_knots(rows(3600.0)).log_likelihood)
 
@@ -94,9 +94,9 @@ def test_what_cannot_be_solved_is_refused_in_a_sentence():
         collocate_by_knots([control, replace(ties, misclosure=wrong)])
     with pytest.raises(ValueError, match="60 misclosures is not positive definite"):
         collocate_by_knots([control, replace(ties, noise=Noise(np.zeros((60, 1, 1))))])
-    with pytest.raises(ValueError, match="3 trend parameters are not determined by 60 miscl"):
+    with pytest.raises(ValueError, match="60 misclosures do not determine 3 trend"):
         collocate_by_knots([ties])
-    with pytest.raises(ValueError, match="72 observations see other epochs"):
+    with pytest.raises(ValueError, match="72 observations refer to other epochs"):
         collocate_by_knots([control, replace(ties, gps_time=ties.gps_time[::-1])], solved.solver)
 
 

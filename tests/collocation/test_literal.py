@@ -130,5 +130,5 @@ def test_its_covariances_are_those_of_no_signal():
 def test_too_few_control_points_are_refused():
     "Five epochs don't determine a polynomial of order five"
     drive = Drive(3, n=5)
-    with pytest.raises(ValueError, match="18 trend parameters are not determined by 15 misclos"):
+    with pytest.raises(ValueError, match="15 misclosures do not determine 18 trend"):
         drive.solve(np.zeros(3))

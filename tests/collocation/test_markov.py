@@ -137,10 +137,10 @@ def test_what_cannot_be_solved_is_refused_in_a_sentence():
         survey.solve()
     survey = RandomSurvey(6)
     survey.design[:, :, 2] = survey.design[:, :, 1]
-    with pytest.raises(ValueError, match="3 trend parameters are not determined by 42 miscl"):
+    with pytest.raises(ValueError, match="42 misclosures do not determine 3 trend"):
         survey.solve()
     solved = RandomSurvey(6).solve()
     with pytest.raises(
-        ValueError, match=r"30 epochs are asked with a design .* of 3 and \[3, 2, 3\]"
+        ValueError, match=r"30 epochs were requested with a design .* with 3 and \[3, 2, 3\]"
     ):
         solved.predict(survey.asked, survey.asked_design, survey.asked_mixing[:2])

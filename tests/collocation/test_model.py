@@ -129,7 +129,7 @@ def test_rows_that_alone_carry_a_column_determine_it():
     solved = collocate(START + np.arange(6.0), np.zeros((6, 1)), noise, design, [])
     assert [solved.determined_without([i]) for i in range(6)] == [True] * 4 + [False, True]
     assert not solved.determined_without([0, 1, 2, 3, 5])
-    with pytest.raises(ValueError, match=r"Without the 1 observations .* other 5 do not determine"):
+    with pytest.raises(ValueError, match=r"Without the 1 observations.*5 do not determine"):
         solved.leave_out(np.array([4]))
 
 
@@ -150,7 +150,7 @@ def test_parameters_that_misclosures_do_not_determine_are_refused(columns):
     else:
         design = np.zeros((2, 1, 1))
     noise = Noise(np.ones((2, 1, 1)))
-    with pytest.raises(ValueError, match=f"{columns} trend parameters are not determined by 2 "):
+    with pytest.raises(ValueError, match=f"2 misclosures do not determine {columns} trend"):
         collocate(START + np.arange(2.0), np.zeros((2, 1)), noise, design, [])
 
 
@@ -239,5 +239,5 @@ def test_a_part_of_the_trend_may_be_believed():
     "Of more coefficients than misclosures some must be"
     rows, _ = believing_rows(8, p=22)
     assert np.isfinite(collocate_rows_dense([rows], np.eye(2, 23)).trend).all()
-    with pytest.raises(ValueError, match="22 trend parameters are not determined by 21"):
+    with pytest.raises(ValueError, match="21 misclosures do not determine 22 trend"):
         collocate_rows_dense([rows], None)

@@ -41,14 +41,14 @@ def applied(change, value, at="clock"):
     [
         (lambda value: value.speed, "line \\d+, .*test_guard.py.*AttributeError.*speed"),
         (lambda value: sys.exit(0), "SystemExit: 0"),
-        (lambda value: None, "it gives a NoneType"),
+        (lambda value: None, "it returns a NoneType"),
         (lambda value: replace(value, kept=0.5 * value.kept), "kept is float64 .5,., not bool"),
         (lambda value: replace(value, gps_time=1j * value.gps_time), "gps_time is complex128"),
         (
             lambda value: replace(value, gps_time=value.gps_time[:, None]),
             "gps_time is float64 .5, 1.",
         ),
-        (lambda value: replace(value, gps_time=value.gps_time / 0.0), "of gps_time 5 of 5 numbers"),
+        (lambda value: replace(value, gps_time=value.gps_time / 0.0), "5 of 5 values of gps_time"),
     ],
 )
 def test_what_cannot_take_the_place_of_the_value_is_refused(change, said):

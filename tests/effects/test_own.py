@@ -85,8 +85,8 @@ def test_simulate_and_plan_take_the_file_of_an_effect(tmp_path):
         ("1 / 0", "ZeroDivisionError: division by zero"),
         ("x = 1", "registers no effect"),
         ("raise SystemExit(0)", "SystemExit: 0"),
-        (CLASS.format(name="a+b", body="0.0"), "'a\\+b' can't name an effect"),
-        (CLASS.format(name="none", body="0.0"), "none of the answers none, noise and unknown"),
+        (CLASS.format(name="a+b", body="0.0"), r"'a\+b' can't be the name of an effect"),
+        (CLASS.format(name="none", body="0.0"), "not none, noise or unknown"),
     ],
 )
 def test_a_file_that_cannot_be_used_is_refused(tmp_path, text, said):
@@ -118,13 +118,13 @@ def test_a_simulator_whose_effect_moves_everything_is_refused(tmp_path):
     with pytest.raises(ValueError, match=r"everything of 0\.1 moves points by 1e\+04 m"):
         expected(g.rows, g.survey, [kind(0.1)])
     (why,) = signatures(g.rows, g.survey, [kind])[1].values()
-    assert why.key == "not usable" and "Is its unit right" in why.values["why"]
+    assert why.key == "not usable" and "Check its unit" in why.values["why"]
 
 
 @pytest.mark.parametrize(
     ("name", "body", "said"),
     [
-        ("everything", "np.array([0.0, 0.0, 1e5])", "Is its unit right"),
+        ("everything", "np.array([0.0, 0.0, 1e5])", "Check its unit"),
         ("nan", "np.array([0.0, 0.0, np.nan])", "not a number"),
         ("raises", "value.speed", "AttributeError"),
         ("leaves", "exit(0)", "SystemExit"),

@@ -93,7 +93,7 @@ def test_the_report_words_it():
     document["verdict"] |= {"label": "squat", "set": ["squat"]}
     text = words(diagnosis_page(document, "street"))
     assert "At 1 m/s the body of the vehicle is 5.0 mm ± 0.4 mm too low." in text
-    assert "One thing is wrong" in text
+    assert "One error" in text
     assert "Squatting vehicle The body of the vehicle rises when it is fast." in text
 
 
@@ -127,13 +127,16 @@ def test_streams_of_the_library_stay_what_they_are(monkeypatch):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"title": "", "remedy": ""}, r"^Squat doesn't say its title, remedy; see Effect\.$"),
-        ({"name": "boresight"}, "boresight is an effect of mlscorr already"),
+        ({"title": "", "remedy": ""}, r"^Squat does not define title, remedy; see Effect\.$"),
+        ({"name": "boresight"}, "boresight is a built-in effect of mlscorr"),
         ({"stage": "clocks"}, "'clocks' is an unknown stage; known are beam, clock"),
-        ({"parts": ("up", "down")}, "squat names 2 parts and sides of 1"),
-        ({"sides": ()}, "Squat doesn't say its sides"),
-        ({"sides": ("high",)}, "squat names 1 parts and sides of 1"),
-        ({"sentence": "It is {size} too {sides}."}, "squat knows size, where, side .* not sides"),
+        ({"parts": ("up", "down")}, "squat has 2 parts and sides for 1"),
+        ({"sides": ()}, "Squat does not define sides"),
+        ({"sides": ("high",)}, "squat has 1 parts and sides for 1"),
+        (
+            {"sentence": "It is {size} too {sides}."},
+            "squat may contain size, where, side.* not sides",
+        ),
         ({"quantities": classmethod(lambda cls: {})}, "squat has no magnitude with unit, typical"),
     ],
 )

@@ -25,10 +25,12 @@ def test_a_vector_is_said_by_the_parts_that_differ_from_zero():
     right = SizeEstimate(-0.093, 0.004, "m")
     up = SizeEstimate(0.019, 0.017, "m")
     text = kind.describe({"right": right, "up": up})
-    assert text.endswith("the scanner really sits 93 mm ± 4 mm farther left.")
+    assert text.endswith("the scanner is actually 93 mm ± 4 mm farther left.")
     text = kind.describe({"forward": SizeEstimate(-0.01, 0.02, "m"), "up": up})
-    assert text.endswith("really sits 10 mm ± 20 mm farther back and 19 mm ± 17 mm higher.")
-    assert kind.describe({"up": SizeEstimate(None, None, "m")}).endswith("really sits –.")
+    assert text.endswith(
+        "the scanner is actually 10 mm ± 20 mm farther back and 19 mm ± 17 mm higher."
+    )
+    assert kind.describe({"up": SizeEstimate(None, None, "m")}).endswith("is actually –.")
 
 
 def test_a_wave_is_said_by_its_amplitude():
@@ -36,7 +38,7 @@ def test_a_wave_is_said_by_its_amplitude():
     kind = effect_class("angle_eccentricity")
     values = [SizeEstimate(3e-4, 1e-5, "rad"), SizeEstimate(-4e-4, 1e-5, "rad")]
     text = kind.describe(dict(zip(kind.parts, values, strict=True)))
-    assert "wrong by up to 0.500 mrad ± 0.010 mrad, once a turn" in text
+    assert "wrong by up to 0.500 mrad ± 0.010 mrad, once per turn" in text
     values[1] = SizeEstimate(float("nan"), None, "rad")
     assert "up to –, once" in kind.describe(dict(zip(kind.parts, values, strict=True)))
 

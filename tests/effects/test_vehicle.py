@@ -28,11 +28,11 @@ def test_position_noise_has_one_sigma_at_all_times_and_forgets_in_two_seconds():
 def test_events_outside_the_drive_and_unknown_targets_are_refused():
     "A step between the passes, a bump after the last, an outlier on a target that isn't there"
     step = make_effect("position_step", magnitude=[0, 0, 1], time=80.0)
-    with pytest.raises(ValueError, match=r"position_step at 80 s lies outside .* 1 gaps"):
+    with pytest.raises(ValueError, match=r"position_step at 80 s is outside .* 1 gaps"):
         step.apply(TRAJECTORY, REFERENCE)
     bump = make_effect("position_bump", magnitude=[0, 0, 1], time=200.0, width=5.0)
     with pytest.raises(ValueError, match=r"position_bump at 200 s .* ends after 160\.0 s"):
         bump.apply(TRAJECTORY, REFERENCE)
     outlier = make_effect("target_outlier", magnitude=[0, 0, 1], target="T3")
-    with pytest.raises(ValueError, match=r"'T3', which is none of the 6 targets; .* 'T03'"):
+    with pytest.raises(ValueError, match=r"'T3', which is not among the 6 targets; .* 'T03'"):
         outlier.apply(CONTROL, REFERENCE)

@@ -42,7 +42,8 @@ def test_a_lever_arm_that_lacks_something_forward_may_be_a_clock(calibration):
         estimate = MountingEstimate.about([RECORDED], lacks, covariance, 1.0)
         warnings = replace(calibration, lsc=estimate).warnings
         sentence = (
-            "lacks -100 mm forward. A clock offset of 20 ms at this survey's speed (5.0 ± 0.0 "
+            "correction of -100 mm forward. A clock offset of 20 ms has the same effect at this "
+            "survey's speed (5.0 ± 0.0 "
         )
         assert sum(sentence in warning for warning in warnings) == number
 

@@ -25,7 +25,7 @@ def test_sigma_columns_of_zero_are_no_statement():
 def test_no_observation_is_refused():
     "Nothing can be estimated from no target"
     case = smooth_case(1)
-    with pytest.raises(ValueError, match="no observation of a control point"):
+    with pytest.raises(ValueError, match="No control point was observed"):
         estimate_correction(case.recorded, case.matched[[]])
 
 
@@ -128,14 +128,14 @@ def test_one_axis_of_zero_is_filled_with_the_others(axis):
 )
 def test_negative_beliefs_are_refused(pos):
     "Both beliefs are named in m and deg"
-    with pytest.raises(ValueError, match=r"believed sigmas .* m and .* deg; none may be negative"):
+    with pytest.raises(ValueError, match="deg; none may be negative"):
         checked(pos=pos)
 
 
 @pytest.mark.parametrize("order", [-1, 1.5, "1", None, True])
 def test_an_order_is_a_whole_number_from_zero_on(order):
     "Order 0 is a shift; there is nothing below it, and nothing between two orders"
-    with pytest.raises(ValueError, match=f"order is {order!r}; it should be 0"):
+    with pytest.raises(ValueError, match=f"order of the trend is {order!r}; it must be"):
         checked(order=order)
     assert checked(order=0)[1] == checked(order=np.int64(1))[1] == ()
 

@@ -305,7 +305,7 @@ def test_a_large_site_is_calibrated_with_parameters_from_a_part_of_it():
 
 def test_too_few_targets_are_refused():
     "Two control points cannot hold six components, however often they are seen"
-    with pytest.raises(ValueError, match=r"2 control points were found .* needs 3 at least"):
+    with pytest.raises(ValueError, match="2 control points were found"):
         Site(8, targets=2).calibrate()
 
 
@@ -313,7 +313,7 @@ def test_targets_of_one_epoch_are_refused():
     "All targets at one time tell the POS error there, not the mounting"
     site = Site(8)
     near = replace(site.observations[[0, 1, 2, 3]], gps_time=START + 9.0 + 0.1 * np.arange(4))
-    with pytest.raises(ValueError, match=r"All 4 control points were seen within 0.30 s"):
+    with pytest.raises(ValueError, match=r"All 4 control points were observed within 0.30 s"):
         estimate_mounting(site.recorded, [RECORDED], Matched.by_name(near, site.control))
 
 
@@ -410,7 +410,7 @@ def test_a_changed_part_leaves_no_sigma_of_the_one_before(correlation, tmp_path)
         (
             "lever_arm_sigma = [1.0, 1.0, 1.0]\nboresight_sigma = [1.0, 1.0, 1.0]\n"
             f"correlation = {(2 * np.eye(6)[::-1] - np.ones((6, 6))).tolist()}",
-            "is no correlation matrix",
+            "is not a correlation matrix",
         ),
     ],
 )

@@ -12,7 +12,7 @@ from tests.beds.lying_pos import START, TIME, survey, walk
 
 EVEN = np.linspace(3.0, 237.0, 16)
 EARLY = "before the first"
-LATE = "past the last"
+LATE = "after the last"
 
 
 def support_of(seed, outage, times):

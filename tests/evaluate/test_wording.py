@@ -27,93 +27,104 @@ CATALOGUE = [
         REASONS,
         "outlier",
         {"statistic": 41.26, "critical": 16.27},
-        "outlier: statistic 41.3 against 16.3",
+        "outlier: statistic 41.3, critical value 16.3",
     ),
     (
         REASONS,
         "no pose",
         {"points": 25, "start": 413_241.0, "end": 413_243.5},
-        "25 points near it, at 413241.0 to 413243.5 s, were measured in a gap of the trajectory or "
-        "outside it, and nothing is interpolated there.",
+        "25 points near it, at 413241.0 to 413243.5 s, were measured outside the trajectory or "
+        "in one of its gaps, where nothing is interpolated.",
     ),
-    (REASONS, "seen by others", {}, "Another scanner saw it, this one did not."),
+    (REASONS, "seen by others", {}, "Another scanner scanned it, this one did not."),
     (
         DATUM,
         "shift",
         {"size": [0.8, 0.4], "length": 0.894, **SHIFT},
-        "The control points lie 0.89 m beside the cloud as the POS puts it (E +0.80, N +0.40 m; 12 "
-        "observations, Bayes factor 25 against an error of the POS). It looks like another "
-        f"horizontal datum, realization or epoch. {FOLLOWS}",
+        "The control points are offset from the cloud by 0.89 m (E +0.80, N +0.40 m; 12 "
+        "observations, Bayes factor 25 against an error of the POS). Likely cause: another "
+        "horizontal datum, realization or epoch. The corrected cloud follows the control; find "
+        "out which of the two is right.",
     ),
     (
         DATUM,
         "height",
         {"size": [-0.3], **SHIFT, "assumed_sigma": 0.02},
-        "The control points lie 0.30 m below the cloud as the POS puts it (12 observations, Bayes "
-        "factor 25 against an error of the POS). It looks like heights of another vertical datum "
-        "or geoid, or a wrong height of an antenna, an instrument or a post. "
-        f"{FOLLOWS}{ASSUMED}",
+        "The control points are 0.30 m below the cloud (12 observations, Bayes factor 25 "
+        "against an error of the POS). Likely cause: another vertical datum or geoid, or a "
+        "wrong height of an antenna, instrument or prism pole. The corrected cloud follows the "
+        "control; find out which of the two is right. The sigma of the POS is not given: 0.02 m "
+        "is assumed, and a less accurate POS could explain the difference. Set it under [pos] "
+        "in survey.toml.",
     ),
     (
         DATUM,
         "height",
         {"size": [0.3], **SHIFT},
-        "The control points lie 0.30 m above the cloud as the POS puts it (12 observations, Bayes "
-        "factor 25 against an error of the POS). It looks like heights of another vertical datum "
-        "or geoid, or a wrong height of an antenna, an instrument or a post. "
-        f"{FOLLOWS}",
+        "The control points are 0.30 m above the cloud (12 observations, Bayes factor 25 "
+        "against an error of the POS). Likely cause: another vertical datum or geoid, or a "
+        "wrong height of an antenna, instrument or prism pole. The corrected cloud follows the "
+        "control; find out which of the two is right.",
     ),
     (
         DATUM,
         "scale",
         SCALE | NET,
-        "The net of control points is larger than in the cloud by +400 +/- 10 ppm (0.040 m at 100 "
-        f"m from its middle; {EVIDENCE}). Ground distances would be larger by +394 ppm there "
-        f'({GROUND}), which fits: if the control is in them, set scale_factor = "ground" under '
-        f"[control], or scale_factor = 0.999600. {FOLLOWS}",
+        "The control network is larger than the cloud by +400 +/- 10 ppm (0.040 m at 100 m from "
+        "its center; 12 observations, Bayes factor 1e8 against an error of the POS). Ground "
+        "distances would be larger by +394 ppm there (scale factor of the projection 0.999606), "
+        'which fits. If the control is in ground distances, set scale_factor = "ground" under '
+        "[control], or scale_factor = 0.999600. The corrected cloud follows the control; find "
+        "out which of the two is right.",
     ),
     (
         DATUM,
         "scale",
         SCALE | NET | {"size": [5e-3], "is_ground": False},
-        "The net of control points is larger than in the cloud by +5000 +/- 10 ppm (0.040 m at 100 "
-        f"m from its middle; {EVIDENCE}). Ground distances would be larger by +394 ppm there "
-        f"({GROUND}), which does not fit: look for another projection or a wrong unit. If the "
-        f"control has this scale, set scale_factor = 0.995025 under [control]. {FOLLOWS}",
+        "The control network is larger than the cloud by +5000 +/- 10 ppm (0.040 m at 100 m "
+        "from its center; 12 observations, Bayes factor 1e8 against an error of the POS). "
+        "Ground distances would be larger by +394 ppm there (scale factor of the projection "
+        "0.999606), which does not fit. Look for another projection or a wrong unit; if the "
+        "control has this scale, set scale_factor = 0.995025 under [control]. The corrected "
+        "cloud follows the control; find out which of the two is right.",
     ),
     (
         DATUM,
         "scale",
         SCALE | NET | {"ground": None, "is_ground": False},
-        "The net of control points is larger than in the cloud by +400 +/- 10 ppm (0.040 m at 100 "
-        f"m from its middle; {EVIDENCE}). It looks like ground distances without the scale of the "
-        f"map: if they are, set scale_factor = 0.999600 under [control]. {FOLLOWS}",
+        "The control network is larger than the cloud by +400 +/- 10 ppm (0.040 m at 100 m from "
+        "its center; 12 observations, Bayes factor 1e8 against an error of the POS). Likely "
+        "cause: ground distances without the map scale. If so, set scale_factor = 0.999600 "
+        "under [control]. The corrected cloud follows the control; find out which of the two is "
+        "right.",
     ),
     (
         DATUM,
         "turn",
         {"size": [np.radians(0.03)], "sigma": [1e-5], "ground": GROUND, **NET},
-        "The net of control points is turned to the left against the cloud by +0.0300 +/- 0.0006 "
-        f"deg (0.040 m at 100 m from its middle; {EVIDENCE}). It looks like another projection or "
-        "zone, or a local net oriented to another north (one to true north would be turned by "
-        f"{-np.degrees(GROUND.convergence):+.4f} deg): export the control in the crs of the cloud. "
-        f"{FOLLOWS}",
+        "The control network is rotated counter-clockwise relative to the cloud by +0.0300 +/- "
+        "0.0006 deg (0.040 m at 100 m from its center; 12 observations, Bayes factor 1e8 "
+        "against an error of the POS). Likely cause: another projection or zone, or a local "
+        "network with another orientation (true north would give -0.1201 deg). Export the "
+        "control in the CRS of the cloud. The corrected cloud follows the control; find out "
+        "which of the two is right.",
     ),
     (
         DATUM,
         "tilt",
         {"size": np.array([4e-4, -1e-4]), "sigma": np.full(2, 1e-5), **NET},
-        "The net of control points is tilted against the cloud: it rises by +0.40 +/- 0.01 mm/m "
-        "towards east and -0.10 +/- 0.01 mm/m towards north (0.040 m at 100 m from its middle; "
-        f"{EVIDENCE}). It looks like heights of another geoid model, or like a network whose "
-        f"vertical was never levelled: export the control with the geoid of the cloud. {FOLLOWS}",
+        "The control network is tilted relative to the cloud: it rises by +0.40 +/- 0.01 mm/m "
+        "toward east and -0.10 +/- 0.01 mm/m toward north (0.040 m at 100 m from its center; 12 "
+        "observations, Bayes factor 1e8 against an error of the POS). Likely cause: another "
+        "geoid model, or a network that was never leveled. Export the control with the geoid of "
+        "the cloud. The corrected cloud follows the control; find out which of the two is right.",
     ),
     (
         BEAMS,
         "no time",
         {"file": "a.laz", "count": 9, "samples": 900, "values": "-1"},
-        "9 of 900 points sampled from a.laz have gps_time -1: they were written without times, and "
-        "stay as they are (exit code 4). Export them with gps_time, or remove them.",
+        "9 of 900 points sampled from a.laz have gps_time -1, which means no time. They stay "
+        "uncorrected (exit code 4). Export them with gps_time, or remove them.",
     ),
     (
         BEAMS,
@@ -127,17 +138,17 @@ CATALOGUE = [
             "gaps": 2,
             "away": 3.25,
         },
-        "9 of 900 points sampled from a.laz lie outside the trajectory [413200.000, 413209.900] s "
-        "or in its gaps (2), up to 3.250 s from it: they stay as they are (exit code 4). Export "
+        "9 of 900 points sampled from a.laz are outside the trajectory [413200.000, 413209.900] "
+        "s or in its gaps (2), by up to 3.250 s. They stay uncorrected (exit code 4). Export "
         "the whole trajectory.",
     ),
     (
         BEAMS,
         "backwards",
         {"file": "a.laz", "steps": 899},
-        "The times of a.laz run backwards: none of 899 sampled points is later than the one "
-        "before. Unless the file was sorted so, its gps_time is wrong, and points get the "
-        "correction of another time.",
+        "The times of a.laz run backward: none of 899 sampled points is later than the one "
+        "before. Unless the file was sorted this way, its gps_time is wrong, and the points "
+        "would get the correction of another time.",
     ),
     (
         BEAMS,
@@ -150,50 +161,50 @@ CATALOGUE = [
             "near": 200.0,
             "off_plane": 20.0,
         },
-        "The points of a.laz lie 3000 m beside the trajectory and 71 deg off the scan plane "
-        "(median of 900 samples; limits 200 m and 20 deg): the file may be of another survey with "
-        "the same times, its gps_time wrong (UTC is 18 s late), or [mounting] another scanner's or "
-        "not in m and deg. Take out what doesn't fit.",
+        "The points of a.laz are 3000 m from the trajectory and 71 deg off the scan plane "
+        "(median of 900 samples; limits 200 m and 20 deg). The file may belong to another "
+        "survey, its gps_time may be wrong (UTC is 18 s late), or [mounting] may be wrong or in "
+        "wrong units.",
     ),
     (
         BEAMS,
         "other clock",
         {"lag": 18, "later": -18, **CLOCK},
-        "The times of a.laz are 18 s later than the trajectory's: its points lie 90 m beside the "
-        "vehicle, and 8 m beside where it is 18 s before (horizontal medians of 600 samples). The "
-        "trajectory seems to be in UTC, the cloud in GPS time: export both in GPS time, or add 18 "
-        "to trajectory.time_constant (s) in survey.toml.",
+        "The times of a.laz are 18 s later than the trajectory's: its points are 90 m from the "
+        "vehicle, and 8 m from its position 18 s before (horizontal medians of 600 samples). "
+        "The trajectory seems to be in UTC, the cloud in GPS time: export both in GPS time, or "
+        "add 18 to trajectory.time_constant (s) in survey.toml.",
     ),
     (
         BEAMS,
         "other clock",
         {"lag": 17, "later": 17, **CLOCK},
-        "The times of a.laz are 17 s earlier than the trajectory's: its points lie 90 m beside the "
-        "vehicle, and 8 m beside where it is 17 s after (horizontal medians of 600 samples). The "
-        "cloud seems to be in UTC, the trajectory in GPS time: export both in GPS time, or add -17 "
-        "to trajectory.time_constant (s) in survey.toml.",
+        "The times of a.laz are 17 s earlier than the trajectory's: its points are 90 m from "
+        "the vehicle, and 8 m from its position 17 s after (horizontal medians of 600 samples). "
+        "The cloud seems to be in UTC, the trajectory in GPS time: export both in GPS time, or "
+        "add -17 to trajectory.time_constant (s) in survey.toml.",
     ),
     (
         ACCURACY,
         "not determined",
         {},
-        "Not determined: no check point was scored, and too few control points to leave one out in "
-        "turn.",
+        "Not determined: no check point was used, and there are too few control points for "
+        "leave-one-out.",
     ),
     (
         ACCURACY,
         "left out",
         {"points": 12},
-        "No check point was scored. 12 control points were left out in turn and predicted from the "
-        "others: an estimate of the accuracy, and not a conformant test, as these points took part "
-        "in the correction.",
+        "No check point was used. 12 control points were predicted from the others "
+        "(leave-one-out). This estimates the accuracy but is not a conformant test, because "
+        "these points were used in the correction.",
     ),
     (
         ACCURACY,
         "too few",
         {"points": 1, "least": 30},
-        "The standard calls for at least 30 check points and 1 point was used: fewer than 30 check "
-        "points are not a conformant test.",
+        "The standard requires at least 30 check points; 1 point was used. The test is not "
+        "conformant.",
     ),
     (
         ACCURACY,
@@ -219,14 +230,14 @@ CATALOGUE = [
         ACCURACY,
         "inaccurate points",
         {"axis": "vertical", "survey": 0.015},
-        "The vertical survey error of the points, 1.5 cm, is more than half of what they found: "
-        "points for a test should be twice as accurate as the product.",
+        "The vertical survey error of the points, 1.5 cm, is more than half of the RMSE found. "
+        "Test points should be twice as accurate as the product.",
     ),
     (
         GATES,
         "not determined",
         {"quantity": "check.rmse_h", "what": "rmse of check points in height (m)"},
-        "check.rmse_h: rmse of check points in height (m) was not determined.",
+        "check.rmse_h: rmse of check points in height (m) is not determined.",
     ),
     (
         GATES,

@@ -65,7 +65,7 @@ def test_two_different_numbers_of_points_are_refused(tmp_path):
     "LAS 1.4 holds the number twice; where they differ nobody knows which of them is true"
     path = write_street(tmp_path / "in.las", points=POINTS)
     turned(path, 107, 3)
-    with pytest.raises(ValueError, match="announces 300 points, and 8 where older versions"):
+    with pytest.raises(ValueError, match=r"300 points, and 8.*older versions"):
         sample_gps_times(path)
 
 
@@ -75,7 +75,7 @@ def test_a_pointwise_file_is_named_as_such(tmp_path):
     data = bytearray(path.read_bytes())
     data[data.find(b"laszip encoded") - 2 + 54] = 1
     path.write_bytes(data)
-    with pytest.raises(ValueError, match=r"point by point.*Compress it anew"):
+    with pytest.raises(ValueError, match="point by point"):
         sample_gps_times(path)
 
 

@@ -139,7 +139,7 @@ def check_ended(ended, number, before, whole):
         return "killed"
     assert ended.code == 130 and left == ended.left, ended
     if left == whole:
-        said = "all results were written before"
+        said = "all results were already written"
     else:
         said = "nothing was written"
     assert ended.stderr.endswith(f"Interrupted; {said}.\n")

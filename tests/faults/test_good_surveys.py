@@ -15,7 +15,7 @@ from tests.beds.places import BENCHMARKS
 from tests.faults.sizes import IS_FULL, tries
 
 # What is true of a good survey too: where it has no control
-TRUE = ("Signal extrapolated", "No control point for", "The pass from")
+TRUE = ("The signal is extrapolated", "No control point for", "The pass from")
 
 
 @pytest.mark.skipif(not IS_FULL, reason="in make faults: seconds each")

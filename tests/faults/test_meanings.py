@@ -19,11 +19,11 @@ from tests.faults.sizes import IS_FULL, tries
 FOOT = 0.3048  # m
 PLACE = ("easting", "northing", "height")
 ANGLES = ("roll", "pitch", "heading")
-OUTSIDE = "None of the sampled times .* lie inside the trajectory .*(days|UTC)"
-BESIDE = "deg off the scan plane .*(gps_time wrong|another scanner)"
+OUTSIDE = "None of the sampled times .* are inside the trajectory .*(days|UTC)"
+BESIDE = r"deg off the scan plane .*gps_time may be wrong"
 HEADING = "heading of .*trajectory.csv differs from the course"
-DATUM = "(below|above) the cloud as the POS puts it .*vertical datum"
-APART = "No point of the cloud lies within .*same CRS"
+DATUM = "(below|above) the cloud .*vertical datum"
+APART = "No point of the cloud is within .*same CRS"
 HEIGHTS = "m (above|below) the trajectory.*heights"
 
 
@@ -121,7 +121,7 @@ READ = {
         lambda r: column("trajectory.csv", PLACE, 1 / FOOT),
         "different CRS or zones|340 m/s",
     ),
-    "control in millimetres": (lambda r: column("control.csv", PLACE, 1000.0), "millimetres"),
+    "control in millimetres": (lambda r: column("control.csv", PLACE, 1000.0), "millimeters"),
     "drive in millimetres": (lambda r: column("trajectory.csv", PLACE, 1000.0), "340 m/s.*units"),
     "control with a zone before": (
         lambda r: column("control.csv", ["easting"], 1.0, 1e6 * r.integers(1, 61)),
@@ -144,19 +144,19 @@ READ = {
     ),
     "angles in radians": (
         lambda r: column("trajectory.csv", ANGLES, np.pi / 180),
-        "radians where degrees belong",
+        "seem to be in radians",
     ),
-    "sizes in centimetres": (lambda r: column("control.csv", ["size"], 100.0), "centimetres"),
+    "sizes in centimetres": (lambda r: column("control.csv", ["size"], 100.0), "centimeters"),
     "sigmas of zero": (
         lambda r: column("control.csv", ["sigma_vertical"], 0.0),
         "must be greater than zero",
     ),
     "a lever arm in millimetres": (
         lambda r: text("[0.1, -0.6, 0.4]", "[100.0, -600.0, 400.0]"),
-        "lever_arm.*can't be used",
+        "lever_arm.*is invalid",
     ),
     "a geographic CRS": (lambda r: text("EPSG:32650", "EPSG:4326"), "projected CRS is needed"),
-    "a CRS in feet": (lambda r: text("EPSG:32650", "EPSG:2263"), "foot, not in metres"),
+    "a CRS in feet": (lambda r: text("EPSG:32650", "EPSG:2263"), "foot, not in meters"),
 }
 ESTIMATED = {
     "cloud late by a second": (lambda r: later(any_of(r, -1.0, 1.0)), BESIDE),
@@ -173,7 +173,7 @@ ESTIMATED = {
     ),
     "another horizontal datum": (
         lambda r: column("control.csv", PLACE[:2], 1.0, any_of(r, -1, 1) * r.uniform(0.25, 4.0)),
-        "beside the cloud as the POS puts it .*horizontal datum",
+        "offset from the cloud .*horizontal datum",
     ),
     "radii for sizes": (
         lambda r: column("control.csv", ["size"], 0.5),
@@ -195,9 +195,9 @@ ESTIMATED = {
 }
 
 CHECKED = {  # what a check says in words of its own
-    "heights over another ellipsoid or geoid": "geoid undulation",
+    "heights over another ellipsoid or geoid": "height systems of control and cloud differ",
     "heights of control in feet": "or feet",
-    "radii for sizes": "look like radii",
+    "radii for sizes": "seem to be radii",
 }
 
 

@@ -125,7 +125,7 @@ def test_a_mount_point_takes_the_results_file_by_file(tmp_path, monkeypatch):
     out.mkdir()
     monkeypatch.setattr(output, "_place", lambda path: path.resolve())
     write(out, "old")
-    with pytest.raises(ValueError, match="holds 2 entries"):
+    with pytest.raises(ValueError, match="2 entries"):
         write(out, "new")
     write(out, "new", overwrite=True)
     assert texts(out) == {"a.txt": "new", "sub/b.txt": "new"}
@@ -153,7 +153,7 @@ def test_an_input_that_changes_while_it_is_read_stops_the_run(change, tmp_path):
     inputs = [input_file("cloud", path)]
     check_unchanged(inputs)
     time.sleep(0.02)  # s, the finest step of a file's time
-    message = r"1 of 1 input files .*the cloud .*pass-1\.laz.*run again"
+    message = r"1 of 1 input files.*pass-1\.laz"
     with pytest.raises(OSError, match=message), output_folder(out, inputs):
         change(path)
     assert not out.exists()
@@ -181,7 +181,7 @@ def test_an_input_in_a_folder_that_gets_results_is_refused(tmp_path):
     path.parent.mkdir()
     path.write_text("old text")
     check_output(tmp_path, [path], overwrite=True)
-    with pytest.raises(ValueError, match=r"holds the input shift/pass-1\.laz, which must stay"):
+    with pytest.raises(ValueError, match=r"the input shift/pass-1\.laz, which must"):
         check_output(tmp_path, [path], True, ["shift"])
 
 
@@ -217,7 +217,7 @@ def test_an_interruption_says_whether_results_stand(has_results, capsys):
     with pytest.raises(typer.Exit) as ended, exit_code(Exit.BAD_DATA, lambda: has_results):
         raise KeyboardInterrupt
     assert ended.value.exit_code == 130
-    assert ("all results were written" in capsys.readouterr().err) == has_results
+    assert ("all results were already written" in capsys.readouterr().err) == has_results
 
 
 def test_a_document_that_finds_no_room_leaves_the_one_before(tmp_path):

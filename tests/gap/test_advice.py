@@ -76,7 +76,7 @@ def test_nothing_needs_to_be_done_where_all_is_as_stated(whole, before, over, rm
     closed = closure(before=before, over=over)
     assert excess_of(found, closed, [Agreement("target", 9, rms_mm, 20.6)]) == excess
     assert keys(advice_of(found, closed, [], excess)) == [OF_EXCESS[excess]]
-    assert ("Nothing is wrong" in sentence_of(found, excess)) == (not excess)
+    assert ("No error was detected" in sentence_of(found, excess)) == (not excess)
     assert (OF_EXCESS[excess] == "nothing to do") == (not excess)
 
 
@@ -115,7 +115,7 @@ def test_what_no_judged_effect_explains_may_be_one_that_needs_a_mounting():
     first, second = advice_of(found, closure(), [], "", left_out=left_out)
     assert first == Statement("unstated mounting", values={"effects": 2})
     assert second.key == "unknown error"
-    assert "that was judged explains it" in sentence_of(found, "")
+    assert "No tested effect explains" in sentence_of(found, "")
 
 
 def test_what_chance_makes_is_not_closed():
@@ -154,14 +154,16 @@ def test_every_advice_has_its_sentence():
     "With its numbers, articles and names in words, and nothing twice"
     advice = [Statement(key, values=VALUES.get(key, {})) for key in ADVICE]
     sentences = dict(zip(ADVICE, advice_sentences([*advice, *advice]), strict=True))
-    assert sentences["nothing to do"].startswith("Nothing needs to be done")
-    assert "makes an easting error: no effect that was judged" in sentences["unknown error"]
-    assert sentences["unstated mounting"].startswith("State [mounting] in survey.toml")
-    assert "2 kinds of error" in sentences["unstated mounting"]
+    assert sentences["nothing to do"].startswith("No action is needed")
+    assert "cause of an easting error: no tested effect" in sentences["unknown error"]
+    assert sentences["unstated mounting"].startswith("Add [mounting] to survey.toml")
+    assert "2 error types" in sentences["unstated mounting"]
     assert "closes 99.5 % of the squared gap, but does not explain" in sentences["nearest effect"]
-    assert "as large as found" in sentences["remedy"]
-    assert "the gap grew (from 18.7 to -53.9 mm)" in sentences["grown gap"]
-    settled = "To settle what is open (lever arm), measure the same road again: two passes"
+    assert "to the value found" in sentences["remedy"]
+    assert ("gap increased with that size in the simulator (from 18.7 to -53.9 mm)") in sentences[
+        "grown gap"
+    ]
+    settled = "To resolve the open hypotheses (lever arm), measure the same road again: two passes"
     assert sentences["addition"].startswith(settled)
     assert "time_offset of 500 s exceeds" in sentences["simulator as it was"]
 
@@ -170,7 +172,7 @@ def test_a_nearest_effect_without_a_share_is_advised_against():
     "No percentage is made of what chance makes"
     statement = Statement("nearest effect", values={"effect": "range_scale", "share": None})
     (sentence,) = advice_sentences([statement])
-    assert "%" not in sentence and "does not explain it: don't use it" in sentence
+    assert "%" not in sentence and "does not explain it: do not use it" in sentence
 
 
 def test_every_reason_not_to_judge_has_its_sentence():
@@ -178,11 +180,11 @@ def test_every_reason_not_to_judge_has_its_sentence():
     values = {
         "stage": "range",
         "name": "range_noise",
-        "why": "It makes values that are no numbers.",
+        "why": "It gives values that are not numbers.",
     }
     left_out = {key: Statement(key, values=values) for key in LEFT_OUT}
     sentences = left_out_sentences(left_out)
     assert sentences["no mounting"] == "It acts on the range, and the survey has no [mounting]."
-    assert sentences["unstated size"].endswith("how large it is: [scanner] range_noise.")
+    assert sentences["unstated size"].endswith("does not give its size: [scanner] range_noise.")
     assert sentences["not usable"] == values["why"]
     assert all(sentence.endswith(".") for sentence in sentences.values())

@@ -151,7 +151,7 @@ def test_an_observation_between_look_alikes_is_refused():
     for refusal in found.refusals:
         assert refusal.pass_number == 1
         assert "T01" in refusal.reason and "T02" in refusal.reason
-        assert "claim" in refusal.reason
+        assert "both match" in refusal.reason
         assert "search radius 10.00 m" in refusal.reason
     assert found.reasons == (found.refusals[0].reason,)
 
@@ -171,7 +171,7 @@ def test_a_control_point_is_matched_once_in_a_pass():
     assert found.matched.name == control_points(PLACES).name
     assert np.array_equal(found.matched.position[0], ORIGIN + seen[0])
     assert len(found.unmatched) == 1
-    assert "T01, another observation of this pass" in found.reasons[0]
+    assert "T01, already matched in this pass" in found.reasons[0]
 
 
 def test_each_pass_has_its_own_misclosure():

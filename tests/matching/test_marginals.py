@@ -80,8 +80,8 @@ def test_a_look_alike_that_is_all_the_evidence_is_refused():
     found = match(seen, control_points(places), trajectory(METRE))
     assert len(found.matched) == 0
     assert {refusal.name for refusal in found.refusals} == {"T01", "T02"}
-    assert "lie 1.50 m apart and both claim the observation at 357750.1 s" in found.reasons[0]
-    assert "no other target tells the misclosure there" in found.reasons[0]
+    assert "1.50 m apart, both match the observation at 357750.1 s" in found.reasons[0]
+    assert "No other target constrains the misclosure there" in found.reasons[0]
 
 
 def test_a_moved_control_point_is_found():
@@ -96,7 +96,7 @@ def test_a_moved_control_point_is_found():
     (refusal,) = found.refusals
     assert refusal.name == "T11"
     assert "T10 (-2.5 s) and T12 (+2.5 s)" in refusal.reason
-    assert "Its surveyed point is wrong" in refusal.reason
+    assert "Its coordinates are wrong" in refusal.reason
     assert refusal.why.values["off"] == pytest.approx(0.8, abs=0.1)
 
 
@@ -141,7 +141,7 @@ def test_every_observation_and_control_point_is_accounted_for():
     assert found.matched.name == surveyed.name[5:]
     assert [refusal.name for refusal in found.refusals] == list(surveyed.name[:5])
     assert len(found.reasons) == len(found.unmatched) == 5
-    assert all("No surveyed point is left" in reason for reason in found.reasons)
+    assert all("No surveyed point remains" in reason for reason in found.reasons)
 
 
 def small_chain(rng):

@@ -24,7 +24,7 @@ def test_the_sentence_of_an_ambiguity_gives_the_numbers():
     )
     assert len(found.matched) == 0
     sentence = found.refusals[0].reason
-    assert "lie 0.31 m apart and both claim the observation at 357705.0 s" in sentence
+    assert "0.31 m apart, both match the observation at 357705.0 s" in sentence
 
 
 def test_unseen_control_has_a_reason_with_the_nearest_find():
@@ -33,7 +33,7 @@ def test_unseen_control_has_a_reason_with_the_nearest_find():
     (refusal,) = found.refusals
     assert (refusal.name, refusal.pass_number) == ("T02", None)
     assert refusal.reason.startswith("No circle of 0.60 m was found near it")
-    assert "was found at 357705.0 s, 100.00 m away and is T01" in refusal.reason
+    assert "was found at 357705.0 s, 100.00 m away (it is T01)" in refusal.reason
 
 
 def test_a_find_that_is_another_point_is_named():
@@ -43,7 +43,7 @@ def test_a_find_that_is_another_point_is_named():
     (refusal,) = found.refusals
     assert refusal.name == "T11" and refusal.pass_number is None
     assert refusal.reason.startswith("Each circle of 0.60 m found near it (search radius 10.00 m)")
-    assert "was found at 357745.0 s, 4.00 m away and is T05" in refusal.reason
+    assert "was found at 357745.0 s, 4.00 m away (it is T05)" in refusal.reason
 
 
 def test_a_find_that_was_refused_says_why():
@@ -54,9 +54,9 @@ def test_a_find_that_was_refused_says_why():
     assert "T05" not in found.matched.name and len(found.matched) == 9
     (refusal,) = found.refusals
     assert refusal.name == "T05"
-    assert "circle of 0.60 m without a name was found at 357745.0 s, 6.00 m away" in refusal.reason
+    assert "was found at 357745.0 s, 6.00 m away" in refusal.reason
     assert refusal.reason.endswith(found.reasons[0])
-    assert "This is another object (misclosure 6.00 m" in found.reasons[0]
+    assert "The observation is another object (misclosure 6.00 m" in found.reasons[0]
 
 
 def test_a_find_of_another_kind_is_no_find_of_a_point():
@@ -86,7 +86,7 @@ def test_two_finds_as_near_as_each_other_are_refused():
     found = match(observations(seen), control_points(PLACES[:1]), trajectory())
     assert len(found.matched) == 0
     assert "Two observations 1.00 m apart" in found.refusals[0].reason
-    assert "both claim T01" in found.refusals[0].reason
+    assert "both match T01" in found.refusals[0].reason
 
 
 def test_exchanged_points_of_two_kinds_are_named():
@@ -104,7 +104,7 @@ def test_exchanged_points_of_two_kinds_are_named():
     for refusal in found.refusals:
         assert refusal.why.key == "other appearance"
         assert {refusal.name, *refusal.why.values["exchanged"]} == {"T06", "T21"}
-        assert "look exchanged" in refusal.reason
+        assert "seem to be exchanged" in refusal.reason
 
 
 def test_a_wrong_size_is_told():
@@ -116,7 +116,7 @@ def test_a_wrong_size_is_told():
     found = match(observations(places + 0.1), control, trajectory())
     (refusal,) = found.refusals
     assert refusal.name == "T08"
-    assert "is a circle of 0.60 m and T08 a circle of 0.30 m" in refusal.reason
+    assert "is a circle of 0.60 m and T08 is a circle of 0.30 m" in refusal.reason
 
 
 def test_a_look_alike_beside_a_hidden_target_is_not_used():
@@ -130,8 +130,8 @@ def test_a_look_alike_beside_a_hidden_target_is_not_used():
     )
     assert "T13" not in found.matched.name
     assert len(found.matched) == 29
-    assert found.reasons[0].startswith("T13 lies 0.")
-    assert "or this is another object" in found.reasons[0]
+    assert found.reasons[0].startswith("T13 is 0.")
+    assert "or the observation is another" in found.reasons[0]
 
 
 def stated(sigma):
@@ -146,7 +146,7 @@ def test_every_observation_has_a_name_or_a_reason():
     found = match(observations(places + 0.1), control_points(places[kept]), trajectory())
     assert len(found.matched) == 28 and len(found.unmatched) == len(found.reasons) == 2
     for reason in found.reasons:
-        assert reason.endswith(".") and "No surveyed point is left" in reason
+        assert reason.endswith(".") and "No surveyed point remains" in reason
 
 
 def test_the_nearest_point_of_a_lone_find_is_named():
@@ -155,16 +155,16 @@ def test_the_nearest_point_of_a_lone_find_is_named():
     found = match(observations(seen), control_points(PLACES), trajectory(), search_radius=2.0)
     (reason,) = found.reasons
     assert "for the circle of 0.60 m at 357705.5 s (search radius 2.00 m)" in reason
-    assert "the nearest, T01, another observation of this pass, a circle of 0.60 m" in reason
-    assert reason.endswith("lies 5.00 m away.")
+    assert "the nearest, T01, already matched in this pass, a circle of 0.60 m" in reason
+    assert reason.endswith("is 5.00 m away.")
 
 
 def test_without_control_each_find_says_so():
     "No surveyed point at all: kind, size and time of what was found"
     found = match(observations(PLACES[:2]), control_points(PLACES[:0]), trajectory())
     assert found.reasons == (
-        "There is no surveyed point for the circle of 0.60 m at 357705.0 s.",
-        "There is no surveyed point for the circle of 0.60 m at 357715.0 s.",
+        "No point was surveyed for the circle of 0.60 m at 357705.0 s.",
+        "No point was surveyed for the circle of 0.60 m at 357715.0 s.",
     )
     assert found.refusals == ()
 
@@ -207,7 +207,7 @@ def test_neighbours_are_named_with_their_times():
     assert first["neighbours"] == (("T02", 2.5),)
     assert middle["neighbours"] == (("T15", -2.5), ("T17", 2.5))
     assert first["sigma"] < 1.0 and middle["sigma"] < 1.0
-    words = "its neighbours T15 (-2.5 s) and T17 (+2.5 s) tell it to 0."
+    words = "Its neighbors T15 (-2.5 s) and T17 (+2.5 s) predict the misclosure with a sigma of 0."
     assert words in found.refusals[1].reason
 
 

@@ -118,7 +118,7 @@ def test_a_mounting_is_known_as_well_as_the_calibration_knows_it(site, tmp_path)
     covariance = np.outer(sigma, sigma) * (0.5 * np.eye(6) + 0.5)
     np.testing.assert_allclose(known.covariance, covariance, rtol=1e-5)
     text = (tmp_path / "out" / "survey.toml").read_text()
-    assert "# not determined: lever arm forward; its sigma holds" in text
+    assert "# not determined: lever arm forward; its sigma depends" in text
     more = mlscorr.apply(survey, [found, make_effect("lever_arm", magnitude=[0.0, 0.1, 0.0])])
     assert more.correction.corrected_mounting.covariance is None
 
@@ -131,16 +131,19 @@ def test_what_was_found_in_other_clouds_is_refused(site, tmp_path):
         path.write_text(json.dumps(calibration() | {"clouds": cloud_rows(survey)}))
         mlscorr.apply(survey, [read_effects(path)]).write(tmp_path / "out")
         without = mlscorr.read_survey(tmp_path / "out")
-        with pytest.raises(ValueError, match=r"None of the 1 clouds .* taken out of them already"):
+        with pytest.raises(ValueError, match=r"None of the 1 clouds .* already removed from them"):
             mlscorr.apply(without, [read_effects(path)])
 
 
 @pytest.mark.parametrize(
     ("content", "sentence"),
     [
-        ({"verdict": {"label": "none"}, "causes": []}, "names no cause but none"),
+        (
+            {"verdict": {"label": "none"}, "causes": []},
+            "only cause that the diagnosis names is none",
+        ),
         ({"verdict": {"label": "range_walk"}, "causes": [{"effect": "range_walk"}]}, "range_walk,"),
-        ({}, "is no gap.json or calibration.json"),
+        ({}, "is not a gap.json or calibration.json"),
     ],
 )
 def test_a_document_that_names_nothing_to_take_out_is_refused(content, sentence, tmp_path):
@@ -154,12 +157,12 @@ def test_a_document_that_names_nothing_to_take_out_is_refused(content, sentence,
 @pytest.mark.parametrize(
     ("found", "sentence"),
     [
-        ("time_offset=late", "'late' is no number"),
+        ("time_offset=late", "'late' is neither a number"),
         (
             "nosuch.json",
-            "no file nosuch.json: neither a gap.json or calibration.json nor NAME=SIZE",
+            "no file nosuch.json. Give a gap.json, a calibration.json, or NAME=SIZE",
         ),
-        ("range_bias=0.1", "neither a gap.json"),
+        ("range_bias=0.1", "Give a gap.json"),
         ("boresight=40,0,0", "exceeds 10 deg"),
     ],
 )
@@ -186,24 +189,24 @@ def test_a_mounting_is_not_taken_out_twice(site, tmp_path):
             mlscorr.calibrate,
             lambda survey: mlscorr.apply(survey, make_effect("boresight", magnitude=[0, 0, 0.1])),
         ):
-            with pytest.raises(ValueError, match="Run mlscorr calibrate --clouds on the survey"):
+            with pytest.raises(ValueError, match="written by mlscorr calibrate --clouds"):
                 work(survey)
         late = mlscorr.apply(survey, make_effect("time_offset", magnitude=0.01))
         late.write(tmp_path / "out")
         (sentence,) = reuse_warnings(mlscorr.read_survey(tmp_path / "out"))
-    assert "still as the recorded mounting put them" in sentence
+    assert "use the recorded mounting, not" in sentence
 
 
 def test_what_cannot_be_taken_out_is_named(site):
     "With what its effect says to do"
     with warnings.catch_warnings(action="ignore"):
         survey = mlscorr.read_survey(site)
-    with pytest.raises(ValueError, match="range_bias can't be taken out"):
+    with pytest.raises(ValueError, match="range_bias can't be removed"):
         mlscorr.apply(survey, [make_effect("range_bias", magnitude=0.01)])
     with pytest.raises(ValueError, match="No effect is given"):
         mlscorr.apply(survey, [])
     for strange in ("time_offset", ["time_offset"]):
-        with pytest.raises(ValueError, match=r"^'time_offset' is no effect"):
+        with pytest.raises(ValueError, match=r"^'time_offset' is not an effect"):
             mlscorr.apply(survey, strange)
 
 
@@ -263,4 +266,4 @@ def test_a_datum_moves_all_points(short, tmp_path):
     way = laspy.read(tmp_path / "out" / "pass-1.laz").xyz - las.xyz
     np.testing.assert_allclose(way, np.tile([0.2, -0.1, 15.3], (len(way), 1)), rtol=0, atol=1e-6)
     (sentence,) = (str(w.message) for w in said if "wall.ply" in str(w.message))
-    assert "Move it by E +0.200, N -0.100, H +15.300 m, too" in sentence
+    assert "Move it by E +0.200, N -0.100, H +15.300 m" in sentence

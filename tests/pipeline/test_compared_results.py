@@ -160,7 +160,7 @@ def test_different_surveys_are_refused_with_a_way_out(pair):
     with pytest.raises(ValueError, match=r"Both results are .*two different folders"):
         mlscorr.compare_results(pair[0], pair[0])
     rewritten(pair[1], moved(0.0, seconds=3600.0))
-    with pytest.raises(ValueError, match=r"no common time: \[.*\] s .*two results of one survey"):
+    with pytest.raises(ValueError, match="two results of one survey"):
         mlscorr.compare_results(*pair)
 
     def rename(report):
@@ -177,18 +177,22 @@ def test_different_surveys_are_refused_with_a_way_out(pair):
 
 def test_what_is_no_result_is_refused(pair, tmp_path, street):
     "A survey, a cut report, another document, a project"
-    with pytest.raises(ValueError, match=r"no result of mlscorr correct: it holds no report\.json"):
+    with pytest.raises(
+        ValueError,
+        match="not a result of mlscorr correct: it has no "
+        r"report\.json",
+    ):
         mlscorr.compare_results(pair[0], street)
     report = pair[1] / "report.json"
     whole = report.read_text()
     report.write_text(whole[: len(whole) // 2])
-    with pytest.raises(ValueError, match=r"no JSON document: .*interrupted"):
+    with pytest.raises(ValueError, match=r"not a JSON document: .*interrupted"):
         mlscorr.compare_results(*pair)
     report.write_text(whole.replace("mlscorr.report/1", "mlscorr.report/9", 1))
     with pytest.raises(ValueError, match=r"schema 'mlscorr\.report/9', not"):
         mlscorr.compare_results(*pair)
     report.write_text('{"schema": "mlscorr.report/1"}')
-    with pytest.raises(ValueError, match=r"lacks check, control, coverage"):
+    with pytest.raises(ValueError, match="check, control, coverage"):
         mlscorr.compare_results(*pair)
     report.rename(pair[1] / "project.json")
     with pytest.raises(ValueError, match=r"results of a project\. Compare the folders"):

@@ -83,7 +83,7 @@ def test_a_method_without_enough_epochs_says_so(compared):
     for name in NAMES:
         why = compared.row(name)["why"] or ""
         is_polynomial = name.startswith(("ls-", "lsc-"))
-        assert ("epochs at least" in why and "here are 3" in why) == is_polynomial, name
+        assert ("or more epochs" in why and "here are 3" in why) == is_polynomial, name
 
 
 def test_few_check_points_are_backed_by_cross_validation(compared):
@@ -91,7 +91,7 @@ def test_few_check_points_are_backed_by_cross_validation(compared):
     document = compared.document
     assert document["scored_by"] == "cross_validated"
     assert document["cross_validation_groups"] == 4
-    assert "cross-validated over all points" in document["statements"][1]["sentence"]
+    assert "cross-validated" in document["statements"][1]["sentence"]
     shift = compared.row("shift")["cross_validated"]
     assert shift["n"] == 5
     assert shift["rmse_3d"] > 0
@@ -182,7 +182,7 @@ def test_without_check_points_the_control_points_are_left_out_in_turn(street, tm
     other = compare(folder)
     assert other.scored_by == "cross_validated"
     assert (
-        "There are no check points, so the scores are cross-validated"
+        "As there are no check points, the scores are cross-validated"
         in other.document["statements"][1]["sentence"]
     )
     assert other.row("shift")["cross_validated"]["n"] == 4
@@ -199,7 +199,7 @@ def test_one_target_leaves_what_one_target_can_tell(street, tmp_path):
     assert determined == ["raw", "shift", "linear", "pchip", "linear-steps", "lsc", "correct"]
     assert all(row["why"] for row in other.rows if row["status"] != "determined")
     assert other.scored_by == "control"
-    assert "mere fit" in other.document["statements"][1]["sentence"]
+    assert "show the fit only" in other.document["statements"][1]["sentence"]
     other.write(tmp_path / "out")
     assert "there is 1" in (tmp_path / "out" / "compare.html").read_text()
 
@@ -222,7 +222,7 @@ def test_collocation_beats_every_single_move_on_the_real_drift():
     for name in ONE_MOVE:
         assert np.all(ours < compared.row(name)["check"]["rmse"]), name
     icp = compared.row("icp")
-    assert any("no rigid motion fits them" in text for text in icp["warnings"])
+    assert any("No rigid motion fits" in text for text in icp["warnings"])
     assert icp["check"]["rmse_3d"] < compared.row("raw")["check"]["rmse_3d"]
 
 

@@ -220,9 +220,7 @@ def test_an_area_where_nothing_was_seen_corrects_nothing(drives):
     bare = replace(drive, features=drive.features[[]])
     ((corrected, state),) = drives_by_areas([bare], areas, 1, ORIGIN)
     assert state.state == "uncorrected" and np.abs(added(corrected)).max() < 1e-9
-    assert {interval.why for interval in corrected.held[1].weak} == {
-        "its pass has no control point"
-    }
+    assert {interval.why for interval in corrected.held[1].weak} == {"pass without control point"}
 
 
 def test_nothing_corrects_a_drive_elsewhere(drives):
@@ -232,9 +230,7 @@ def test_nothing_corrects_a_drive_elsewhere(drives):
     corrected, state = apart["second"]
     assert state.state == "uncorrected" and not state.tied_with
     assert np.abs(added(corrected)).max() < 1e-9
-    assert {interval.why for interval in corrected.held[1].weak} == {
-        "its pass has no control point"
-    }
+    assert {interval.why for interval in corrected.held[1].weak} == {"pass without control point"}
     alone = results([first])["first"][0]
     assert np.array_equal(added(apart["first"][0]), added(alone))
     assert apart["first"][1].state == "controlled"

@@ -161,8 +161,13 @@ def test_check_looks_at_a_merged_cloud(merged):
         ("[12]", "[11, 12]", r"point_source_id 11 of merged\.laz is of scanners 1 and 2"),
         ("[12]", "[13]", r"\d+ of the \d+ points of merged\.laz .* \(12; those named are 11, 13\)"),
         ("[11]", "[11, 12]", r"point_source_id 12 of"),
-        ("point_source_ids = [12]", "", r"merged\.laz \(1, 2\).* or the point_source_ids of each"),
-        ("point_source_ids = [11]", "", r"scanner\.0: files is missing: name .* point_source_ids"),
+        (
+            "point_source_ids = [12]",
+            "",
+            r"merged\.laz \(1, 2\).* or give the point_source_ids of "
+            "each",
+        ),
+        ("point_source_ids = [11]", "", r"scanner\.0: files is missing: list .* point_source_ids"),
         ("[11]", "[]", r"scanner\.0\.point_source_ids = \[\] .*at least 1"),
     ],
 )

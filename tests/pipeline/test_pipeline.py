@@ -142,7 +142,7 @@ def test_points_that_are_control_and_check_at_once_are_no_matter_of_the_crs(copy
     (copy / "control.csv").write_text("\n".join([header, *lines, ""]), encoding="utf-8")
     with warnings.catch_warnings(action="ignore"), pytest.raises(ValueError) as caught:
         mlscorr.correct(mlscorr.read_survey(copy))
-    assert str(caught.value).endswith("Is each point named twice?")
+    assert str(caught.value).endswith("each point is listed twice")
     assert "CRS" not in str(caught.value)
 
 
@@ -413,7 +413,7 @@ def test_a_target_in_a_gap_is_refused_with_the_reason(in_part):
     report = read_json(in_part[1])
     row = next(target for target in report["targets"] if target["name"] == "T02")
     assert not row["used"]
-    assert "in a gap of the trajectory" in row["reason"]
+    assert "outside the trajectory or in one of its gaps" in row["reason"]
     assert row["observed"] is row["before"] is row["after"] is row["gps_time"] is None
     assert [t["name"] for t in report["targets"] if t["used"]] == ["T01", "T04", "T05"]
     check_schema(report, REPORT)
@@ -455,7 +455,7 @@ def test_no_folder_of_an_input_is_written_to(place, corrected, copy, monkeypatch
     survey = mlscorr.read_survey(copy)
     result = replace(corrected[0], survey=survey)
     monkeypatch.chdir(copy)
-    with pytest.raises(ValueError, match="holds the input"):
+    with pytest.raises(ValueError, match="contains the input"):
         result.write(place, overwrite=True)
 
 
@@ -497,7 +497,7 @@ def test_results_that_cannot_take_their_place_leave_the_old_ones(where, full):
     (full / where).mkdir()
     (full / where / "mine.txt").write_text("mine")
     before = texts(full)
-    with pytest.raises(OSError, match="is a folder, where a file belongs"):
+    with pytest.raises(OSError, match="is a folder, but a file is needed there"):
         write_new(full)
     assert texts(full) == before
     assert list(full.parent.iterdir()) == [full]

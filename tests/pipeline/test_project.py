@@ -200,7 +200,7 @@ def test_a_drive_without_points_is_a_failure(project, tmp_path):
     (fault,) = check_project(folder).faults
     points = sum(len(laspy.read(path)) for path in (folder / "tiles").iterdir())
     words = f"None of the {points} points in the files of drive third has its point_source_id "
-    assert fault.sentence.startswith(words + "(7, 9): they have 1, 2.")
+    assert fault.sentence.startswith(words + "(7, 9); they have 1, 2.")
     command = ["correct", str(folder), "-o", str(out), "--no-report"]
     assert CliRunner().invoke(app, command).exit_code == 4
     content = json.loads((out / "project.json").read_text())
@@ -234,7 +234,7 @@ def test_a_check_tells_the_faults_of_all_drives(project, tmp_path):
         file.write("far,533500.0,3374000.0,43.0,0.003,0.003,circle,0.6,control\n")
     checked = check_project(folder)
     (fault,) = checked.faults
-    assert "tile-2.laz" in fault.sentence and "cut off" in fault.sentence
+    assert "tile-2.laz" in fault.sentence and "truncated" in fault.sentence
     (folder / "second" / "tile-1.laz").unlink()  # the drive has none but the cut one now
     (alone,) = check_project(folder).faults
     assert alone == fault
@@ -249,8 +249,8 @@ def test_a_check_tells_the_faults_of_all_drives(project, tmp_path):
     assert any("(first: far)" in fault.sentence for fault in check_project(folder).faults)
     (folder / "control.csv").write_text(header + "\n")
     (fault,) = check_project(folder).faults
-    assert "project.toml gives no control points" in fault.sentence
-    with pytest.raises(ValueError, match=r"gives no control points: .* --ties-only"):
+    assert "project.toml has no control points" in fault.sentence
+    with pytest.raises(ValueError, match=r"has no control points: .* --ties-only"):
         correct_project(folder, tmp_path / "out", QUICK)
 
 
@@ -311,7 +311,10 @@ def test_a_folder_of_tasks_that_no_run_made_is_refused(project, tmp_path, option
     for name, text in texts.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
-    with pytest.raises(ValueError, match=r"tasks is not of a run: .* choose another folder"):
+    with pytest.raises(
+        ValueError,
+        match=r"tasks was not written by a run: .* choose another folder",
+    ):
         correct_project(project, tmp_path, options)
     there = {str(p.relative_to(tmp_path)): p for p in tmp_path.rglob("*") if p.is_file()}
     assert {name: path.read_text() for name, path in there.items()} == texts
@@ -336,7 +339,7 @@ def test_a_run_that_was_ended_before_its_plan_is_resumed(project, corrected, tmp
     (out / "tasks").mkdir(parents=True)
     for name in ("log.txt", "tasks/lock", *(f"tasks/{name}" for name in left)):
         (out / name).touch()
-    with pytest.raises(ValueError, match="--resume does what is missing"):
+    with pytest.raises(ValueError, match="is missing or changed with --resume"):
         correct_project(project, out, QUICK)
     correct_project(project, out, Options(page=False, resume=True))
     assert outputs(out) == outputs(corrected[1])
@@ -362,8 +365,8 @@ def test_resume_does_what_is_missing_or_damaged(project, copy):
     shutil.copy(out / "first" / "tile-1.laz", out / "third" / "tile-1.laz")
     document = correct_project(project, out, Options(page=False, resume=True)).document
     (older,) = [row for row in document["statements"] if row["what"] == "Older results"]
-    assert older["sentence"].startswith("1 file is left of an earlier run: of clouds or ")
-    assert older["items"] == [{"name": "third/tile-1.laz", "text": "not of this run"}]
+    assert older["sentence"].startswith("1 file is from an earlier run: from clouds or ")
+    assert older["items"] == [{"name": "third/tile-1.laz", "text": "not from this run"}]
     shutil.rmtree(out / "third")
     same = outputs(out)
     same.pop("project.json"), before.pop("project.json")
@@ -382,7 +385,7 @@ def test_what_is_gone_or_cut_off_is_not_done(copy):
     rows = {row["stage"]: (row["done"], row["tasks"]) for row in project_status(copy)["all"]}
     assert (rows["findings"], rows["clouds"], rows["reports"]) == ((4, 4), (2, 4), (1, 2))
     said = CliRunner().invoke(app, ["status", str(copy)]).stderr
-    assert "Not running: the same command with --resume goes on." in said
+    assert "Not running: continue with the same command and --resume." in said
 
 
 def test_a_cloud_that_cannot_be_opened_is_a_fault_of_its_own(project, tmp_path):
@@ -424,7 +427,7 @@ def test_an_ended_run_is_resumed_to_the_same_bytes(project, corrected, tmp_path,
     process.send_signal(sent)
     said = process.communicate()[1]
     assert process.returncode == code and "Traceback" not in said
-    assert sent == signal.SIGKILL or "with --resume goes on" in said
+    assert sent == signal.SIGKILL or "and --resume" in said
     assert not (tmp_path / "out" / "project.json").exists()
     correct_project(project, tmp_path / "out", Options(page=False, resume=True))
     assert outputs(tmp_path / "out") == outputs(corrected[1])
@@ -442,7 +445,7 @@ def test_one_corrupt_file_is_named_and_the_rest_done(project, tmp_path):
     run = subprocess.run(list(map(str, command)), capture_output=True, text=True)
     assert run.returncode == 4, run.stderr
     (fault,) = json.loads(run.stdout)["faults"]
-    assert fault["name"] == "second/tile-2.laz" and "cut off" in fault["fault"]
+    assert fault["name"] == "second/tile-2.laz" and "truncated" in fault["fault"]
     assert sorted(path.name for path in (out / "second").glob("*.laz")) == ["tile-1.laz"]
     assert len([*(out / "first").glob("*.laz")]) == 2
     assert "Failed: second/tile-2.laz" in run.stderr

@@ -14,9 +14,9 @@ from mlscorr.report import first_screen
 from tests.beds.reports import because, drive, fabricate
 
 CHANGES = {  # what a drive lacks, and what of its first screen says so
-    "hidden check point": "1 check point was not seen although the cloud covers the surroundings",
-    "no check point": "No check point was surveyed, so nothing independent tests this result.",
-    "worse axis": "it is worse than before: N by 0.012 m (RMS of 2 points).",
+    "hidden check point": "1 check point was not found although the cloud covers the surroundings",
+    "no check point": "No check point was surveyed: there is no independent test of this result.",
+    "worse axis": "The RMSE of 2 points increased after the correction: N by 0.012 m.",
     "warning": "The clock may be wrong.",
 }
 

@@ -90,7 +90,7 @@ def test_all_that_a_run_says_has_its_sentence():
         assert progress_sentence(Statement(key, values=values)).endswith((".", "It is empty."))
     rate = "95 %, 1e-06 M points/s"
     whole = (
-        f"Reading headers: 95 of 100 files of 1 drive, {rate}, 5 s left of this stage, 0 failures"
+        f"Reading headers: 95 of 100 files of 1 drive, {rate}, 5 s left in this stage, 0 failures"
     )
     assert progress_sentence(Statement("stage progress", values=SAID)) == f"{whole} so far"
     unknown = Statement("stage progress", values=SAID | {"left": None})
@@ -111,11 +111,11 @@ def test_progress_is_told_beside_the_last_line(tmp_path):
         for progress.due, task in zip((0.0, np.inf, np.inf), tasks, strict=False):
             progress.ended(Outcome(task, seconds=1.0))
         content = project_status(tmp_path)
-        assert " left of this stage, 1 failure so far" in content["progress"]
+        assert " left in this stage, 1 failure so far" in content["progress"]
         assert content["log"].endswith("tiles: 2.laz in 1.0 s")
         said = CliRunner().invoke(app, ["status", str(tmp_path)]).stderr
-        assert "At work: " in said
-    assert "At work" not in CliRunner().invoke(app, ["status", str(tmp_path)]).stderr
+        assert "Running: " in said
+    assert "Running" not in CliRunner().invoke(app, ["status", str(tmp_path)]).stderr
 
 
 def test_a_run_that_is_no_more_is_said(tmp_path):
@@ -124,7 +124,7 @@ def test_a_run_that_is_no_more_is_said(tmp_path):
     assert run(tmp_path, tiles(tmp_path, "a.laz"))["is_running"] is True
     assert project_status(tmp_path)["is_running"] is False
     said = CliRunner().invoke(app, ["status", str(tmp_path)]).stderr
-    assert "Not running: the same command with --resume goes on." in said
+    assert "Not running: continue with the same command and --resume." in said
     with TaskStore(tmp_path / "tasks").locked():
         assert "Not running" not in CliRunner().invoke(app, ["status", str(tmp_path)]).stderr
 

@@ -115,7 +115,7 @@ def test_what_both_scanners_saw_tells_the_one_beside_the_other(together, command
     assert tied["fit_sigma"] < 0.003  # m
     pairs = [row["scanners"] for row in rows[0]["ties"]["pairs"]]
     assert [1, 1] in pairs and [2, 2] in pairs and [1, 2] in pairs
-    assert "Scanners 1 and 2 put a wall that both saw in one place to" in together[1]
+    assert "Walls scanned by both scanner 1 and scanner 2 agree to" in together[1]
 
 
 def test_one_trajectory_is_written_by_all_scanners(site, together):
@@ -147,14 +147,14 @@ def thinned(site, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("ties", "fault"), [(True, r"has nothing to calibrate with: 0 con"), (False, r"0 control poi")]
+    ("ties", "fault"), [(True, "can't be calibrated: 0 con"), (False, r"0 control poi")]
 )
 def test_a_scanner_that_nothing_tells_is_named(thinned, ties, fault):
     "200 points show no target and no plane: the sentence has its name, and what to drive"
     with warnings.catch_warnings(action="ignore"), pytest.raises(ValueError, match=fault) as raised:
         mlscorr.calibrate(thinned, ties=ties)
     assert str(raised.value).startswith("Scanner 2: ")
-    assert "both sides of the way, near and far" in str(raised.value)
+    assert "both sides of it, near and far" in str(raised.value)
 
 
 def test_the_written_survey_has_each_calibrated_mounting(survey, commanded, corrected):

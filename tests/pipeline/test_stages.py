@@ -98,7 +98,7 @@ def test_scores_are_those_of_the_result(survey, matches, estimate):
 
 def test_a_score_of_other_matches_is_refused(survey, targets, estimate):
     "The estimate and the matches must be of the same control observations"
-    with pytest.raises(ValueError, match="rests on 4 control observations, and the matches hold 3"):
+    with pytest.raises(ValueError, match="uses 4 control observations, but the matches have 3"):
         mlscorr.score(estimate, mlscorr.match_targets(without_first(survey, targets), survey))
 
 
@@ -110,7 +110,7 @@ def test_an_estimate_needs_something_to_rest_on(survey, matches):
         matched=matches.matches.matched[is_check],
         probability=matches.matches.probability[is_check],
     )
-    with pytest.raises(ValueError, match="No control point is among the matched targets"):
+    with pytest.raises(ValueError, match="No control point was matched"):
         mlscorr.estimate_pos_error(survey, replace(matches, matches=alone))
 
 
@@ -149,7 +149,7 @@ def test_geometries_lie_where_their_stages_say(survey, targets, matches, estimat
     outline = targets.to_open3d(origin).point["positions"].numpy() + origin
     near = np.linalg.norm(outline[:, None] - targets.observations.position, axis=2).min(axis=1)
     assert near.max() < 2.0  # m, half a target, and its ellipsoid a hundred times enlarged
-    with pytest.raises(ValueError, match="'correction', 'sigma'"):
+    with pytest.raises(ValueError, match="'correction' or 'sigma'"):
         estimate.to_open3d(origin, color="red")
 
 

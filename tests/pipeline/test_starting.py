@@ -162,7 +162,7 @@ def test_a_pof_with_its_poq_is_known_by_its_ending(folder):
     started = mlscorr.init(folder)
     assert tomllib.loads(started.text)["trajectory"] == {"file": "LINE.POF", "accuracy": "LINE.POQ"}
     reason = next(role.reason for role in started.roles if role.path.name == "LINE.pofx")
-    assert "not public: export it as POF" in reason
+    assert "not public. Export it as POF" in reason
     assert any("RIEGL's POF 1.1" in note for note in started.notes)
 
 
@@ -229,7 +229,7 @@ def test_simulated_surveys_and_results_are_left_out_and_called_what_they_are(fol
     (folder / "corrected").mkdir()
     (folder / "corrected" / "report.json").write_text("{}")
     reasons = {role.path.name: role.reason for role in mlscorr.init(folder).roles}
-    assert reasons["replica"] == "a simulated survey, which is one by itself"
+    assert reasons["replica"] == "a simulated survey of its own"
     assert reasons["corrected"] == "results of a run"
     for path in folder.glob("*.las"):
         path.unlink()
@@ -251,7 +251,7 @@ def test_control_of_another_town_is_not_taken(folder):
     (folder / "other.csv").write_text(CONTROL + control().replace(",53", ",93"))
     started = mlscorr.init(folder)
     assert tomllib.loads(started.text)["control"]["file"] == "control.csv"
-    assert any("km from it" in role.reason for role in started.roles)
+    assert any("km from the trajectory" in role.reason for role in started.roles)
 
 
 def test_a_folder_without_control_has_none(folder):
@@ -273,12 +273,12 @@ def test_a_copy_of_a_cloud_is_left_out_and_refused(folder):
     (folder / "copy.las").write_bytes((folder / "pass-1.las").read_bytes())
     started = mlscorr.init(folder)
     reasons = {role.path.name: role.reason for role in started.roles if role.role == "none"}
-    assert reasons == {"pass-1.las": "the same points as copy.las, which would count twice"}
+    assert reasons == {"pass-1.las": "a copy of copy.las, which would count twice"}
     assert tomllib.loads(started.text)["cloud"]["files"] == ["copy.las", "pass-2.las"]
     path = started.write()
     path.write_text(started.text.replace('"copy.las"', '"*.las"').replace(', "pass-2.las"', ""))
     (fault,) = mlscorr.check(path).faults
-    assert re.search(r"pass-1.las, which is a copy of .*copy.las\. Remove it", fault.sentence)
+    assert re.search(r"pass-1.las, a copy of .*copy.las\. Remove it", fault.sentence)
 
 
 def test_a_las_beside_its_laz_is_one_pass(folder):
@@ -287,13 +287,13 @@ def test_a_las_beside_its_laz_is_one_pass(folder):
     started = mlscorr.init(folder)
     assert tomllib.loads(started.text)["cloud"]["files"] == ["pass-1.las", "pass-2.las"]
     reasons = {role.path.name: role.reason for role in started.roles if role.role == "none"}
-    assert reasons == {"pass-1.laz": "the same points as pass-1.las, which would count twice"}
+    assert reasons == {"pass-1.laz": "a copy of pass-1.las, which would count twice"}
     path = started.write()
     path.write_text(started.text.replace('"pass-1.las"', '"pass-1.las", "pass-1.laz"'))
     for command in (["check", str(path)], ["correct", str(path), "-o", str(folder / "out")]):
         result = CliRunner().invoke(app, command)
         assert result.exit_code == 2, result.stderr
-        assert re.search(r"pass-1.laz, which is a copy of .*pass-1.las. Remove it", result.stderr)
+        assert re.search("pass-1.laz, a copy of .*pass-1.las. Remove it", result.stderr)
 
 
 # ---- folders that do not
@@ -346,7 +346,10 @@ AMBIGUOUS = {
     ),
     "a trajectory without a header": (
         write("trajectory.csv", trajectory()),
-        ["No file looks .*trajectory.csv .rows of numbers without names", "columns.gps_time = "],
+        [
+            "No trajectory .*trajectory.csv .rows of numbers without column names",
+            "columns.gps_time = ",
+        ],
     ),
     "a trajectory by other names": (
         write(
@@ -354,14 +357,21 @@ AMBIGUOUS = {
             HEADER.replace("roll,pitch,heading", "wx,wy,wz").replace("gps_time", "tick")
             + trajectory(),
         ),
-        ["No file looks like", "trajectory.csv .its columns are tick", "trajectory.columns"],
+        [
+            "No trajectory was recognized",
+            "trajectory.csv .its columns are tick",
+            "trajectory.columns",
+        ],
     ),
-    "no trajectory": (remove("trajectory.csv"), ["No file looks like a trajectory", "gps_time"]),
+    "no trajectory": (
+        remove("trajectory.csv"),
+        ["No trajectory was recognized", "gps_time"],
+    ),
     "trajectory of another day": (
         write("trajectory.csv", HEADER + trajectory(START + 86_400.0)),
         ["None of the sampled times of pass-1.las"],
     ),
-    "dates for seconds": (dates, ["trajectory.csv", "2023-05-01", "where a number belongs"]),
+    "dates for seconds": (dates, ["trajectory.csv", "2023-05-01", "where a number is expected"]),
     "SBET of another zone": (other_zone, ["VLRs of pass-1.las", "disagree|another CRS"]),
     "no control but a table": (
         photos,
@@ -371,18 +381,18 @@ AMBIGUOUS = {
         write("control.csv", CONTROL + control(swap=True)),
         ["Easting and northing seem to be swapped"],
     ),
-    "clouds in feet": (far, ["km from the trajectory .* beside it .* as feet", "map coordinates"]),
+    "clouds in feet": (far, ["km from the trajectory.* near it .* as feet", "map coordinates"]),
     "X and Y far away": (
         write("control.csv", "Pt,X,Y,Z\nP1,10.0,20.0,3.0\nP2,15.0,25.0,3.0\n"),
-        ["neither order lies", "To be said besides: .*kind", "--set 'control.size = 0.6'"],
+        ["neither order is", "Also needed: .*kind", "--set 'control.size = 0.6'"],
     ),
     "seconds of the day": (
         write("trajectory.csv", HEADER + trajectory(START % 86_400.0)),
-        ["^((?!--set).)*seconds of the day, add 345600 to .*instead. Nothing was written.$"],
+        ["^((?!--set).)*seconds of the day, you can add 345600 .*instead. Nothing was written.$"],
     ),
     "a workbook of another office program": (
         lambda folder: (folder / "control.csv").rename(folder / "control.ods"),
-        ["control.ods is neither .*read once it is saved as .xlsx"],
+        ["control.ods is neither .*readable once saved as .xlsx"],
     ),
     "clouds of two zones": (
         lambda folder: write_cloud(folder / "pass-3.las", "EPSG:32649"),
@@ -392,13 +402,13 @@ AMBIGUOUS = {
         lambda folder: (folder / "pass-2.las").write_bytes(
             (folder / "pass-2.las").read_bytes()[:-500]
         ),
-        ["pass-2.las", "cut off"],
+        ["pass-2.las", "truncated"],
     ),
     "no cloud": (
         lambda folder: [(folder / f"pass-{i}.las").unlink() for i in (1, 2)],
-        ["holds no LAS, LAZ, E57 or PLY cloud"],
+        ["has no LAS, LAZ, E57 or PLY cloud"],
     ),
-    "survey.toml is there": (write("survey.toml", "# mine"), ["is there already"]),
+    "survey.toml is there": (write("survey.toml", "# mine"), ["already exists"]),
 }
 
 
@@ -426,7 +436,7 @@ ASKED = {  # what is written, words of the question, and the keys that are open
     ),
     "two lists": (
         write("check.csv", CONTROL + control()),
-        ["2 files may be the control", "check.csv", "Join those that belong together"],
+        ["2 files may be the control", "check.csv", "Combine those that belong together"],
         ["control.file"],
     ),
     "headings from some north": (
@@ -441,12 +451,12 @@ ASKED = {  # what is written, words of the question, and the keys that are open
     ),
     "angles in radians": (
         write("trajectory.csv", HEADER + trajectory(row="{:.3f},{:.4f},3374000,42,0,0,1.5708")),
-        ["seem to be radians"],
+        ["seem to be in radians"],
         ["trajectory.angles"],
     ),
     "a time by another name": (
         write("trajectory.csv", HEADER.replace("gps_time", "gps_timestamp") + trajectory()),
-        ["gps_time may be meant by 'gps_timestamp'", 'column of the gps_time: "gps_timestamp"'],
+        ["'gps_timestamp' may be the gps_time", 'column of the gps_time: "gps_timestamp"'],
         ["trajectory.columns.gps_time"],
     ),
     "a yaw": (
@@ -575,7 +585,7 @@ def test_ids_that_take_turns_are_named(folder):
     strips.write(folder / "pass-1.las")
     turns.write(folder / "pass-2.las")
     text = mlscorr.init(folder).text
-    assert "(point_source_id) take turns in pass-2.las." in text and "[[scanner]]" in text
+    assert "(point_source_id) alternate in pass-2.las." in text and "[[scanner]]" in text
 
 
 def test_trajectories_that_overlap_stay_ambiguous(folder):
@@ -627,7 +637,7 @@ def test_what_is_said_decides(folder):
 
 @pytest.mark.parametrize(
     ("line", "words"),
-    [("control.sizes = 0.6", "nearest known one is control.size"), ("= 3", "takes a key")],
+    [("control.sizes = 0.6", "nearest known one is control.size"), ("= 3", "needs a key")],
 )
 def test_what_no_survey_can_say_is_refused(line, words, folder):
     "An unknown key is named with the nearest one"
@@ -673,7 +683,7 @@ def test_a_folder_that_is_not_there_is_a_failure_to_write(folder):
     out = folder / "no" / "such" / "survey.toml"
     result = CliRunner().invoke(app, ["init", str(folder), "-o", str(out)])
     assert result.exit_code == 5 and not out.parent.exists()
-    assert f"{out.parent} is no folder, so survey.toml can't be written there." in " ".join(
+    assert f"{out.parent} is not a folder, so survey.toml can't be written there." in " ".join(
         result.output.split()
     ).replace("- ", "-")
 

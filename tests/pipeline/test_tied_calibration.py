@@ -49,7 +49,7 @@ def commanded(tmp_path_factory):
     command = [MLSCORR, "calibrate", folder / "survey", "-o", folder / "out", *options]
     process = subprocess.run(map(str, command), capture_output=True, text=True)
     assert process.returncode == 0, process.stderr
-    assert "that two passes both saw are used" in process.stderr
+    assert "tie features between passes were used" in process.stderr
     return lacks, json.loads((folder / "out" / "calibration.json").read_text())
 
 
@@ -106,14 +106,14 @@ def test_what_ties_alone_cannot_tell_is_named(uncontrolled):
     assert not result.calibration.determined[2]
     assert result.calibration.determined[[0, 1, 3, 4]].all()
     sentences = result.calibration.warnings
-    assert any("No control point takes part" in sentence for sentence in sentences)
+    assert any("No control point was used" in sentence for sentence in sentences)
     assert any("does not determine lever arm up" in sentence for sentence in sentences)
     assert result.to_frame()["determined"].tolist() == result.calibration.determined.tolist()
-    assert "not determined by this site" in result._repr_html_()
+    assert "not determined by this geometry" in result._repr_html_()
 
 
 def test_one_pass_without_control_says_what_is_missing(tmp_path):
     "Nothing was seen twice and nothing surveyed: the error counts both and says what to drive"
     site(tmp_path, [0.3, 0.0, 0.0], 0, back=False)
-    with pytest.raises(ValueError, match=r"0 control points were found .* Drive the way back"):
+    with pytest.raises(ValueError, match=r"0 control points were found .* in both directions"):
         mlscorr.calibrate(mlscorr.read_survey(tmp_path))

@@ -87,7 +87,7 @@ def test_a_single_pass_says_why_it_has_no_ties():
     features = street.features(1, 1)
     (sentence,) = of_features(features).warnings
     assert sentence.startswith(f"No tie was found: none of {len(features)} planes, poles and")
-    assert "Drive the street twice" in sentence
+    assert "Drive the road twice" in sentence
 
 
 def test_a_tunnel_is_named_with_its_direction():
@@ -98,7 +98,7 @@ def test_a_tunnel_is_named_with_its_direction():
     exact /= np.linalg.norm(exact, axis=1, keepdims=True)
     (sentence,) = of_features(replace(features, direction=exact)).warnings
     assert "1.00, " in sentence.replace("-", "")
-    assert "unheld" in sentence
+    assert "unconstrained" in sentence
 
 
 def test_the_library_gives_what_the_command_gives(tmp_path):

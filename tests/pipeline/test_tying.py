@@ -54,7 +54,7 @@ def test_check_points_fit_no_worse(survey, tied):
     "With ties check points fit as well as without, to 2 mm, or better"
     alone = mlscorr.correct(survey, ties="off")
     assert alone.estimate.ties is None
-    assert "left out, as asked" in alone.estimate.untied
+    assert "not used, as requested" in alone.estimate.untied
     left = [np.linalg.norm(result.check["after"]["rmse"]) for result in (alone, tied)]
     assert left[1] < left[0] + 0.002  # m
 
@@ -78,9 +78,9 @@ def test_another_use_of_ties_is_refused(survey):
 @pytest.mark.parametrize(
     ("given", "sentence"),
     [
-        ({"order": 1.5}, "order is 1.5; it should be 0"),
-        ({"order": None}, "order is None; it should be 0"),
-        ({"rng": 5}, r"rng = '5' is no random generator: numpy.random.default_rng\(seed\)"),
+        ({"order": 1.5}, "order of the trend is 1.5; it must be"),
+        ({"order": None}, "order of the trend is None; it must be"),
+        ({"rng": 5}, r"rng = '5' is not a random generator. .*numpy.random.default_rng\(seed\)"),
     ],
 )
 def test_what_is_no_order_and_no_generator_is_refused(survey, given, sentence):
@@ -96,8 +96,8 @@ def test_the_report_tells_what_ties_did(tied, tmp_path):
     """
     section = tied.write(tmp_path / "out")["ties"]
     text = words((tmp_path / "out" / "report.html").read_text(encoding="utf-8"))
-    assert "What was seen twice" in text
-    assert "scanned by pass 1" in text and "scanned by pass 2" in text
+    assert "Tie features" in text
+    assert "scanned in pass 1" in text and "scanned in pass 2" in text
     assert (tmp_path / "out" / "pictures" / "ties.png").exists()
     assert [row["passes"] for row in section["pairs"]] == [[1, 2]]
     assert section["pairs"][0]["after"]["median"] < 0.005  # m
@@ -111,7 +111,7 @@ def test_one_pass_has_no_ties(street):
     survey = mlscorr.read_survey(street)
     result = mlscorr.correct(survey)
     assert result.estimate.ties is None
-    with pytest.raises(ValueError, match=r"No two passes .* saw the same thing"):
+    with pytest.raises(ValueError, match=r"No two passes .* overlap"):
         mlscorr.correct(survey, ties="only")
 
 
@@ -121,7 +121,7 @@ def test_one_pass_is_named_as_the_reason_in_terminal_report_and_page(commanded):
     report = json.loads(process.stdout)
     assert report["ties"]["n"] == report["ties"]["used"] == 0
     reason = report["ties"]["reason"]
-    assert reason.startswith("Nothing was scanned twice") and "A second pass" in reason
+    assert reason.startswith("Passes hardly overlap") and "A second pass" in reason
     assert reason in report["notes"]
     assert reason in " ".join(process.stderr.split())
     assert reason in words((out / "report.html").read_text(encoding="utf-8"))
@@ -164,8 +164,8 @@ def test_passes_that_never_meet_are_named():
     apart = replace(features, centre=features.centre + of_second(features, [0.0, 500.0, 0.0]))
     estimate = tied_street(apart)
     assert estimate.ties is None
-    number = f"0 of {len(features)} planes, poles and markings lie within"
-    assert f"twice, or hardly: {number}" in estimate.untied
+    number = f"0 of {len(features)} planes, poles and markings are within"
+    assert f"hardly overlap: {number}" in estimate.untied
     assert estimate.untied not in estimate.warnings
 
 
@@ -174,7 +174,7 @@ def test_tiles_of_one_visit_are_not_blamed_for_having_no_ties():
     features = street_bed.features(1, 1)
     late = features.gps_time > np.median(features.gps_time)
     estimate = tied_street(replace(features, pass_number=1 + late))
-    assert estimate.untied.startswith("Nothing was scanned twice, or hardly: 0 of")
+    assert estimate.untied.startswith("Passes hardly overlap: 0 of")
     assert estimate.untied not in estimate.warnings
 
 
@@ -184,7 +184,7 @@ def test_passes_that_meet_and_agree_nowhere_are_warned_of():
     back = features.direction - of_second(features, 2 * features.direction)
     estimate = tied_street(replace(features, direction=back))
     assert estimate.ties is None
-    assert estimate.untied.startswith("Nothing that two passes both saw agrees")
+    assert estimate.untied.startswith("No overlapping features agree")
     assert "mlscorr calibrate" in estimate.untied
     assert estimate.untied in estimate.warnings
 
@@ -194,7 +194,7 @@ def test_a_tunnel_names_the_direction_that_nobody_holds():
     features = street_bed.features()
     features = features[(np.abs(features.direction[:, 0]) < 0.1) & (features.kind == "plane")]
     estimate = tied_street(features)
-    (sentence,) = [text for text in estimate.warnings if "unheld" in text]
+    (sentence,) = [text for text in estimate.warnings if "unconstrained" in text]
     assert "E, N, H = 1.00" in sentence.replace("-", "")
     assert estimate.untied == ""
 

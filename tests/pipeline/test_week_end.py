@@ -88,4 +88,4 @@ def test_it_is_said(results):
     assert checked.faults == ()
     assert any("The GPS week ends before epoch" in note for note in checked.notes)
     report = json.dumps(json.loads((results["again"] / "out" / "report.json").read_text()))
-    assert "604800 s are added where its times start again" in report
+    assert "604800 s are added after the rollover" in report

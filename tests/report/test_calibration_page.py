@@ -62,7 +62,7 @@ def test_the_page_says_first_what_the_mounting_lacks_and_what_the_site_does_not_
     assert [row["name"] for row in undetermined.values["components"]] == ["lever arm up"]
     assert content["rating"] == "amber"
     text = words(calibration_page({"name": "site", **content}).html())
-    first = text[: text.index("How far the cloud is")]
+    first = text[: text.index("Misclosures at the surveyed targets")]
     assert all(row["sentence"] in first for row in content["statements"])
 
 
@@ -90,9 +90,9 @@ def test_the_page_says_next_what_fits_its_clouds():
     "Clouds that are as the recorded mounting put them are written anew before they are corrected"
     content = {"name": "site", **calibrated()}
     still = words(calibration_page(content | {"files": []}).html())
-    assert "still as the recorded mounting put them. Next: run mlscorr calibrate --clouds" in still
+    assert "still use the recorded mounting. Next: run mlscorr calibrate --clouds" in still
     done = words(calibration_page(content | {"files": [{"name": "pass-1.laz"}]}).html())
-    assert "Next: run mlscorr correct with the survey.toml beside this page." in done
+    assert "Next: run mlscorr correct with the survey.toml next to this page." in done
 
 
 def test_least_squares_without_control_has_no_result():
@@ -156,7 +156,7 @@ def test_what_the_drift_explains_between_passes_is_said_apart():
     content = calibrated() | {"ties": ties}
     drift = {"with_drift": {"ties": {"after": {"median": 0.002}}}}
     for more, without_drift in (({}, None), (drift, 0.002)):
-        (passes,) = said(calibration_statements(content | more, []), "Two passes")
+        (passes,) = said(calibration_statements(content | more, []), "Tie features")
         assert passes.values == {
             "used": 80,
             "n": 90,
@@ -196,7 +196,9 @@ def test_each_scanner_has_its_part():
     text = words(html)
     assert text.count("Scanner left") == 6
     assert "1 and 2, scanners left and right" in text
-    assert text.index("right beside left") > text.index("Scanner right beside scanner left")
+    assert text.index("right relative to left") > text.index(
+        "scanner right relative to scanner left"
+    )
 
 
 def test_how_well_scanners_fit_each_other_comes_first():

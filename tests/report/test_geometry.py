@@ -51,7 +51,7 @@ def test_a_plan_of_a_search_tells_how_many_it_refused():
     trajectory = drive()
     for found, refused in ((3, 2), (0, 0)):
         figure = search_figure(trajectory, ties_of(np.full(found, 0.1)), ties_of(np.ones(refused)))
-        assert figure.axes[0].get_title(loc="left") == f"{found} ties, {refused} pairs refused"
+        assert figure.axes[0].get_title(loc="left") == f"{found} ties, {refused} pairs rejected"
 
 
 def test_the_correction_colors_the_trajectory_by_its_size():

@@ -32,8 +32,8 @@ def test_all_that_was_seen_and_held_is_said_plainly():
     "Two check and six control points on a drive that control holds"
     report = replace(fabricate(drive())[2], support=Support())
     assert headline(report) == (
-        "2 of 2 surveyed check points were seen and scored. "
-        "Control: 6 of 6 surveyed points used. Control points hold the whole drive."
+        "2 of 2 surveyed check points were found and used for the RMSE. Control: 6 of 6 "
+        "surveyed points used. Control points constrain the whole drive."
     )
 
 
@@ -86,10 +86,10 @@ def test_a_single_control_point_is_corrected_by_no_others(checks):
     "It is said that the POS alone checks it, and no number of what the others make of it"
     rows = [row for row in fabricate(drive(), count=3)[2].targets if row.name != "T02"]
     report = report_of(drive(), rows if checks else rows[:1])
-    (fact,) = said(report, "Left out in turn").values()
+    (fact,) = said(report, "Leave-one-out").values()
     assert (fact.key, fact.severity) == ("single control point", "warning")
     words = " ".join(f"{row.sentence} {row.items}" for row in statements(report))
-    assert "the others" not in words and "were left out in turn" not in words
+    assert "the others" not in words and "(leave-one-out)" not in words
 
 
 def test_what_was_found_half_a_metre_off_is_not_said_to_be_unseen():
@@ -155,7 +155,7 @@ def test_page_report_and_terminal_begin_with_the_same_statements(tmp_path, capsy
     terminal = " ".join(capsys.readouterr().err.split())
     text = words(html)
     for row in content["statements"]:
-        assert row["sentence"] in text[: text.index("How far the cloud is")]
+        assert row["sentence"] in text[: text.index("Misclosures at the surveyed")]
         if row["what"] != "Warnings":  # said when they arose
             assert row["sentence"] in terminal[: terminal.index("RMSE of misclosures")]
     assert "C7 : C7 is hidden." in text and "C7: C7 is hidden." in terminal
@@ -188,7 +188,7 @@ def test_a_weak_stretch_is_named_by_time_and_way_and_is_amber_where_it_exceeds_w
             if row.what == "Extrapolated"
         )
         assert row.rating == rating
-        assert row.items[0][0] == "50.0 to 61.5 s, 300 to 360 m of the way"
+        assert row.items[0][0] == "50.0 to 61.5 s, chainage 300 to 360 m"
 
 
 def test_a_correction_that_is_extrapolated_everywhere_is_never_green():
@@ -243,7 +243,7 @@ def test_a_drive_that_others_hold_is_nowhere_said_to_stand_on_the_pos_alone(weak
     report = replace(report, targets=rows, support=Support(weak))
     (fact,) = said(report, "Control points").values()
     assert (fact.key, fact.severity) == ("control of other drives", "warning")
-    assert headline(report).startswith("2 of 2 surveyed check points were seen and scored.")
+    assert headline(report).startswith("2 of 2 surveyed check points were found")
     alone = Support((WeakInterval(0.0, 9.0, 45.0, 0.02, REASONS[NO_CONTROL]),))
     assert list(said(replace(report, support=alone), "Control points")) == ["no control point"]
 

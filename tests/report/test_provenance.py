@@ -15,7 +15,7 @@ def test_the_systems_and_beliefs_are_named():
     survey, _, _ = fabricate(drive())
     pairs = dict(systems(survey))
     assert pairs["Coordinate reference system"] == "EPSG:32650"
-    assert pairs["Time of pass-1.laz"] == "GPS week seconds, as the trajectory's"
+    assert pairs["Time of pass-1.laz"] == "GPS week seconds, as in the trajectory"
     assert pairs["Epochs of the trajectory"] == "3 000 at 50 Hz"
     assert "not stated" in dict(systems(replace(survey, crs=None)))["Coordinate reference system"]
 
@@ -27,8 +27,8 @@ def test_times_counted_over_the_end_of_the_week_are_named():
     survey, _, _ = fabricate(trajectory)
     late = replace(survey.clouds[0], time_system="week", new_week=100.0)
     pairs = dict(systems(replace(survey, clouds=(late,))))
-    assert pairs["Time of the trajectory"].endswith("counted on over the end of the GPS week")
-    assert "counted on where they start again (+604800 s)" in pairs["Time of pass-1.laz"]
+    assert pairs["Time of the trajectory"].endswith("continued past the end of the GPS week")
+    assert "continued where they restart (+604800 s)" in pairs["Time of pass-1.laz"]
 
 
 def test_each_scanner_has_its_lever_arm():
@@ -50,11 +50,11 @@ def test_the_coverage_is_told_in_seconds_and_points():
     pairs = dict(coverage(correction, report))
     assert pairs["Trajectory"].startswith(f"{START:.3f} to ")
     for where in (
-        "Points before the first or past the last control point",
-        "Points whose correction is extrapolated: no control point holds them",
+        "Points before the first or after the last control point",
+        "Points with extrapolated correction (outside the control)",
     ):
         assert pairs[where] == "40 000 (3.24 %)"
-    assert pairs["Points outside the trajectory (left as they were)"] == "0"
+    assert pairs["Points outside the trajectory (not corrected)"] == "0"
     assert pairs["Gaps of the trajectory (nothing is interpolated across them)"] == 1
 
 

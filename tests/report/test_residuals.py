@@ -30,6 +30,6 @@ def test_many_names_give_way_to_a_sentence():
     "More than 60 targets are not named under the axis"
     few, many = (residual_figure(fabricate(drive(), count)[2]).axes[-1] for count in (8, 80))
     assert next(text.get_text() for text in few.get_xticklabels()) == "T01"
-    assert "in the order of time" in many.get_xlabel() and "T01" not in [
+    assert "in time order" in many.get_xlabel() and "T01" not in [
         text.get_text() for text in many.get_xticklabels()
     ]

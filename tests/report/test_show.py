@@ -41,7 +41,7 @@ def read(path):
     text = path.read_text(encoding="utf-8")
     scene = json.loads(re.search(r'id="scene">(.*?)</script>', text, re.S)[1])
     entries = re.findall(r"<b>(.*?)</b> <span>(.*?)</span>", text)
-    words = re.search(r"Map axes about (\d+) E, (\d+) N, (-?\d+) H", text)
+    words = re.search(r"Map axes relative to (\d+) E, (\d+) N, (-?\d+) H", text)
     origin = np.array([float(word) for word in words.groups()])
     return entries, scene["layers"], origin, text
 
@@ -168,7 +168,7 @@ def test_what_cannot_be_shown_is_refused(cloud, correction, tmp_path):
         mlscorr.show(walls="cloud.laz", page=page)
     with pytest.raises(TypeError, match="TriangleMesh"):
         mlscorr.show(o3d.t.geometry.TriangleMesh.create_box(), page=page)
-    with pytest.raises(ValueError, match="shows none"):
+    with pytest.raises(ValueError, match="shows nothing"):
         mlscorr.show(cloud, points=0, page=page)
     broken = cloud.xyz.copy()
     broken[3] = np.inf

@@ -11,7 +11,7 @@ from tests.beds.reports import drive, fabricate
     ("changes", "labels"),
     [
         ({}, ["Check points, before", "Check points, after", "Control points, before"]),
-        ({"checks": False}, ["Control points, before", "Control points, left out in turn"]),
+        ({"checks": False}, ["Control points, before", "Control points, leave-one-out"]),
         ({"count": 0}, ["Control points, before", "Control points, after (fit)"]),
     ],
 )
@@ -20,7 +20,7 @@ def test_the_independent_rows_come_first(changes, labels):
     rows = tables.rmse_rows(fabricate(drive(), **changes)[2])
     assert [row.label for row in rows][: len(labels)] == labels
     strong = [row.label for row in rows if row.strong]
-    assert strong == [label for label in strong if "in turn" in label or "Check" in label]
+    assert strong == [label for label in strong if "leave-one-out" in label or "Check" in label]
 
 
 def test_statistics_stand_in_the_order_of_their_heads():

@@ -33,7 +33,7 @@ def test_the_worst_place_is_not_hidden():
 def test_a_legend_names_what_is_drawn_and_nothing_else():
     "Refused ties only where there are any; a map without a used tie still has its crosses"
     _, correction, _, residuals = tied_report()
-    for used, expected in ((True, ["Seen twice"]), (False, ["Not used"])):
+    for used, expected in ((True, ["Used"]), (False, ["Rejected"])):
         every = replace(residuals, used=np.full(len(residuals.used), used))
         figure = tie_figure(correction, every)
         labels = [text.get_text() for text in figure.legends[0].texts]

@@ -29,7 +29,7 @@ def test_outages_steps_and_extrapolated_stretches_are_told_apart():
     "Each is drawn where it was, and stands in the legend; what isn't there doesn't"
     _, correction, report = fabricate(drive())
     names = {
-        "Extrapolated: no control point holds it",
+        "Extrapolated, outside the control",
         "GNSS outage: the position drifts",
         "GNSS re-acquired: the recorded position jumps",
     }

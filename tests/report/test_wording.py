@@ -33,74 +33,72 @@ CATALOGUE = [
     (
         "nothing to judge by",
         {},
-        "There is no surveyed point that could tell how good the correction is.",
+        "The accuracy of the correction is unknown: no point was surveyed.",
     ),
     (
         "no target to judge by",
         {},
-        "No target was found that could tell how good the correction is.",
+        "The accuracy of the correction is unknown: no target was found.",
     ),
     (
         "hardly changed",
         {"before": 0.011, "after": 0.012, "kind": "check"},
-        "The correction changed next to nothing, as independent check points tell: from 1.1 cm "
-        "to 1.2 cm off the surveyed places.",
+        "The correction hardly changed the cloud. 3D RMSE at independent check points: 1.1 cm "
+        "before, 1.2 cm after the correction.",
     ),
     (
         "changed within sigma",
         {"before": 0.008, "after": 0.016, "kind": "leave-one-out"},
-        "The correction changed less than these targets tell, as control points tell that were "
-        "left out in turn: from 8 mm to 1.6 cm off the surveyed places.",
+        "The change is smaller than the accuracy of these targets. 3D RMSE at control points "
+        "(leave-one-out): 8 mm before, 1.6 cm after the correction.",
     ),
     (
         "made worse",
         {"before": 0.008, "after": 0.016, "kind": "check"},
-        "The correction made the cloud worse, as independent check points tell: from 8 mm to "
-        "1.6 cm off the surveyed places. Don't use it.",
+        "The correction made the cloud worse; don't use it. 3D RMSE at independent check "
+        "points: 8 mm before, 1.6 cm after the correction.",
     ),
     (
         "improved",
         {**OFF, "kind": "check", "times": 9.7, "holds_everywhere": True},
-        "The correction brought the cloud from 77.5 cm to 8.0 cm off the surveyed places (10 "
-        "times closer), as independent check points tell.",
+        "3D RMSE at independent check points: 77.5 cm before, 8.0 cm after the correction (10 "
+        "times smaller).",
     ),
     (
         "improved",
         {**OFF, "kind": "check", "times": 9.7, "holds_everywhere": False},
-        "The correction brought the cloud from 77.5 cm to 8.0 cm off the surveyed places at the"
-        " points that were seen, as independent check points tell.",
+        "3D RMSE at independent check points: 77.5 cm before, 8.0 cm after the correction. Not "
+        "every check point was found, so this may not hold for the whole cloud.",
     ),
     (
         "improved",
         {**OFF, "kind": "leave-one-out", "times": 9.7, "holds_everywhere": False},
-        "The correction brought the cloud from 77.5 cm to 8.0 cm off the surveyed places where "
-        "control holds it, as control points tell that were left out in turn.",
+        "3D RMSE at control points (leave-one-out): 77.5 cm before, 8.0 cm after the "
+        "correction. This holds only where control points constrain the cloud.",
     ),
     (
         "improved",
         {**OFF, "kind": "fit", "times": None, "holds_everywhere": True},
-        "The correction brought the cloud from 77.5 cm to 8.0 cm off the surveyed places, but "
-        "only at the points that it was made from: nothing independent can judge it.",
+        "3D RMSE at the points used for the correction (fit only, no independent check): 77.5 "
+        "cm before, 8.0 cm after the correction.",
     ),
     (
         "rmse of check points",
         {**AXES, "points": 2, "observations": 2},
-        "Check points: RMSE 0.71/0.20/0.24 m before, 0.06/0.04/0.04 m after (E/N/H), 2 points "
-        "that took no part in the estimate.",
+        "Check points, not used in the estimate: RMSE 0.71/0.20/0.24 m before, 0.06/0.04/0.04 m "
+        "after (E/N/H), 2 points.",
     ),
     (
         "rmse left out",
         {**AXES, "points": 4, "observations": 8, "has_checks": True},
-        "No check point was seen. Control points, each left out in turn and predicted from the "
-        "others: RMSE 0.71/0.20/0.24 m before, 0.06/0.04/0.04 m after (E/N/H), 8 observations "
-        "of 4 points.",
+        "No check point was found in the cloud. Control points, leave-one-out: RMSE "
+        "0.71/0.20/0.24 m before, 0.06/0.04/0.04 m after (E/N/H), 8 observations of 4 points.",
     ),
     (
         "rmse left out",
         {**AXES, "points": 4, "observations": 8, "has_checks": False},
-        "There are no check points. Control points, each left out in turn and predicted from "
-        "the others: RMSE 0.71/0.20/0.24 m before, 0.06/0.04/0.04 m after (E/N/H), 8 "
-        "observations of 4 points.",
+        "There are no check points. Control points, leave-one-out: RMSE 0.71/0.20/0.24 m "
+        "before, 0.06/0.04/0.04 m after (E/N/H), 8 observations of 4 points.",
     ),
     (
         "rmse of the fit",
@@ -110,65 +108,62 @@ CATALOGUE = [
             "points": 1,
             "observations": 1,
         },
-        "There is no independent check: every target used (1 point) made the correction. The "
-        "fit, RMSE 0.7081/0.2043/0.2398 m before, 0.0012/0.0040/0.0040 m after (E/N/H), does "
-        "not tell how good the correction is elsewhere.",
+        "Fit to the points used for the correction: RMSE 0.7081/0.2043/0.2398 m before, "
+        "0.0012/0.0040/0.0040 m after (E/N/H), 1 point. No independent point shows the accuracy "
+        "elsewhere.",
     ),
     (
         "worse axes",
         {"rises": {"E": 0.0082, "H": 0.012}, "points": 2, "observations": 2},
-        "After the correction it is worse than before: E by 0.008 m, H by 0.012 m (RMS of 2 "
-        "points).",
+        "The RMSE of 2 points increased after the correction: E by 0.008 m, H by 0.012 m.",
     ),
     (
         "points",
         {"held": 900, "extrapolated": 93, "left": 7},
-        "90 % of the points corrected where control holds them, 9 % by extrapolation, 0.7 % "
-        "left as they were. 7 of 1000 points lie outside the trajectory or in its gaps.",
+        "90 % of the points are constrained by control, 9 % extrapolated, 0.7 % not corrected. "
+        "7 of 1000 points were measured outside the trajectory or in its gaps.",
     ),
     (
         "points",
         {"held": 1000, "extrapolated": 0, "left": 0},
-        "100 % of the points corrected where control holds them, 0 % by extrapolation, 0 % left"
-        " as they were.",
+        "100 % of the points are constrained by control, 0 % extrapolated, 0 % not corrected.",
     ),
     (
         "no check point",
         {},
-        "No check point was surveyed, so nothing independent tests this result.",
+        "No check point was surveyed: there is no independent test of this result.",
     ),
     (
         "check points",
         {"scored": 1, "surveyed": 3},
-        "1 of 3 surveyed check points was seen and scored.",
+        "1 of 3 surveyed check points was found and used for the RMSE.",
     ),
     (
         "check points",
         {"scored": 2, "surveyed": 2},
-        "2 of 2 surveyed check points were seen and scored.",
+        "2 of 2 surveyed check points were found and used for the RMSE.",
     ),
     (
         "hidden check points",
         {"names": ["C7"]},
-        "1 check point was not seen although the cloud covers the surroundings (C7): the error "
-        "there is unknown, and counts against this result.",
+        "1 check point was not found although the cloud covers the surroundings (C7). The error "
+        "there is unknown.",
     ),
     (
         "refused check points",
         {"names": ["C1", "C2", "C3", "C4", "C5", "C6", "C7", "C8"]},
-        "8 check points were found, but refused, as place, kind or size does not fit (C1, C2, "
-        "C3, C4, C5, C6 and 2 more): the error there is unknown, and counts against this "
-        "result.",
+        "8 check points were found but rejected, because position, kind or size does not fit "
+        "(C1, C2, C3, C4, C5, C6 and 2 more). The error there is unknown.",
     ),
     (
         "check points elsewhere",
         {"count": 1, "by_others": True},
-        "1 stands where only another scanner saw the target.",
+        "1 was scanned by another scanner only.",
     ),
     (
         "check points elsewhere",
         {"count": 2, "by_others": False},
-        "2 stand where nothing was scanned.",
+        "2 were outside the scanned area.",
     ),
     (
         "control points",
@@ -179,8 +174,8 @@ CATALOGUE = [
             "hidden": ["T40"],
             "elsewhere": {False: 1, True: 2},
         },
-        "5 of 9 surveyed points used, 1 refused (T01), 1 not seen (T40), 1 where nothing was "
-        "scanned, 2 where only another scanner saw the target.",
+        "5 of 9 surveyed points used, 1 rejected (T01), 1 not found (T40), 1 outside the "
+        "scanned area, 2 scanned by another scanner only.",
     ),
     (
         "control points",
@@ -190,73 +185,77 @@ CATALOGUE = [
     (
         "no control point",
         {"is_tied": True, "sigma": 0.09},
-        "No control point takes part: nothing but the POS says where the cloud lies. Passes are"
-        " fitted to one another by what two of them both saw: accuracy is relative only, and an"
-        " error that all of them share stays in the cloud. An error of up to 9.0 cm is to be "
-        "expected (one sigma).",
+        "No control point was used: the absolute position of the cloud is that of the POS. Tie "
+        "features align the passes with one another. The accuracy is relative only, and an "
+        "error that all passes share remains. Expected error up to 9.0 cm (1 sigma).",
     ),
     (
         "no control point",
         {"is_tied": False, "sigma": 0.0},
-        "No control point takes part: nothing but the POS says where the cloud lies.",
+        "No control point was used: the absolute position of the cloud is that of the POS.",
     ),
     (
         "control of other drives",
         {},
-        "No point of its own takes part: those of other drives hold it, through ties.",
+        "This drive has no control point of its own. Control points of other drives constrain "
+        "it through ties.",
     ),
     (
         "datum",
         {"lengths": {"scale": 0.1, "turn": 0.052}},
-        "Control and cloud differ by one linear term each (scale 10.0 cm, turn 5.2 cm), which "
-        "check points of the same survey cannot show.",
+        "Control and cloud differ systematically (scale 10.0 cm, turn 5.2 cm). Check points "
+        "from the same survey cannot show this.",
     ),
     (
         "held by other drives",
         {},
-        "Control points of other drives hold the whole drive, through ties.",
+        "Control points of other drives constrain the whole drive through ties.",
     ),
-    ("held", {}, "Control points hold the whole drive."),
+    ("held", {}, "Control points constrain the whole drive."),
     (
         "extrapolated",
         {"seconds": 31.5, "metres": 160.0, "share": 0.03, "sigma": 1.25},
-        "No control holds 31.5 s (160 m) of the drive, 3 % of the points: the correction is "
-        "extrapolated there, and an error of up to 1.25 m is to be expected (one sigma).",
+        "31.5 s (160 m, 3 % of the points) are outside the control. The correction is "
+        "extrapolated there; expected error up to 1.25 m (1 sigma).",
     ),
-    ("between control points", {"sigma": 0.095}, "Between control points it is up to 9.5 cm."),
+    (
+        "between control points",
+        {"sigma": 0.095},
+        "Between control points, expected error up to 9.5 cm.",
+    ),
     (
         "left out",
         {"rmse": [0.06, 0.04, 0.038], "rmse_3d": 0.0815},
-        "RMSE 8.2 cm in 3D (6.0 cm, 4.0 cm, 3.8 cm in E, N, H) at control points that the "
-        "others alone correct.",
+        "3D RMSE at control points, each predicted from the others: 8.2 cm (6.0 cm, 4.0 cm, 3.8 "
+        "cm in E, N, H).",
     ),
     (
         "single control point",
         {},
-        "A single control point has no others: the POS's own sigmas alone check it.",
+        "No leave-one-out test is possible with a single control point: only the stated sigmas "
+        "of the POS check it.",
     ),
     (
         "sigma",
         {"largest": 0.13, "time": 413_205.0, "median": 0.053},
-        "Up to 13.0 cm (at 413205.0 s), 5.3 cm at half of the epochs: one sigma in 3D of the "
-        "corrected position.",
+        "3D sigma of the corrected position: median 5.3 cm, largest 13.0 cm (at 413205.0 s).",
     ),
-    ("stated sigma", {"sigma": 0.03}, "The POS states 3.0 cm of the recorded one."),
+    ("stated sigma", {"sigma": 0.03}, "The POS states 3.0 cm for the recorded position."),
     (
         "assumed",
         {
             "count": 1,
-            "purpose": " until control points show better",
+            "purpose": " until control points give an estimate",
             "sections": ["[pos]"],
             "has_sigma": True,
         },
-        "1 accuracy that nobody stated is assumed until control points show better. State what "
-        "you know under [pos] in survey.toml, or give the trajectory sigma columns.",
+        "1 accuracy was not given and is assumed until control points give an estimate. Set "
+        "known values under [pos] in survey.toml, or add sigma columns to the trajectory.",
     ),
     (
         "assumed",
         {"count": 3, "purpose": "", "sections": ["[pos]", "[scanner]"], "has_sigma": False},
-        "3 accuracies that nobody stated are assumed. State what you know under [pos] and "
+        "3 accuracies were not given and are assumed. Set known values under [pos] and "
         "[scanner] in survey.toml.",
     ),
     ("warnings", {"count": 2}, "2 warnings:"),
@@ -264,232 +263,231 @@ CATALOGUE = [
     (
         "unused ties",
         {"n": 1200, "has_control": True},
-        "None of the 1 200 places that were seen twice is used, since more than half of them "
-        "contradict the others: control points alone made the correction.",
+        "None of the 1 200 tie features was used, because more than half of them contradict the "
+        "others. The correction is based on the control points alone.",
     ),
     (
         "unused ties",
         {"n": 1200, "has_control": False},
-        "None of the 1 200 places that were seen twice is used, since more than half of them "
-        "contradict the others: passes stay apart.",
+        "None of the 1 200 tie features was used, because more than half of them contradict the "
+        "others. The passes were not aligned with each other.",
     ),
     (
         "ties",
         {"n": 1200, "before": 0.105, "after": 0.0029},
-        "The same wall, road surface, pole or painted line was seen twice in 1 200 places: "
-        "there both views lay 10.5 cm apart before the correction and lie 3 mm apart after it "
-        "(median).",
+        "Median misclosure of 1 200 tie features (walls, road surfaces, poles and painted lines "
+        "scanned twice): 10.5 cm before, 3 mm after the correction.",
     ),
     (
         "contradicting ties",
         {"wrong": 13},
-        "13 of these places are not used, as the others contradict them: cars that moved, "
-        "people, leaves, or one row of windows taken for the next.",
+        "13 of these tie features were rejected because the others contradict them. Likely "
+        "causes: moving cars, people, foliage, or repeated facade elements matched wrongly.",
     ),
     (
         "contradicting ties",
         {"wrong": 1},
-        "1 of these places is not used, as the others contradict them: cars that moved, people,"
-        " leaves, or one row of windows taken for the next.",
+        "1 of these tie features was rejected because the others contradict them. Likely "
+        "causes: moving cars, people, foliage, or repeated facade elements matched wrongly.",
     ),
     (
         "relative ties",
         {},
-        "This is relative only; nothing is claimed in absolute terms: no control point takes "
-        "part, and an error that all passes share stays in the cloud.",
+        "The accuracy is relative only: no control point was used, and an error that all passes "
+        "share remains in the cloud.",
     ),
     (
         "share of control",
         {"control": 0.003},
-        "Of what the result knows of the drive, 0.3 % comes from control points and 99.7 % from"
-        " these places.",
+        "Information on the drift: 0.3 % from control points, 99.7 % from tie features.",
     ),
     (
         "sufficient control",
         {"control": 6, "sufficient": 3},
-        "6 control points took part; 3 of them, evenly spread, would have sufficed to know the "
-        "drive about as well (to a tenth of its sigma).",
+        "6 control points were used; 3 of them, evenly spaced, would give a sigma within 10 % "
+        "of the present one.",
     ),
     (
         "sufficient control",
         {"control": 6, "sufficient": 1},
-        "6 control points took part; 1 of them would have sufficed to know the drive about as "
-        "well (to a tenth of its sigma).",
+        "6 control points were used; 1 of them would give a sigma within 10 % of the present one.",
     ),
     (
         "all control needed",
         {"control": 6},
-        "All 6 control points were needed: with fewer the drive is known less well.",
+        "All 6 control points are needed: with fewer, the sigma of the correction increases.",
     ),
     (
         "all control needed",
         {"control": 2},
-        "Both control points were needed: with fewer the drive is known less well.",
+        "Both control points are needed: with fewer, the sigma of the correction increases.",
     ),
     (
         "scanners together",
         {"first": "left", "name": "right", "fit": 0.0018, **SIGMAS},
-        "Scanners left and right put a wall that both saw in one place to 1.8 mm. Scanner right"
-        " beside scanner left: lever arm to 0.3/1.3/0.4 mm right/forward/up, boresight to "
-        "0.016/0.008/0.033 deg about them (one sigma).",
+        "Walls scanned by both scanner left and scanner right agree to 1.8 mm. Sigma of scanner "
+        "right relative to scanner left: lever arm 0.3/1.3/0.4 mm (right/forward/up), boresight "
+        "0.016/0.008/0.033 deg about the same axes.",
     ),
     (
         "scanners together",
         {"first": "left", "name": "right", "fit": None, **SIGMAS},
-        "No wall that scanners left and right both saw holds them. Scanner right beside scanner"
-        " left: lever arm to 0.3/1.3/0.4 mm right/forward/up, boresight to 0.016/0.008/0.033 "
-        "deg about them (one sigma).",
+        "No wall was scanned by both scanner left and scanner right. Sigma of scanner right "
+        "relative to scanner left: lever arm 0.3/1.3/0.4 mm (right/forward/up), boresight "
+        "0.016/0.008/0.033 deg about the same axes.",
     ),
-    ("mounting not told", {}, "This geometry does not tell whether the recorded mounting holds."),
+    ("mounting not told", {}, "This geometry can't confirm the recorded mounting."),
     (
         "mounting holds",
         {"sigmas": 3.0},
-        "The recorded mounting holds: it lacks nothing beyond 3 sigmas.",
+        "The recorded mounting is confirmed: no correction exceeds 3 sigma.",
     ),
     (
         "determined parts hold",
         {"sigmas": 3.0},
-        "The recorded mounting holds in the parts that are determined: it lacks nothing beyond "
-        "3 sigmas.",
+        "The determined components of the recorded mounting are confirmed: no correction "
+        "exceeds 3 sigma.",
     ),
     (
         "mounting lacks",
         {"components": COMPONENTS},
-        "The recorded mounting lacks boresight about up 0.300 ± 0.010 deg, lever arm up 424 ± "
-        "41 mm (not determined).",
+        "Corrections to the recorded mounting: boresight about up 0.300 ± 0.010 deg, lever arm "
+        "up 424 ± 41 mm (not determined).",
     ),
-    ("all parts determined", {"count": 6}, "All 6 parts by this geometry."),
+    ("all parts determined", {"count": 6}, "This geometry determines all 6 components."),
     (
         "parts not determined",
         {"components": COMPONENTS[1:], "count": 6},
-        "5 of 6 parts by this geometry. Not determined, and changed only as far as the accuracy"
-        " of the POS tells it from what looks the same: lever arm up 424 ± 41 mm.",
+        "This geometry determines 5 of 6 components. Not determined: lever arm up 424 ± 41 mm. "
+        "Their sigmas rest on the stated accuracy of the POS.",
     ),
-    ("no target", {}, "No target tells how good the calibration is."),
+    ("no target", {}, "The accuracy of the calibration is unknown: no target was found."),
     (
         "fit of a calibration",
         {"role": "control", **OFF},
-        "3D RMSE of control points 77.5 cm → 8.0 cm: the fit alone, which proves little.",
+        "3D RMSE at control points: 77.5 cm before, 8.0 cm after the calibration (fit only, no "
+        "independent check).",
     ),
     (
         "calibration tested",
         {"role": "check", **OFF},
-        "3D RMSE of check points 77.5 cm → 8.0 cm; they took no part.",
+        "3D RMSE at check points: 77.5 cm before, 8.0 cm after the calibration (not used in the "
+        "estimate).",
     ),
     (
         "worse by the scanner",
         {"role": "check", **OFF},
-        "3D RMSE of check points 77.5 cm → 8.0 cm; they took no part, and keep what the scanner"
-        " itself lacks.",
+        "3D RMSE at check points: 77.5 cm before, 8.0 cm after the calibration (not used in the "
+        "estimate; errors of the scanner itself remain).",
     ),
     (
         "worse by chance",
         {"role": "check", **OFF},
-        "3D RMSE of check points 77.5 cm → 8.0 cm; they took no part. No part changed "
-        "significantly.",
+        "3D RMSE at check points: 77.5 cm before, 8.0 cm after the calibration (not used in the "
+        "estimate). No component changed significantly.",
     ),
     (
         "scanner is off",
         {"range_offset": RANGES, "encoder_scale": ENCODER},
-        "Ranges lack 12 ± 1.0 mm (not determined), scan angles 0.10 ± 0.20 mrad per rad; the "
-        "mounting is free of it.",
+        "Range offset 12 ± 1.0 mm (not determined), scale of the scan angles 0.10 ± 0.20 mrad "
+        "per rad; the mounting is free of these errors.",
     ),
     (
         "scanner is right",
         {"range_offset": ENCODER, "encoder_scale": ENCODER},
-        "Ranges lack 0.1 ± 0.2 mm, scan angles 0.10 ± 0.20 mrad per rad: nothing significant.",
+        "Range offset 0.1 ± 0.2 mm, scale of the scan angles 0.10 ± 0.20 mrad per rad: not "
+        "significant.",
     ),
     (
         "scanner hardly told",
         {"range_offset": ENCODER, "encoder_scale": RANGES},
-        "Ranges lack 0.1 ± 0.2 mm, scan angles 12.00 ± 1.00 mrad per rad (not determined); this"
-        " geometry hardly tells it.",
+        "Range offset 0.1 ± 0.2 mm, scale of the scan angles 12.00 ± 1.00 mrad per rad (not "
+        "determined); this geometry hardly determines them.",
     ),
     (
         "two passes",
         {**PASSES, "is_between_scanners": False, "without_drift": None},
-        "80 of 90 places that two passes both saw are used: 1.5 cm apart before, 1.6 cm after "
-        "(median).",
+        "80 of 90 tie features between passes were used. Median misclosure: 1.5 cm before, 1.6 "
+        "cm after the calibration.",
     ),
     (
         "two passes",
         {**PASSES, "is_between_scanners": True, "without_drift": 0.002},
-        "80 of 90 places that two passes, or two scanners of one, both saw are used: 1.5 cm "
-        "apart before, 1.6 cm after (median), 2 mm without the drift.",
+        "80 of 90 tie features between passes or scanners were used. Median misclosure: 1.5 cm "
+        "before, 1.6 cm after the calibration, 2 mm with the drift removed.",
     ),
     (
         "no method improves",
         {"least": 0.002, "raw": 0.021},
-        "No method improves this cloud by 2 mm or more. The cloud as recorded, with 0.021 m, is"
-        " as good as any.",
+        "No method reduces the 3D RMSE by 2 mm or more. The recorded cloud has 0.021 m.",
     ),
     (
         "best method",
         {"name": "lsc", "about": "About lsc.", "rmse": 0.02, "raw": 0.5},
-        "Best is lsc: 3D RMSE 0.020 m, against 0.500 m without any correction. About lsc.",
+        "Best method: lsc, 3D RMSE 0.020 m; 0.500 m without correction. About lsc.",
     ),
     (
         "best methods",
         {"names": ["lsc", "shift"], "rmse": 0.02, "raw": 0.5, "least": 0.002},
-        "Best are lsc and shift: 3D RMSE 0.020 m, against 0.500 m without any correction. They "
-        "differ by less than 2 mm, which can't be told apart.",
+        "Best methods: lsc and shift, 3D RMSE 0.020 m; 0.500 m without correction. They differ "
+        "by less than 2 mm, which is not significant.",
     ),
     (
         "best of a kind",
         {"kind": "one move", "name": "shift", "rmse": 0.2},
-        "Best of those that move the whole cloud as one: shift, with 0.200 m.",
+        "Best single transformation of the whole cloud: shift, 0.200 m.",
     ),
     (
         "best of a kind",
         {"kind": "over time", "name": "ls-2", "rmse": 0.2},
-        "Best of polynomials and interpolation over time: ls-2, with 0.200 m.",
+        "Best polynomial or interpolation over time: ls-2, 0.200 m.",
     ),
     (
         "behind the best",
         {"name": "correct", "rmse": 0.03, "behind": 0.01},
-        "correct, with 0.030 m, is 0.010 m behind.",
+        "correct has 0.030 m, 0.010 m more than the best.",
     ),
     (
         "scored by check points",
         {"control": 9, "check": 8},
-        "Every method was fitted to the same 9 control points and scored by 8 check points that"
-        " took no part.",
+        "Every method was fitted to the same 9 control points and tested at 8 check points not "
+        "used in the fit.",
     ),
     (
         "scored by the fit",
         {"control": 9},
-        "Every method was fitted to the same 9 control points. Nothing independent is left to "
-        "score them by: this is the mere fit.",
+        "Every method was fitted to the same 9 control points. No independent point is left: "
+        "the scores show the fit only.",
     ),
     (
         "cross-validated",
         {"control": 9, "check": 1, "groups": 9},
-        "Every method was fitted to the same 9 control points. There is only 1 check point, so "
-        "the scores are cross-validated over all points: control points, each left out in turn,"
-        " are predicted from the others; each check point from all control points.",
+        "Every method was fitted to the same 9 control points. As there is only 1 check point, "
+        "the scores are cross-validated (leave-one-out): control points are predicted from the "
+        "others. Each check point is predicted from all control points.",
     ),
     (
         "cross-validated",
         {"control": 40, "check": 0, "groups": 10},
-        "Every method was fitted to the same 40 control points. There are no check points, so "
-        "the scores are cross-validated over all points: control points, left out in 10 groups "
-        "in turn, are predicted from the others.",
+        "Every method was fitted to the same 40 control points. As there are no check points, "
+        "the scores are cross-validated (in 10 groups): control points are predicted from the "
+        "others.",
     ),
     (
         "method with ties",
         {"name": "correct", "count": 375},
-        "correct also uses 375 ties: planes, poles and paint that two passes both saw. All "
-        "other methods use the control points alone.",
+        "correct also uses 375 ties between passes (planes, poles and paint). All other methods "
+        "use the control points only.",
     ),
     (
         "method without ties",
         {"name": "correct", "other": "lsc", "why": "One pass."},
-        "correct equals lsc here, for no ties were used. One pass.",
+        "correct equals lsc here because no ties were used. One pass.",
     ),
     (
         "method without ties",
         {"name": "correct", "other": "lsc", "why": None},
-        "correct equals lsc here, for no ties were used.",
+        "correct equals lsc here because no ties were used.",
     ),
     ("methods without a score", {"count": 1, "methods": 3}, "1 of 3 methods have no score."),
     (
@@ -511,14 +509,15 @@ CATALOGUE = [
     (
         "epochs differ",
         {"interpolated": 400, "first": 1, "second": 99},
-        "400 epochs of the first result have no partner in the second, which is interpolated "
-        "there. Not compared, as the other trajectory does not cover them: 1 epoch of the first, "
-        "99 of the second.",
+        "400 epochs of the first result have no counterpart in the second, which was "
+        "interpolated there. Not covered by the other trajectory and therefore not compared: 1 "
+        "epoch of the first, 99 of the second.",
     ),
     (
         "epochs differ",
         {"interpolated": 1, "first": 0, "second": 0},
-        "1 epoch of the first result has no partner in the second, which is interpolated there.",
+        "1 epoch of the first result has no counterpart in the second, which was interpolated "
+        "there.",
     ),
     (
         "scores of results",
@@ -557,10 +556,10 @@ CATALOGUE = [
     (
         "surveyed differently",
         {"count": 1},
-        "1 surveyed point has other coordinates in the second result:",
+        "1 surveyed point has different coordinates in the second result:",
     ),
     ("same targets used", {"n": 4}, "Both results use the same 4 observations of targets."),
-    ("targets used in one", {"count": 2}, "2 observations are used in one result only:"),
+    ("targets used in one", {"count": 2}, "2 observations were used in one result only:"),
     (
         "values differ",
         {"count": 9, "all": 21},
@@ -569,30 +568,32 @@ CATALOGUE = [
     ("values differ", {"count": 0, "all": 21}, "All 21 values of model and coverage agree."),
     ("inputs differ", {"count": 1, "all": 4}, "1 of 4 inputs differ:"),
     ("inputs differ", {"count": 0, "all": 4}, "All 4 inputs have the same contents."),
-    ("warnings of one", {"count": 1}, "1 warning stands in one result only:"),
+    ("warnings of one", {"count": 1}, "1 warning appears in one result only:"),
     (
         "check sigmas hold",
         SIGMA_TEST | {"statistic": 20.14},
-        "The residuals of 8 check points agree with their stated sigmas: chi-squared is 20.1 with "
-        "24 degrees of freedom, within its limits 12.4 and 39.4 (95 %). The residuals of "
-        "neighboring check points are correlated, which the test disregards: a narrow miss proves "
+        "The residuals at 8 check points agree with their stated sigmas: chi-squared 20.1 with "
+        "24 degrees of freedom, within the limits 12.4 and 39.4 (95 %). The test disregards the "
+        "correlation between neighboring check points: a value just outside the limits proves "
         "little.",
     ),
     (
         "check sigmas too small",
         SIGMA_TEST | {"statistic": 60.0, "factor": 1.58},
-        "The residuals of 8 check points exceed their stated sigmas: chi-squared is 60.0 with 24 "
-        "degrees of freedom, outside its limits 12.4 and 39.4 (95 %). The sigmas are too small by "
-        "a factor of about 1.6, or some check points are wrong. The residuals of neighboring "
-        "check points are correlated, which the test disregards: a narrow miss proves little.",
+        "The residuals at 8 check points exceed their stated sigmas: chi-squared 60.0 with 24 "
+        "degrees of freedom, outside the limits 12.4 and 39.4 (95 %). The sigmas are too small "
+        "by a factor of about 1.6, or some check points are wrong. The test disregards the "
+        "correlation between neighboring check points: a value just outside the limits proves "
+        "little.",
     ),
     (
         "check sigmas too large",
         SIGMA_TEST | {"statistic": 9.2, "factor": 0.62},
-        "The residuals of 8 check points are smaller than their stated sigmas: chi-squared is 9.2 "
-        "with 24 degrees of freedom, outside its limits 12.4 and 39.4 (95 %). The sigmas are "
-        "pessimistic: residuals are about 0.62 times as large. The residuals of neighboring check "
-        "points are correlated, which the test disregards: a narrow miss proves little.",
+        "The residuals at 8 check points are smaller than their stated sigmas: chi-squared 9.2 "
+        "with 24 degrees of freedom, outside the limits 12.4 and 39.4 (95 %). The sigmas are "
+        "pessimistic: the residuals are only 0.62 times as large. The test disregards the "
+        "correlation between neighboring check points: a value just outside the limits proves "
+        "little.",
     ),
 ]
 
@@ -611,7 +612,7 @@ def test_no_sentence_is_missing_from_the_catalogue():
 def test_an_extrapolated_part_is_named_by_time_and_way():
     "And what it is, with its sigma"
     assert interval_in_words(50.0, 61.5, 300.0, 60.0, "no control", 1.25) == (
-        "50.0 to 61.5 s, 300 to 360 m of the way",
+        "50.0 to 61.5 s, chainage 300 to 360 m",
         "no control; sigma up to 1.25 m",
     )
 
@@ -622,7 +623,7 @@ def test_an_extrapolated_part_is_named_by_time_and_way():
         (
             {"value": 0.02, "unit": "m", "estimate": 0.031},
             None,
-            "2.0 cm assumed; about 3.1 cm by this survey",
+            "2.0 cm assumed; estimated from this survey: 3.1 cm",
         ),
         ({"value": 0.02, "unit": "m"}, "for the sigmas", "2.0 cm assumed; for the sigmas"),
         ({"value": (0.01, 0.02), "unit": "deg"}, None, "0.01°, 0.02° assumed"),

@@ -224,15 +224,17 @@ def test_drives_that_contradict_themselves_are_refused():
     )
     refused(r"is too short", duration=20.0, stops=((0.0, 20.0),))
     refused(
-        r"A stop of 10.0 s from 55.0 s lies outside the first pass of 60.0 s",
+        "A stop of 10.0 s from 55.0 s is outside the first pass of 60.0 s",
         stops=((55.0, 10.0),),
         passes=(FORWARD, BACK),
     )
-    refused("500.0 m beside the centre line leaves the scene", passes=(PassScenario(lateral=500),))
+    refused(
+        "500.0 m from the center line is outside the scene", passes=(PassScenario(lateral=500),)
+    )
     close = BACK.model_copy(update={"pause": 0.05})
     refused(r"A pause of 0.05 s .* more than 0.1 s", passes=(FORWARD, close))
-    refused("less than 3 epochs", duration=0.01)
-    refused("leave out stops, u_turn and passes", file=Path("a.csv"), u_turn=True)
+    refused("fewer than 3 epochs", duration=0.01)
+    refused("remove stops, u_turn and passes", file=Path("a.csv"), u_turn=True)
 
 
 # A given path
@@ -352,9 +354,9 @@ def test_a_stop_in_a_given_path_adds_no_length(tmp_path):
     [
         ("a.txt", "x", "unknown suffix"),
         ("a.pos", "hello world\n", "not a table of time, latitude"),
-        ("b.pos", "1 532000 3374000 40\n2 532000 3374000 40\n", "no latitude and longitude"),
+        ("b.pos", "1 532000 3374000 40\n2 532000 3374000 40\n", "not latitude and longitude"),
         ("c.pos", "1 30 114 40\n1 30 114 40\n2 30 114 40\n", "must increase"),
-        ("d.pos", "1 30 114 40\n", "at least 2 epochs"),
+        ("d.pos", "1 30 114 40\n", "needs at least 2"),
         (
             "a.csv",
             "gps_time,x,y,z\n1,2,three,4\n",

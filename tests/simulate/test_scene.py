@@ -484,9 +484,9 @@ def test_bad_meshes_are_refused(tmp_path):
     (tmp_path / "text.ply").write_text("hello")
     refused(on_mesh(tmp_path / "text.ply"), "no triangles")
     (tmp_path / "bad.obj").write_text("v 1 2 3\nf 1 2 x\n")
-    refused(on_mesh(tmp_path / "bad.obj"), "Line 2 of .*bad.obj is no vertex or face")
+    refused(on_mesh(tmp_path / "bad.obj"), "Line 2 of .*bad.obj is not a vertex or face")
     (tmp_path / "short.obj").write_text("v 1 2 3\nf 1 2 3\n")
-    refused(on_mesh(tmp_path / "short.obj"), "vertices it does not have")
+    refused(on_mesh(tmp_path / "short.obj"), "vertices that do not exist")
     refused(on_mesh(tmp_path / "mesh.stl"), "unknown suffix")
     small = write_ply(tmp_path / "small.ply", *ground_mesh(40.0))
     refused(on_mesh(small), r"The drive leaves the mesh: \d+ of \d+ m have no ground")
@@ -513,9 +513,7 @@ def test_targets_without_room_beside_the_drive_are_refused(tmp_path):
     path = write_ply(
         tmp_path / "trench.ply", np.vstack([vertices, corners]), np.vstack([triangles, faces])
     )
-    with pytest.raises(
-        ValueError, match=r"(\d+) of \1 targets find no free place beside the drive"
-    ):
+    with pytest.raises(ValueError, match=r"(\d+) of \1 targets find no free place along the drive"):
         build_scene(on_mesh(path), line, length, rng(2))
 
 

@@ -142,7 +142,7 @@ def test_pulses_can_be_made_again_in_blocks_of_any_size(pair):
 
 def test_a_seed_is_no_generator(short):
     """A whole number as rng ends in a sentence that makes a generator of it."""
-    with pytest.raises(ValueError, match=r"rng = '5' is no random generator"):
+    with pytest.raises(ValueError, match="rng = '5' is not a random generator"):
         simulate(short.scenario, 5)
 
 
@@ -413,7 +413,7 @@ def test_progress_counts_every_pulse_that_is_fired(pair, tmp_path):
         return bars[-1].append
 
     pair.write(tmp_path, progress)
-    assert [title for title, *_ in bars] == ["Simulating pulses", "Writing their truth"]
+    assert [title for title, *_ in bars] == ["Simulating pulses", "Writing the truth"]
     for _, total, *steps in bars:
         assert total == sum(steps)
     assert bars[0][1] == pair.fired
@@ -475,7 +475,7 @@ def test_a_full_disk_leaves_nothing(tmp_path, limit):
 
 def test_a_crs_that_no_survey_can_have_is_refused():
     "In degrees or feet nothing is simulated: the folder could not be read again"
-    for crs, fault in (("EPSG:4326", "a projected CRS is needed"), ("EPSG:2263", "not in metres")):
+    for crs, fault in (("EPSG:4326", "a projected CRS is needed"), ("EPSG:2263", "not in meters")):
         with pytest.raises(ValueError, match=fault):
             make(with_(SHORT, crs=crs))
 
@@ -493,7 +493,7 @@ def test_a_drive_that_meets_nothing_is_refused(tmp_path, sight):
     ("second", "corner", "message"),
     [
         ([np.nan, 3_374_000.0, 42.0], [532_000.0, 3_374_000.0, 42.0], "1 of 2 points"),
-        ([0.0, 0.0, 0.0], [0.0, 0.0, 0.0], "A point lies 3374000 m from the cloud's corner"),
+        ([0.0, 0.0, 0.0], [0.0, 0.0, 0.0], "A point is 3374000 m from the corner of the cloud"),
     ],
     ids=["not finite", "too wide"],
 )

@@ -67,10 +67,10 @@ def test_points_share_what_is_stated_once():
 @pytest.mark.parametrize(
     ("changed", "words"),
     [
-        ({"name": ["A", "A"]}, "names stand twice"),
-        ({"kind": "disc"}, "kind = 'disc' is none of circle"),
+        ({"name": ["A", "A"]}, "names occur twice"),
+        ({"kind": "disc"}, "kind = 'disc' is"),
         ({"size": [0.6, np.nan]}, "1 of 2 surveyed points"),
-        ({"position": [PLACE]}, "unlike numbers of rows"),
+        ({"position": [PLACE]}, "different numbers of rows"),
     ],
 )
 def test_points_that_are_none_are_refused(changed, words):
@@ -99,7 +99,7 @@ def test_clouds_that_are_none_are_refused(xyz, time, words):
 def test_float32_at_map_size_says_what_is_lost():
     "A quarter of a meter a step at a northing of 3 374 km; nothing about an origin"
     xyz = np.tile(PLACE, (3, 1)).astype(np.float32)
-    with pytest.warns(UserWarning, match="steps of 0.25 m, so that up to 0.125 m is lost"):
+    with pytest.warns(UserWarning, match="steps of 0.25 m, with errors of up to 0.125 m"):
         PointCloud.from_arrays(xyz, START + np.zeros(3))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -125,7 +125,7 @@ def test_a_survey_of_arrays_has_its_points():
     survey = Survey.from_arrays([cloud, cloud], path, control, name="street")
     assert [file.name for file in survey.clouds] == ["street-1.laz", "street-2.laz"]
     assert survey.points == 2 * len(cloud) and len(survey.check) == 0
-    with pytest.raises(ValueError, match="each with a point at least"):
+    with pytest.raises(ValueError, match="at least one point each"):
         Survey.from_arrays([cloud[[]]], path, control)
 
 

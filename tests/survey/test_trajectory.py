@@ -23,7 +23,7 @@ def drive(gps_time, attitude=None, **others):
 @pytest.mark.parametrize(
     ("gps_time", "sentence"),
     [
-        ([START], "needs at least 2 epochs, this one has 1"),
+        ([START], "needs at least 2 epochs.*this one has 1"),
         ([START, START], "1 epochs are duplicates and 0 go back"),
         ([START, START - 1.0, START + 1.0], r"1 go back in time .*413200\.000 s"),
         ([START, np.nan, START + 1.0], "1 of 3 trajectory epochs have a gps_time that is not"),
@@ -100,7 +100,7 @@ def test_segments_count_from_zero_and_gaps_belong_to_none():
 @pytest.mark.parametrize("asked", [-0.001, 3.0, 22.2])
 def test_nothing_is_extrapolated_or_carried_over_a_gap(asked):
     "A time before, after or in a gap is refused, with the span and the number of gaps"
-    sentence = r"1 of 2 times lie outside the trajectory \[413200.000, 413222.000\] s .* 2 gaps"
+    sentence = r"1 of 2 times are outside the trajectory \[413200.000, 413222.000\] s .* 2 gaps"
     with pytest.raises(ValueError, match=sentence):
         gappy().at(START + np.array([1.0, asked]))
 
@@ -142,7 +142,7 @@ def test_sessions_part_a_trajectory_where_steps_do_not():
     assert whole.passes == pytest.approx(START + np.array([[0.0, 9.9], [10.0, 58.0]]))
     assert len(drive(time).passes) == 25  # each step of 2 s is twenty median ones
     assert whole.at(START + np.array([9.85, 11.0])).session.tolist() == [3, 1]
-    with pytest.raises(ValueError, match="1 of 1 times lie outside"):
+    with pytest.raises(ValueError, match="1 of 1 times"):
         whole.at(START + 9.95)
 
 

@@ -378,6 +378,6 @@ def test_without_contrast_there_is_no_target():
     assert len(find(seen)) == 0
     for level in (0.0, 100.0):
         flat = replace(seen.cloud, intensity=np.full(len(seen.cloud), level))
-        with pytest.warns(UserWarning, match=f"all points is {level:g}.* Bright targets can't"):
+        with pytest.warns(UserWarning, match=f"all points is {level:g}.* bright targets can't"):
             assert len(find(replace(seen, cloud=flat))) == 0
     assert len(find(replace(seen, cloud=seen.cloud[:0]))) == 0

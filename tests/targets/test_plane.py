@@ -24,7 +24,7 @@ def test_fit_plane_with_outliers(seed):
 
 def test_fit_plane_needs_three_points():
     "Two points are refused with the number"
-    with pytest.raises(ValueError, match="needs 3 points, there are 2"):
+    with pytest.raises(ValueError, match="needs at least 3 points; there are 2"):
         fit_plane(np.zeros((2, 3)), 0.03)
 
 

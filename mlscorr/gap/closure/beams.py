@@ -128,8 +128,8 @@ def _beams(survey, rows, platform, origin, patches, targets):
     pulses, count = _joined(platform, origin, patches, targets)
     if len(count) == 0:
         raise ValueError(
-            f"None of the pulses behind {len(rows)} rows is in the clouds of {survey.path}: the "
-            "rows are of another survey, or the files have changed."
+            f"None of the pulses behind {len(rows)} residuals is in the clouds of {survey.path}: "
+            "they belong to another survey, or the files have changed."
         )
     view = np.repeat(np.arange(len(count)), count)
     item = np.array([part.item for part in [*patches, *(sighting for sighting, _ in targets)]])

@@ -180,8 +180,9 @@ def make_folds(
     nothing = np.zeros(len(rows), dtype=int)
     if not callable(simulated):
         held_out = (
-            "The simulator's next run was compared with the same survey; the effect had been "
-            "looked for in it, what the simulator then changed had not been fitted to it."
+            "The next run of the simulator was compared with the same survey. The effect had "
+            "been estimated from this survey, but the change of the simulator was not fitted to "
+            "it."
         )
         return Folds(block, nothing, (whole,), held_out, whole, columns)
     if cause.effect == "none":
@@ -191,7 +192,9 @@ def make_folds(
     squares = np.bincount(block, (shift * rows.metric * used) ** 2)
     is_brief = len(np.unique(block[used & rows.metric])) < 2
     if is_brief or squares.max() > SETTINGS.block_share * squares.sum() > 0:
-        held_out = "Nothing could be held out: what acts in one moment is told by no other."
+        held_out = (
+            "Nothing could be held out: an effect at a single moment shows in no other residual."
+        )
         return Folds(block, nothing, (whole,), held_out, whole, columns)
     fold = np.where(used, _dealt(squares)[block], -1)
     if columns.shape[1]:
@@ -203,15 +206,18 @@ def make_folds(
     if progress is not None:
         progress(1)
     held_out = (
-        f"The effect was chosen on all {block.max() + 1} blocks of time; each fifth of them judges "
-        "a size that was found without it."
+        f"The effect was chosen on all {block.max() + 1} blocks of time; each fifth of them "
+        "tests a size that was estimated without it."
     )
     if not used.all():
-        held_out += f" {len(np.unique(rows.item[~used]))} looks at check points were never used."
+        held_out += (
+            f" {len(np.unique(rows.item[~used]))} observations of check points were never used."
+        )
     if case.undecided.any():
         held_out += (
             f" {len(np.unique(rows.item[case.undecided]))} of these, at the moment of the jump, "
-            "can't judge: no other row says on which side of it they were."
+            "can't be used for the test: no other residual shows on which side of the jump they "
+            "are."
         )
     return Folds(block, fold, predicted, held_out, whole, columns)
 

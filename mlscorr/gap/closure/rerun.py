@@ -147,8 +147,8 @@ def _views_of(rows, beams):
     other = (views[:, 0] >= 0) & (beams.gps_time[views[:, 0]] != rows.gps_time)
     if other.any():
         raise ValueError(
-            f"{other.sum()} of {len(rows)} rows have another time than in the Beams: collect the "
-            "beams anew for these rows."
+            f"{other.sum()} of {len(rows)} residuals have other times than in the Beams. Collect "
+            "the beams again for these residuals."
         )
     return views
 

@@ -6,17 +6,17 @@ from mlscorr.gap.contrast.tables import ContrastTable, Measure, with_sigma
 from mlscorr.wording import percent, value_and_sigma
 
 SILENT = {  # reasons why a channel is not compared
-    "intensity": "The simulator says nothing of intensity: without its clouds there is nothing to "
-    "compare the survey's with. Give them by --simulated.",
-    "density": "The simulator says nothing of how many points come from where: it has no cloud "
-    "of its own. Give its clouds by --simulated.",
-    "edge_width": "The simulator says nothing of the width of its beam, which it takes as thin. "
-    "Give its clouds by --simulated.",
-    "dropout": "The simulator says nothing of lost returns: it has no effect dropout.",
-    "pulses": "Lost returns can't be counted: the time stamps have no regular step, or no flat "
-    "surface shows them.",
-    "edges": "Too few depth edges lie along scan lines for a width.",
-    "apart": "The two clouds have hardly a place in common.",
+    "intensity": "Intensity is not compared: the simulator has no model of it. Give the "
+    "simulator's clouds with --simulated.",
+    "density": "Point density is not compared: the simulator has no cloud of its own. Give its "
+    "clouds with --simulated.",
+    "edge_width": "Beam width is not compared: the simulator assumes a thin beam. Give the "
+    "simulator's clouds with --simulated.",
+    "dropout": "Lost returns are not compared: the simulator has no effect dropout.",
+    "pulses": "Lost returns can't be counted: the time stamps have no regular step, or there "
+    "are no flat surfaces.",
+    "edges": "Too few depth edges along scan lines to estimate the beam width.",
+    "apart": "The two clouds hardly overlap.",
 }
 PLACES = {"range": ("range", " m"), "incidence": ("angle of incidence", "°")}
 
@@ -52,31 +52,31 @@ def sentence(
     if measure.channel == "dropout":
         lost = f"{value_and_sigma(100 * real, 100 * sigma)} % of the beams"
         return (
-            f"{_opening(lost, is_further)} on flat surfaces bring no return "
-            f"{where}, {percent(simulated, 1)} in the simulation: the simulator "
-            f"{'lacks lost returns' if value > 0 else 'loses too many returns'}."
+            f"{_opening(lost, is_further)} on flat surfaces give no return {where}, "
+            f"{percent(simulated, 1)} in the simulation: the simulator "
+            f"{'loses too few returns' if value > 0 else 'loses too many returns'}."
         )
     return (
         f"{_opening('depth edges', is_further)} are smeared over "
-        f"{value_and_sigma(abs(value), sigma)} mrad "
-        f"{'more' if value > 0 else 'less'} than simulated {where} ({real:.2g} against "
-        f"{simulated:.2g} mrad): the simulator's beam is {'too thin' if value > 0 else 'too wide'}."
+        f"{value_and_sigma(abs(value), sigma)} mrad {'more' if value > 0 else 'less'} than "
+        f"simulated {where} ({real:.2g} versus {simulated:.2g} mrad): the simulator's beam is "
+        f"{'too thin' if value > 0 else 'too wide'}."
     )
 
 
 def _opening(subject, is_further):
     """Subject of a sentence, which may follow another one on the same channel."""
     if is_further:
-        return f"Beyond that, {subject}"
+        return f"In addition, {subject}"
     return subject.capitalize()
 
 
 def _density(value, sigma, where, is_further):
     change = "more"
-    hint = "loses too many returns there, or its scene lacks things"
+    hint = "loses too many returns there, or objects are missing in its scene"
     if value < 0:
         change = "fewer"
-        hint = "lacks lost returns there, or what hides things"
+        hint = "loses too few returns there, or occluding objects are missing"
     change_in_percent = value_and_sigma(100 * abs(np.expm1(value)), 100 * sigma * np.exp(value))
     return (
         f"{_opening('the real cloud', is_further)} has {change_in_percent} % {change} points than "
@@ -94,8 +94,8 @@ def _intensity(table, value, sigma, where, is_further):
     times = value_and_sigma(factor, factor * sigma)
     return (
         f"{_opening('real returns', is_further)} are {times} times "
-        f"{'weaker' if value < 0 else 'stronger'} than simulated ones {where}, beside the usual "
-        f"ratio of the two: the simulator{_lacks(table.by, slope < 0)}."
+        f"{'weaker' if value < 0 else 'stronger'} than simulated ones {where}, relative to their "
+        f"usual ratio: the simulator{_lacks(table.by, slope < 0)}."
     )
 
 
@@ -110,8 +110,8 @@ def _lacks(by, falls):
     else:
         along = f"with the {PLACES[by][0]}"
     if falls:
-        return f" lacks falloff {along}"
-    return f"'s intensity falls off too fast {along}"
+        return f" has no decrease {along}"
+    return f"'s intensity decreases too fast {along}"
 
 
 def _largest_run(table):

@@ -149,7 +149,9 @@ def _intensity(
     """Ratio of intensities relative to the median, which depends on units."""
     for name, cloud in (("survey's", real), ("simulated", simulated)):
         if not cloud.has_intensity:
-            return Contrast("intensity", f"The {name} cloud has no intensity: all are the same.")
+            return Contrast(
+                "intensity", f"The {name} cloud has no intensity: all values are equal."
+            )
     known = pairs[np.isfinite(pairs.brightness).all(axis=1)]
     if len(known) == 0:
         return Contrast("intensity", SILENT["apart"])

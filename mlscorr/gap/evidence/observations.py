@@ -277,8 +277,8 @@ class Observations(Columns):
         """
         if not rows.metric.any():
             raise ValueError(
-                f"None of {len(rows)} rows has a residual in m: roughness and return rate alone "
-                "can't say what is wrong. Survey targets, or give a [scene] reference."
+                f"None of {len(rows)} residuals is in m: roughness and return rate alone can't "
+                "identify an error. Survey targets, or set scene.reference in survey.toml."
             )
         leg = np.flatnonzero(_affordable(rows)[background.row])
         leg = leg[np.argsort(background.gps_time[leg], kind="stable")]

@@ -40,7 +40,7 @@ NAMES = {  # name and unit of a number of a split
 CHANNELS = {
     "target": "on the targets",
     "surface": "on the reference surface",
-    "shared": "on planes that two passes share",
+    "shared": "on planes scanned in two passes",
 }
 DEGREES = ("incidence", "scan_angle", "turn_rate")
 AXES = ("E", "N", "H")

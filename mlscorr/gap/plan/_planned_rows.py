@@ -35,8 +35,8 @@ def planned_rows(survey: Survey) -> Rows:
     """
     if survey.mounting is None:
         raise SurveyFileError(
-            f"{survey.path} has no [mounting]: without it nobody knows where the scanner looks. "
-            "Give lever_arm and boresight as they are planned."
+            f"{survey.path} has no [mounting], so the directions of the beams are unknown. Set "
+            "lever_arm and boresight as planned."
         )
     targets = survey.surveyed
     parts = [_targets(survey, targets)]
@@ -46,16 +46,15 @@ def planned_rows(survey: Survey) -> Rows:
     if not parts and not len(targets) and survey.reference is None:
         is_named = any(file.what == "control" for file in survey.inputs)
         raise (ValueError if is_named else SurveyFileError)(
-            f"{survey.path} names no target and no [scene] reference, so there is nothing to plan "
-            "with. Give [control] with the points as they are planned."
+            f"{survey.path} has neither targets nor a [scene] reference, so there is nothing to "
+            "plan with. Add [control] with the points as planned."
         )
     if not parts:
         raise ValueError(
-            f"None of {len(targets)} targets will come within "
-            f"{SETTINGS.farthest_target:.0f} m before the scanner on this "
-            f"trajectory, and {'the' if survey.reference else 'no'} [scene] "
-            f"reference {'is out of its sight' if survey.reference else 'is given'}. Are "
-            "control and trajectory in the same CRS?"
+            f"None of {len(targets)} targets comes within {SETTINGS.farthest_target:.0f} m of "
+            f"the scanner on this trajectory, and {'the' if survey.reference else 'no'} [scene] "
+            f"reference {'is out of sight' if survey.reference else 'is given'}. Check that "
+            "control and trajectory are in the same CRS."
         )
     return Rows.concatenate(parts)
 

@@ -55,11 +55,13 @@ def additions(rows: Rows, survey: Survey) -> dict[str, tuple[Rows, Survey]]:
         items = np.unique(rows.item[targets])
         count = min(SETTINGS.stop_targets, len(items))
         near = items[np.linspace(0, len(items) - 1, count).astype(int)]
-        stop = f"a stop of {SETTINGS.pass_interval:.0f} s beside {len(near)} targets"
+        stop = f"a stop of {SETTINGS.pass_interval:.0f} s next to {len(near)} targets"
         far_targets = _more_targets(rows, survey, items, SETTINGS.factor)
         made |= {
-            "as many targets again, between the others": _more_targets(rows, survey, items),
-            "as many targets again, at twice the distance": far_targets,
+            "twice as many targets, the new ones between the others": _more_targets(
+                rows, survey, items
+            ),
+            "twice as many targets, the new ones at twice the distance": far_targets,
             stop: _stop(rows, survey, near),
         }
     return made
@@ -99,10 +101,10 @@ def next_data(
         if before - after >= SETTINGS.smallest_fall:
             end = "."
             if after > INFERENCE.same:
-                end = ", which is still one class."
+                end = ", which is still not separable."
             why = (
-                f"{lowered(titles(names))}: squared correlation falls from {before:.2f} to "
-                f"{after:.2f}{end}"
+                f"the squared correlation of {lowered(titles(names))} decreases from "
+                f"{before:.2f} to {after:.2f}{end}"
             )
             data.append(NextData(name, why, before, after))
     return tuple(sorted(data, key=lambda planned: planned.after or 0.0))

@@ -383,9 +383,10 @@ def _elsewhere(survey, patches, mesh, origin):
         what = "in another CRS or place"
     limit = float(np.median(gate(survey, patches.gps_time)))
     return (
-        f"Of {len(patches)} flat patches of the cloud hardly any lies within {limit:.2f} m of the "
-        f"reference surface {survey.reference}: it is {distance:.1f} m away in the median "
-        f"({up:+.1f} m in height), so it seems to be {what}. Give it in the cloud's coordinates."
+        f"Hardly any of {len(patches)} flat patches of the cloud is within {limit:.2f} m of the "
+        f"reference surface {survey.reference}: the median distance is {distance:.1f} m "
+        f"({up:+.1f} m in height). It seems to be {what}; give it in the coordinates of the "
+        "cloud."
     )
 
 

@@ -37,9 +37,9 @@ class AbsentRun:
     def lead(self) -> str:
         """Description of the run in words."""
         return (
-            f"stretch from {self.gps_time[0]:.1f} to {self.gps_time[-1]:.1f} s in which the "
-            f"{len(self.distinct)} surveyed targets {', '.join(self.distinct)} were within sight "
-            "and none could be matched"
+            f"interval from {self.gps_time[0]:.1f} to {self.gps_time[-1]:.1f} s in which the "
+            f"{len(self.distinct)} surveyed targets {', '.join(self.distinct)} were in range and "
+            "none could be matched"
         )
 
     def document(self) -> dict:
@@ -88,7 +88,7 @@ class Absence:
     def warnings(self) -> tuple[str, ...]:
         """Return a sentence on each run, with all reasons."""
         return tuple(
-            f"No residual tells of the {run.lead}: "
+            f"No residual describes the {run.lead}: "
             + " ".join(
                 f"{name} ({time:.1f} s): {reason}"
                 for name, time, reason in zip(run.name, run.gps_time, run.reason, strict=True)

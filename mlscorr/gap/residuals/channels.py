@@ -107,8 +107,8 @@ def beside_seen_noise(rows: Rows) -> tuple[Rows, tuple[str, ...]]:
         believed=np.where(rough, rows.believed * np.exp(offset), rows.believed),
     )
     return quiet, (
-        f"Flat surfaces scatter {np.exp(-offset / 2):.1f} times less than the simulator makes "
-        "them: its range or angle noise is too large. Noise was looked for beyond what they show.",
+        f"Flat surfaces scatter {np.exp(-offset / 2):.1f} times less than simulated: the range "
+        "or angle noise of the simulator is too large. Only noise beyond this was tested.",
     )
 
 

@@ -30,7 +30,8 @@ from mlscorr.targets import SETTINGS as TARGETS
 from mlscorr.targets import Candidates
 
 NO_INTENSITY = (
-    "Intensity is not compared: neither survey.toml nor a reference surface says what to expect."
+    "Intensity is not compared: neither survey.toml nor a reference surface states the expected "
+    "values."
 )
 
 
@@ -113,13 +114,13 @@ def build_rows(
     if patches is not None:
         parts += _patch_rows(survey, patches, limit, correction, notes)
     else:
-        notes.append("The cloud holds no flat patch: surfaces and channels say nothing.")
+        notes.append("The cloud has no flat patch: surfaces and channels are not compared.")
     rows = Rows.concatenate(parts)
     if len(rows) == 0:
         raise ValueError(
             f"There is nothing to compare: {len(matched)} targets were matched, none of them a "
-            "control point, and the cloud holds no flat patch that was seen twice or that the "
-            "reference surface has. Survey targets, or give a [scene] reference."
+            "control point, and no flat patch was scanned twice or is on the reference surface. "
+            "Survey targets, or set scene.reference."
         )
     return Pairing(rows, check, tuple(notes))
 
@@ -220,11 +221,11 @@ def _patch_rows(survey, patches, limit, correction, notes):
     rng = np.random.default_rng(0)
     shared = shared_rows(survey, patches, rng, limit, correction)
     if shared is None:
-        notes.append("No plane was seen twice: passes are not compared with each other.")
+        notes.append("No plane was scanned twice: passes are not compared with each other.")
     else:
         parts.append(shared)
     if survey.reference is None:
-        notes.append("No [scene] reference is given: surfaces are not compared with it.")
+        notes.append("No [scene] reference is given: surfaces are not compared with one.")
         patches = patches[spread(_covered(survey, patches), limit, rng)]
         surface = None
     else:
@@ -235,8 +236,8 @@ def _patch_rows(survey, patches, limit, correction, notes):
     parts.append(patch_rows(survey, patches, surface))
     if "return_rate" not in parts[-1].channel:
         notes.append(
-            "The return rate can't be told: the time stamps have no regular step, or the cloud "
-            "was thinned."
+            "The return rate is unknown: the time stamps have no regular step, or the cloud was "
+            "thinned."
         )
     return parts
 

@@ -157,15 +157,15 @@ def rows_against(
         raise ValueError(_elsewhere(survey, patches, simulated))
     number = 0 if patches is None else len(patches)
     elsewhere = (
-        f" No pulse of the same time has its point within {SETTINGS.cell:g} m of the real one: "
+        f" No simulated pulse of the same time is within {SETTINGS.cell:g} m of the real point: "
         "another clock, other beams or another place was simulated."
     )
     is_elsewhere = number > 0 and not np.isfinite(simulated.beams.xyz).any()
     is_whole = targets == len(matched) and by_beams + by_place == number
     return rows, (
-        f"Of {simulated.name}, {targets} of {len(matched)} observed targets were paired, and "
-        f"{by_beams + by_place} of {number} patches ({by_beams} by pulses of the same times, "
-        f"{by_place} by place){'.' if is_whole else '; the rest is not compared.'}"
+        f"{simulated.name}: {targets} of {len(matched)} observed targets were paired, and "
+        f"{by_beams + by_place} of {number} patches ({by_beams} by pulses of the same time, "
+        f"{by_place} by position){'.' if is_whole else '; the rest is not compared.'}"
         f"{elsewhere * is_elsewhere}{_beside(survey, simulated.matched) if targets else ''}"
     )
 
@@ -304,18 +304,18 @@ def _beside(survey, matched):
     misclosure = Matched.by_name(matched, survey.surveyed).misclosure
     middle = "/".join(f"{v:+.3f}" for v in -np.median(misclosure, axis=0))
     return (
-        f" In the median its targets stand {middle} m (E/N/H) beside where they were surveyed: of "
-        "that much a wrong datum can't be told."
+        f" Median offset of its targets from their surveyed positions: {middle} m (E/N/H). A "
+        "wrong datum of this size can't be detected."
     )
 
 
 def _elsewhere(survey, patches, simulated):
     """Sentence on clouds that do not overlap the survey."""
-    where = "holds neither a flat patch nor a matched target"
+    where = "has neither a flat patch nor a matched target"
     if patches is not None and simulated.patches is not None:
         away, _ = cKDTree(simulated.patches.centre).query(patches.centre)
-        where = f"has its surfaces {np.median(away):.1f} m away in the median"
+        where = f"has its surfaces {np.median(away):.1f} m away (median)"
     return (
-        f"Nothing of {simulated.name} can be paired with {survey.path}: it {where}. It is of "
-        "another survey or place, or in another CRS; simulate this survey's trajectory."
+        f"Nothing in {simulated.name} can be paired with {survey.path}: it {where}. It is of "
+        "another survey or place, or in another CRS; simulate the trajectory of this survey."
     )

@@ -148,7 +148,7 @@ def _tried(bench, kind, bank, rng):
     for sign in signs:
         moved = np.abs(sign.jacobian * sign.typical).max(axis=1, initial=0.0)
         if not all(np.isfinite(v).all() for v in (moved[metric], sign.variance, sign.growth)):
-            return "It makes values that are no numbers."
+            return "It gives values that are not numbers."
         size = f"At its usual size, {sign.typical[0]:g} {sign.units[0]}, it"
         if why := _too_far(bench.rows, moved, size):
             return why
@@ -182,8 +182,8 @@ def _too_far(rows: Rows, moved: np.ndarray, what: str) -> str:
     if usual <= largest:
         return ""
     return (
-        f"{what} moves points by {usual:.3g} m in the median: more than {largest:g} m no survey is "
-        "off everywhere. Is its unit right?"
+        f"{what} moves points by {usual:.3g} m (median); the limit is {largest:g} m. Check its "
+        "unit."
     )
 
 

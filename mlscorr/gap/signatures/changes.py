@@ -292,6 +292,6 @@ def check_mounting(survey: Survey, effects: Iterable[Effect]) -> None:
     for effect in effects:
         if survey.mounting is None and effect.needs_mounting():
             raise ValueError(
-                f"{effect.name} acts on the {effect.stage}, and {survey.path} has no [mounting]: "
-                "without it nobody knows the beams."
+                f"{effect.name} acts on the {effect.stage}, and {survey.path} has no [mounting], "
+                "so the beams are unknown."
             )

@@ -34,7 +34,7 @@ def as_believed(survey: Survey, simulator: Simulator) -> tuple[Survey, tuple[Eff
     effects = list(simulator.effects)
     if believed is not None and recorded is None:
         raise SurveyFileError(
-            f"The simulator knows a [mounting], and {survey.path} has none: give it there, so that "
+            f"The simulator has a [mounting] and {survey.path} has none. Add it there, so that "
             "the beams are known."
         )
     if believed is not None:

@@ -69,7 +69,7 @@ def _check_single(path, what, largest, limit, cause):
     step = float(np.spacing(np.float32(largest)))
     if step > limit:
         raise ValueError(
-            f"{path} has its {what} in single precision: at {largest:.0f} they are rounded to "
+            f"{path} stores its {what} in single precision: at {largest:.0f} they are rounded to "
             f"steps of {step:.2g}. {cause}"
         )
 
@@ -95,10 +95,10 @@ def check_precision(
         With the remaining resolution.
     """
     if "coordinates" in singles and len(xyz):
-        cause = "What is lost can't be had back: export it in double precision, or as LAS."
+        cause = "The lost digits can't be recovered: export it in double precision, or as LAS."
         _check_single(path, "coordinates (m)", np.abs(xyz).max(), SETTINGS.single_step, cause)
     if "times" in singles and len(time):
-        cause = "A vehicle moves on meanwhile: export times in double precision, or as LAS."
+        cause = "The vehicle moves within such a step: export times in double precision, or as LAS."
         _check_single(path, "times (s)", np.abs(time).max(), SETTINGS.single_time_step, cause)
 
 
@@ -116,6 +116,6 @@ def lacking_time(path: Path, fields: Collection[str], where: str, names: str) ->
         Names of time fields.
     """
     return ValueError(
-        f"{path} holds no time of its points{where}, so they cannot be placed on the trajectory. "
-        f"It has {', '.join(fields)}: export it with {names}, or as LAS with gps_time."
+        f"The points of {path} have no times{where}, so they can't be located on the trajectory. "
+        f"The file has {', '.join(fields)}: export it with {names}, or as LAS with gps_time."
     )

@@ -241,7 +241,7 @@ class _Octree:
             At least one record.
         """
         needed = int(self._counts.sum()) * self._layout.record_length
-        check_space(self._folder, needed, "to sort points into an octree beside the output.")
+        check_space(self._folder, needed, "to sort points into an octree next to the output.")
         path: list[_Node] = []  # from the root to the parent of the last part
         for key, records in self._parts(partial(self._blocks, True), _ROOT, self._counts):
             while path and (path[-1].key.level >= key.level or not path[-1].key.holds(key)):

@@ -51,7 +51,7 @@ def open_e57(path: Path) -> CloudSource:
         else:
             metadata = ""
         if not scans:
-            raise ValueError(f"{path} holds no points.")
+            raise ValueError(f"{path} has no points.")
         dropped = sorted({name for scan in scans for name in scan.fields} - FIELDS)
         limits = [scan.colour_limit for scan in scans]
         starts = {scan.starts for scan in scans}
@@ -75,8 +75,8 @@ def _opened(path) -> Iterator[Any]:
         from pye57 import libe57
     except ImportError:
         raise ValueError(
-            f"{path} is an E57 file, and pye57, which reads it, is not installed: "
-            "pip install 'mlscorr[e57]', or export it as LAZ."
+            f"{path} is an E57 file, and pye57, which reads it, is not installed: pip install "
+            "'mlscorr[e57]', or export the cloud as LAZ."
         ) from None
 
     try:
@@ -88,8 +88,8 @@ def _opened(path) -> Iterator[Any]:
     except libe57.E57Exception as error:
         cause = str(error).strip().splitlines()[0].split(" (")[0]
         raise ValueError(
-            f"{path} can't be read as E57 ({cause}): it was cut off or damaged, or is of another "
-            "kind. Copy or export it anew."
+            f"{path} can't be read as E57 ({cause}): it is truncated, damaged or of another "
+            "format. Copy or export it again."
         ) from None
 
 

@@ -56,7 +56,7 @@ def in_time_order(layout: LasLayout, new_week: float = -np.inf) -> LasLayout:
 def _in_order(layout, new_week, _state):
     """LasLayout of a file's points sorted by time."""
     path = layout.path
-    what = f"to put the points of {path} in order of time. Let TMPDIR name another disk."
+    what = f"to sort the points of {path} by time. Set TMPDIR to a folder on another disk."
     folder = Path(tempfile.mkdtemp(dir=temporary_folder()))
     check_space(folder, layout.points * layout.record_length, what)
     head = bytearray(layout.head)

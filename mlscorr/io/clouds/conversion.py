@@ -153,7 +153,7 @@ def _convert(source, target, limit):
     blocks = _first(source.blocks(size), end)
     first = next((block for block in blocks if len(block.xyz)), None)
     if first is None:
-        raise ValueError(f"{source.path} holds no valid points.")
+        raise ValueError(f"{source.path} has no valid points.")
     is_standard, taken = _time_system(source.path, first.gps_time)
     crs, crs_note = _known_crs(source.crs)
     done = progress_of(f"Reading {source.path.name}", end)
@@ -187,8 +187,8 @@ def _check_extent(path, way):
     if count := int((np.abs(way) > limit).any(axis=1).sum()):
         raise ValueError(
             f"{path} has {count} points more than {limit / 1e3:.0f} km from its first one, up to "
-            f"{np.abs(way).max() / 1e3:.0f} km: one of them may be a pulse without an echo, as at "
-            "0, 0, 0. Export it without such points, in metres."
+            f"{np.abs(way).max() / 1e3:.0f} km; one may be a pulse without echo, as at 0, 0, 0. "
+            "Export it in meters without such points."
         )
 
 
@@ -217,7 +217,7 @@ def _scale(source, size, end):
         if (count := count + len(values)) >= end:
             break
     if not np.isfinite([low, high]).all():
-        return 0.0, 1.0, "; it has no intensity, by which targets are seen"
+        return 0.0, 1.0, "; it has no intensity, which the target search needs"
     if low >= 0 and 1 < high <= LARGEST:
         return 0.0, 1.0, ""
     base = min(low, 0.0)
@@ -234,11 +234,11 @@ def _time_system(path, times):
     """
     times = times[np.isfinite(times)]
     if not len(times):
-        raise ValueError(f"{path} has points whose times are no numbers.")
+        raise ValueError(f"{path} has points whose times are not numbers.")
     if np.abs(times).max() > SETTINGS.microseconds:
         raise ValueError(
-            f"{path} has times of {np.abs(times).max():.6g}, which count milli-, micro- or "
-            "nanoseconds: export them in seconds."
+            f"{path} has times of {np.abs(times).max():.6g}, which seem to be milli-, micro- or "
+            "nanoseconds. Export them in seconds."
         )
     if not lacks_time(times).all():
         times = times[~lacks_time(times)]
@@ -254,7 +254,7 @@ def _known_crs(wkt):
     try:
         CRS.from_user_input(wkt).to_wkt("WKT1_GDAL")
     except CRSError:
-        return None, "; its coordinateMetadata is no CRS that is known"
+        return None, "; its coordinateMetadata is not a known CRS"
     return wkt, ""
 
 
@@ -265,10 +265,10 @@ def _note(source, count, limit, phrases):
     else:
         taken = f"{count} points"
     if not limit and count < source.points:
-        phrases += f"; {source.points - count} invalid points were left out"
+        phrases += f"; {source.points - count} invalid points were omitted"
     if source.dropped:
         phrases += f"; without its {', '.join(source.dropped)}"
     return (
         f"{source.path.name} was read through LAZ at {RESOLUTION * 1e3:g} mm, {taken} "
-        f"{source.parts}{phrases}. What is corrected is written as {written_name(source.path)}."
+        f"{source.parts}{phrases}. The corrected cloud is written as {written_name(source.path)}."
     )

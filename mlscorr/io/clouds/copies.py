@@ -149,7 +149,7 @@ def _time_moments(layout: LasLayout) -> np.ndarray:
         total += since.sum(), np.square(since).sum()
         count += len(since)
     if not count:
-        raise ValueError(f"{layout.cloud} has points whose times are no numbers.")
+        raise ValueError(f"{layout.cloud} has points whose times are not numbers.")
     mean, square = total / count
     about_first = square - 2.0 * first * mean + first**2
     start = origin + first + layout.time_offset

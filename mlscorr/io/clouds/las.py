@@ -207,8 +207,8 @@ def read_windows(
         times = times[is_timed]
     if len(times) < 2 or not (np.diff(times) >= 0).all():
         raise ValueError(
-            f"The points of {file.path.name} are not in order of time: where a time stands in it "
-            "is known only once all are read."
+            f"The points of {file.path.name} are not in time order, so the position of a time in "
+            "the file is known only after all are read."
         )
     done = 0
     for span in np.asarray(spans) - file.time_constant:
@@ -419,9 +419,9 @@ def _noise_sentence(flagged: int, points: int, classes: list[int]) -> str:
     if classes:
         kinds += f" or of class {' or '.join(map(str, classes))}"
     return (
-        f"{flagged} of {points} points read are flagged as noise ({kinds}). They take no part in "
-        "any measurement, and are corrected like all others; cloud.noise_classes in survey.toml "
-        "names other classes."
+        f"{flagged} of {points} points read are flagged as noise ({kinds}). They are not used "
+        "for measurements but corrected like all others; cloud.noise_classes in survey.toml "
+        "selects other classes."
     )
 
 

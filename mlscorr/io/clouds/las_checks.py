@@ -42,20 +42,21 @@ def read_layout(path: str | Path) -> LasLayout:
     """
     path = as_path(path)
     if not is_there(path):
-        raise ValueError(f"There is no file {path}. Check cloud.files in survey.toml.")
+        raise ValueError(f"{path} does not exist. Check cloud.files in survey.toml.")
     source = None
     if is_foreign(path):
         source = path
         path = converted(path).path
     size = file_state(path)[0]
     if not size:
-        raise ValueError(f"{path} is empty (0 bytes): its copying was interrupted. Copy it anew.")
+        raise ValueError(f"{path} is empty (0 bytes): copying was interrupted. Copy it again.")
     with open_file(path, is_scattered=True) as file:
         head = file.read(HEADER_SIZES[0])
         if head[:4] != b"LASF" or len(head) < HEADER_SIZES[0]:
             raise ValueError(
-                f"{path} is not a LAS or LAZ file (or .e57, .ply), or cut off: it has {size} bytes "
-                f"and begins with {head[:4]!r}; a header alone has {HEADER_SIZES[0]}, from b'LASF'."
+                f"{path} is not a LAS or LAZ file (or .e57, .ply), or it is truncated: it has "
+                f"{size} bytes and starts with {head[:4]!r}, while a LAS header has "
+                f"{HEADER_SIZES[0]} bytes and starts with b'LASF'."
             )
         start = struct.unpack_from("<I", head, 96)[0]
         if start > size:
@@ -71,13 +72,13 @@ def read_layout(path: str | Path) -> LasLayout:
 
 
 def _cut_off(path, evidence):
-    return f"{path} is cut off: {evidence}. Its writing or copying was interrupted; copy it anew."
+    return f"{path} is truncated: {evidence}. Writing or copying was interrupted; copy it again."
 
 
 def _check_header(layout):
     path, (major, minor) = layout.path, layout.version
     if major != 1 or minor >= len(HEADER_SIZES):
-        raise ValueError(f"{path} is LAS {major}.{minor}; LAS 1.0 to 1.5 can be read.")
+        raise ValueError(f"{path} is LAS {major}.{minor}; only LAS 1.0 to 1.5 can be read.")
     if not HEADER_SIZES[minor] <= layout.field("H", 94)[0] <= len(layout.head):
         raise ValueError(
             f"{path} is damaged: its header has {layout.field('H', 94)[0]} bytes and its points "
@@ -87,8 +88,8 @@ def _check_header(layout):
     known = number in supported_point_formats()
     if known and "gps_time" not in PointFormat(number).dimension_names:
         raise ValueError(
-            f"{path} has point format {number}, which holds no gps_time, so its points cannot be "
-            "placed on the trajectory. Export it in format 1, 3 or 6 to 10."
+            f"{path} has point format {number}, which has no gps_time, so its points can't be "
+            "located on the trajectory. Export it in format 1, 3 or 6 to 10."
         )
     if not known or layout.extra_bytes < 0:
         raise ValueError(
@@ -99,17 +100,17 @@ def _check_header(layout):
     if not ((numbers <= SETTINGS.largest_coordinate).all() and (layout.scale > 0).all()):
         raise ValueError(
             f"{path} is damaged: scale {layout.scale} m and offset {layout.offset} m of its "
-            f"coordinates must be numbers up to {SETTINGS.largest_coordinate:g} m, the scale above "
-            "zero. Copy the file anew."
+            f"coordinates must be numbers up to {SETTINGS.largest_coordinate:g} m, the scale "
+            "above zero. Copy the file again."
         )
     old_points = layout.field("I", 107)[0]  # LAS up to 1.3 has it, zero if unused
     if old_points not in (0, layout.points):
         raise ValueError(
-            f"{path} is damaged: its header announces {layout.points} points, and "
-            f"{old_points} where older versions have their number. Copy the file anew."
+            f"{path} is damaged: its header states {layout.points} points, and {old_points} in "
+            "the field of older versions. Copy the file again."
         )
     if layout.points == 0:
-        raise ValueError(f"{path} holds 0 points; perhaps its writing was interrupted.")
+        raise ValueError(f"{path} has 0 points; writing was probably interrupted.")
     _check_kind(layout)
 
 
@@ -119,17 +120,17 @@ def _check_kind(layout):
     number = layout.point_format
     if layout.version >= (1, 5) and number < 6:
         raise ValueError(
-            f"{path} is damaged: LAS 1.5 has point formats 6 to 10, not {number}. Export it anew."
+            f"{path} is damaged: LAS 1.5 has point formats 6 to 10, not {number}. Export it again."
         )
     if layout.has_time_offset and not layout.is_standard:
         raise ValueError(
-            f"{path} states a time offset, and times in seconds of the week, which have none "
-            "(bits 6 and 0 of its global encoding). Export it anew."
+            f"{path} states a time offset together with times in seconds of the week, which have "
+            "none (bits 6 and 0 of its global encoding). Export it again."
         )
     if layout.is_copc and number not in COPC_FORMATS:
         raise ValueError(
-            f"{path} is damaged: a COPC file has points of formats 6 to 8, not {number}. Write it "
-            "anew: pdal translate IN.copc.laz OUT.laz."
+            f"{path} is damaged: a COPC file has points of formats 6 to 8, not {number}. Write "
+            "it again: pdal translate IN.copc.laz OUT.laz."
         )
 
 
@@ -139,7 +140,7 @@ def _check_size(layout):
     end = min(layout.tail, layout.size)
     whole = (end - start) // layout.record_length
     if whole < layout.points and end == layout.size:
-        evidence = f"{whole} of the {layout.points} points that its header announces fit into"
+        evidence = f"{whole} of the {layout.points} points stated in its header fit into"
         raise ValueError(_cut_off(layout.path, f"{evidence} its {layout.size} bytes"))
     if whole != layout.points:
         raise ValueError(_other_count(layout, whole))
@@ -148,8 +149,8 @@ def _check_size(layout):
 
 def _other_count(layout, points):
     return (
-        f"{layout.path} is damaged: its header announces {layout.points} points, and {points} lie "
-        "in it. Its writing may have been interrupted; export it anew."
+        f"{layout.path} is damaged: its header states {layout.points} points, and the file has "
+        f"{points}. Writing may have been interrupted; export it again."
     )
 
 
@@ -168,9 +169,9 @@ def _check_chunks(layout, file):
     count = int.from_bytes(file.read(4), "little")
     if not 0 < count * layout.record_length <= table - start:  # a chunk starts with a plain point
         raise ValueError(
-            f"{path} is damaged: {count} LAZ chunks cannot fit into {table} bytes. Copy it anew."
+            f"{path} is damaged: {count} LAZ chunks do not fit into {table} bytes. Copy it again."
         )
-    with decoding(f"{path} is damaged: its LAZ chunks cannot be read"):
+    with decoding(f"{path} is damaged: its LAZ chunks can't be read"):
         file.seek(start)
         chunks = lazrs.read_chunk_table(file, lazrs.LazVlr(layout.laszip))
         layout.decoder(file, threads=False)
@@ -178,8 +179,8 @@ def _check_chunks(layout, file):
         chunks.pop()
     if (used := sum(length for _, length in chunks)) > table - start:
         raise ValueError(
-            f"{path} is damaged: LAZ chunks of {used} bytes do not lie in {table - start} bytes. "
-            "Copy it anew."
+            f"{path} is damaged: LAZ chunks of {used} bytes do not fit into {table - start} "
+            "bytes. Copy it again."
         )
     _check_chunk_points(layout, [points for points, _ in chunks])
     if layout.point_format >= 6:  # layered chunks state their number after the first point
@@ -201,13 +202,13 @@ def _check_chunk_points(layout, points):
     whole = sum(points)
     longest = max(points)
     if whole < layout.points:
-        evidence = f"its LAZ chunks hold at most {whole} of the {layout.points} points"
-        raise ValueError(_cut_off(path, f"{evidence} that its header announces"))
+        evidence = f"its LAZ chunks have at most {whole} of the {layout.points} points"
+        raise ValueError(_cut_off(path, f"{evidence} that its header states"))
     if longest > SETTINGS.largest_chunk:
         raise ValueError(
             f"{path} is compressed in chunks of {longest} points (limit "
-            f"{SETTINGS.largest_chunk}), which do not fit into memory. Compress it anew: "
-            "pdal translate IN.laz OUT.laz."
+            f"{SETTINGS.largest_chunk}), which do not fit into memory. Compress it again: pdal "
+            "translate IN.laz OUT.laz."
         )
     if whole - points[-1] >= layout.points:
         raise ValueError(_other_count(layout, f"more than {whole - points[-1]}"))
@@ -220,15 +221,15 @@ def _check_laszip(layout):
     expected = lazrs.LazVlr.new_for_compression(layout.point_format, layout.extra_bytes)
     if int.from_bytes(data[:2], "little") == 1:
         raise ValueError(
-            f"{path} is compressed point by point (LASzip's compressor 1, before "
-            "2011), without the chunks that lazrs reads. Compress it anew: laszip -i IN.laz -o "
-            "OUT.laz, or pdal translate IN.laz OUT.laz."
+            f"{path} is compressed point by point (LASzip's compressor 1, before 2011), without "
+            "the chunks that lazrs reads. Compress it again: laszip -i IN.laz -o OUT.laz, or "
+            "pdal translate IN.laz OUT.laz."
         )
     items, known = (_items(vlr) for vlr in (data, bytes(expected.record_data())))
     if items != known:
         raise ValueError(
-            f"{path} is damaged: its LASzip VLR describes other points than format "
-            f"{layout.point_format} with {layout.record_length} bytes a point. Copy it anew."
+            f"{path} is damaged: its LASzip VLR does not describe points of format "
+            f"{layout.point_format} with {layout.record_length} bytes. Copy it again."
         )
 
 
@@ -245,7 +246,7 @@ def _check_tail(layout, file, points_end):
     size = layout.size
     if not points_end <= layout.tail <= size:
         raise ValueError(
-            _cut_off(path, f"data behind the points should be at byte {layout.tail} of {size}")
+            _cut_off(path, f"data after the points should be at byte {layout.tail} of {size}")
         )
     for number, (position, length) in enumerate(evlrs(layout, file)):
         if position + length > size:
@@ -296,8 +297,8 @@ def _check_hierarchy(layout: LasLayout, file: BinaryIO, chunks: Sequence[tuple[i
     info = b"".join(layout.vlr_data(*COPC))
     if len(info) != INFO.size:
         raise ValueError(
-            f"{layout.path} is damaged: its COPC info VLR has {len(info)} bytes, not {INFO.size}. "
-            "Copy the file anew."
+            f"{layout.path} is damaged: its COPC info VLR has {len(info)} bytes, not "
+            f"{INFO.size}. Copy the file again."
         )
     start, size = INFO.unpack(info)[5:7]
     entries = np.concatenate([np.empty(0, ENTRY), *_pages(layout, file, start, size, len(chunks))])
@@ -311,10 +312,10 @@ def _check_hierarchy(layout: LasLayout, file: BinaryIO, chunks: Sequence[tuple[i
     )
     if not same:
         raise ValueError(
-            f"{layout.path} is damaged: its COPC hierarchy has {len(nodes)} nodes of "
-            f"{nodes['points'].sum(dtype=np.int64)} points, its LAZ chunks are {len(chunks)} of "
-            f"{points.sum()}, and they are not the same ones. A program that knows no COPC may "
-            "have rewritten it. Write it anew: pdal translate IN.copc.laz OUT.laz."
+            f"{layout.path} is damaged: its COPC hierarchy ({len(nodes)} nodes, "
+            f"{nodes['points'].sum(dtype=np.int64)} points) does not match its LAZ chunks "
+            f"({len(chunks)}, {points.sum()} points). A program without COPC support may have "
+            "rewritten it. Write it again: pdal translate IN.copc.laz OUT.laz."
         )
 
 
@@ -326,14 +327,14 @@ def _pages(layout, file, start, size, chunks) -> Iterator[np.ndarray]:
         start, size = pages.pop()
         if start + size > layout.size:
             raise ValueError(
-                f"{layout.path} is cut off: its COPC hierarchy should reach to byte "
-                f"{start + size} of {layout.size}. Its writing or copying was interrupted; copy it "
-                "anew."
+                f"{layout.path} is truncated: its COPC hierarchy should extend to byte "
+                f"{start + size} of {layout.size}. Writing or copying was interrupted; copy it "
+                "again."
             )
         if size <= 0 or size % ENTRY.itemsize:
             raise ValueError(
-                f"{layout.path} is damaged: {size} bytes are no page of a COPC hierarchy. Copy it "
-                "anew."
+                f"{layout.path} is damaged: {size} bytes are not a page of a COPC hierarchy. "
+                "Copy it again."
             )
         file.seek(start)
         entries = np.frombuffer(file.read(size), ENTRY)
@@ -343,7 +344,7 @@ def _pages(layout, file, start, size, chunks) -> Iterator[np.ndarray]:
             if page[0] in known or len(known) > chunks:  # a cycle of pages
                 raise ValueError(
                     f"{layout.path} is damaged: its COPC hierarchy has page {page[0]} twice, or "
-                    f"more pages than chunks ({chunks}). Copy it anew."
+                    f"more pages than chunks ({chunks}). Copy it again."
                 )
             known.add(page[0])
             pages.append(page)

@@ -134,13 +134,13 @@ def _write_points(part, file, target):
     """Write corrected points from memory as a new file; return the number of those outside."""
     if part.sigma is not None:
         raise ValueError(
-            f"{file.name} stands for points in memory, which are written without the fields of "
-            "sigmas: point_sigma() of the result gives these."
+            f"{file.name} represents points in memory, which can't be written with sigma fields. "
+            "Use point_sigma() of the result instead."
         )
     if part.added.displacement or part.added.provenance is not None:
         raise ValueError(
-            f"{file.name} stands for points in memory, which are written without displacement and "
-            "provenance. Write the points as LAS first, and read the survey from files."
+            f"{file.name} represents points in memory, which can't be written with displacement "
+            "or provenance. Write the points as LAS first, and read the survey from files."
         )
     outside = 0
     with cloud_writer(target, file.cloud.xyz[0], file.crs) as writer:
@@ -213,7 +213,7 @@ def write_parts(parts: Sequence[CorrectedPart], target: str | Path) -> list[int]
             what = "that is not a number"
         warnings.warn(
             f"{count} of {layout.points} points of {layout.path} have a gps_time {what}. They "
-            "can't be placed on the trajectory: nothing that goes by time moves them.",
+            "can't be located on the trajectory and are not corrected.",
             stacklevel=3,
         )
     return corrected.outside.tolist()
@@ -306,7 +306,7 @@ def _check_channels(layout, target, records):
     if np.ptp(channel):
         raise ValueError(
             f"{layout.path} has waveforms (point format {layout.point_format}) of "
-            f"{len(np.unique(channel))} scanner channels, which lazrs does not compress without "
+            f"{len(np.unique(channel))} scanner channels, which lazrs can't compress without "
             "loss. Use LAS for input and output, or one file for each channel."
         )
 
@@ -317,8 +317,7 @@ def _check_target(source, target):
     for path in (target, target.with_name(target.name + PART)):
         if path.exists() and not is_remote(source) and path.samefile(source):
             raise ValueError(
-                f"The corrected file {path} is the input itself, which would be lost. Choose "
-                "another output folder."
+                f"The corrected file {path} would replace the input. Choose another output folder."
             )
 
 
@@ -374,14 +373,14 @@ def _with_fields(layout, additions):
     if twice := sorted({field.name.decode(errors="replace") for field in fields} & set(new)):
         kinds = "sigmas" if twice[0] in SIGMAS else "displacements"
         raise ValueError(
-            f"The points of {layout.path} have the field {twice[0]} already. Correct the file as "
-            f"it was recorded, or do so without {kinds}."
+            f"The points of {layout.path} already have the field {twice[0]}. Correct the file as "
+            f"recorded, or omit {kinds}."
         )
     nameless = layout.extra_bytes - sum(field.dtype().itemsize for field in fields)
     if nameless < 0:
         raise ValueError(
             f"{layout.path} is damaged: it describes {layout.extra_bytes - nameless} extra bytes "
-            f"a point, and its points have {layout.extra_bytes}."
+            f"per point, and its points have {layout.extra_bytes}."
         )
     longest = np.iinfo(np.uint8).max  # bytes that a descriptor of raw bytes can cover
     for number, start in enumerate(range(0, nameless, longest)):

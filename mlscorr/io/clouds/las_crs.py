@@ -95,7 +95,7 @@ def crs_conflict(layout: LasLayout, crs: str, source: str = "crs of survey.toml"
         return ""
     return (
         f"The VLRs of {layout.cloud.name} state {crs_name(stated)}, {source} is "
-        f"{crs_name(survey_crs)}: {what}. Set crs to that of the cloud, or bring the cloud into it."
+        f"{crs_name(survey_crs)}: {what}. Set crs to that of the cloud, or transform the cloud."
     )
 
 
@@ -105,7 +105,7 @@ def _other_units(layout, stated):
     units = [FEET[keys[key]] for key in UNITS_OF_LENGTH if keys.get(key) in FEET]
     units += [axis.unit_name for axis in stated.axis_info if axis.unit_name != "metre"]
     if units:
-        return f"the cloud is in {units[0]}, and a correction needs metres"
+        return f"the cloud is in {units[0]}, and mlscorr needs meters"
     return ""
 
 
@@ -126,8 +126,8 @@ def _other_place(layout, stated, survey_crs):
     else:
         length = f"{apart:.2f} m"
     if not np.isfinite(apart):
-        return "one has no place for the cloud's middle"
-    return f"by the two the cloud's middle lies in places {length} apart"
+        return "the center of the cloud is outside one of them"
+    return f"they place the center of the cloud {length} apart"
 
 
 def _other_heights(stated, survey_crs):
@@ -141,7 +141,7 @@ def _other_heights(stated, survey_crs):
         same = first.name == second.name
     if same:
         return ""
-    return "heights are of two systems"
+    return "the height systems differ"
 
 
 def cloud_box(layout: LasLayout) -> np.ndarray:

@@ -220,7 +220,7 @@ class LasLayout:
                 end += VLR_HEADER.unpack_from(self.head, position)[2]
             if end > len(self.head):
                 raise ValueError(
-                    f"{self.path} is damaged: it announces {count} VLRs in its header, but only "
+                    f"{self.path} is damaged: its header states {count} VLRs, but only "
                     f"{len(bounds)} fit before the points at byte {len(self.head)}."
                 )
             bounds.append((position, end))
@@ -323,8 +323,8 @@ class LasLayout:
         starts = [(a + VLR_HEADER.size, b) for a, b in self.vlrs if self.owner(a)[0] == LASZIP]
         if not starts:
             raise ValueError(
-                f"{self.path} is damaged: its points are compressed, and no LASzip VLR says how. "
-                "Copy the file anew."
+                f"{self.path} is damaged: its points are compressed, but there is no LASzip VLR. "
+                "Copy the file again."
             )
         return self.head[slice(*starts[0])]
 
@@ -418,7 +418,7 @@ def decoding_points(layout: LasLayout, first: int, end: int) -> AbstractContextM
         points = f"Points {first} to {end - 1}"
     else:
         points = f"Point {first}"
-    return decoding(f"{points} of {layout.points} in {layout.path} cannot be decoded")
+    return decoding(f"{points} of {layout.points} in {layout.path} can't be decoded")
 
 
 @contextmanager
@@ -441,7 +441,7 @@ def decoding(message: str) -> Iterator[None]:
         if not isinstance(error, lazrs.LazrsError) and type(error).__name__ != "PanicException":
             raise
         raise ValueError(
-            f"{message} ({error}). The file is cut off or damaged; copy it anew."
+            f"{message} ({error}). The file is truncated or damaged; copy it again."
         ) from error
 
 

@@ -83,7 +83,7 @@ def cloud_writer(
                 writer = CloudWriter(las)
                 yield writer
                 if writer.points == 0:
-                    raise ValueError(f"{path.name} would hold no points.")
+                    raise ValueError(f"{path.name} would have no points.")
             stream.flush()
             os.fsync(stream.fileno())
     except lazrs.LazrsError as error:
@@ -163,8 +163,8 @@ def _check(xyz, header):
     distance = float(np.abs(xyz - header.offsets).max())
     if distance / scale > INTEGER_LIMIT:
         raise ValueError(
-            f"A point lies {distance:.0f} m from the cloud's corner; at a scale of {scale} m a "
-            f"LAS file holds {INTEGER_LIMIT * scale:.0f} m. Choose a coarser scale."
+            f"A point is {distance:.0f} m from the corner of the cloud; at a scale of {scale} m "
+            f"a LAS file can store {INTEGER_LIMIT * scale:.0f} m. Choose a coarser scale."
         )
 
 

@@ -111,7 +111,7 @@ class _Vertices:
                 try:
                     rows = np.loadtxt(islice(file, count), self.kind, comments=None, ndmin=1)
                 except ValueError as error:
-                    raise ValueError(f"{self.path}, behind point {start}: {error}") from None
+                    raise ValueError(f"{self.path}, after point {start}: {error}") from None
                 if len(rows) < count:
                     raise ValueError(_cut_off(self.path, start + len(rows), self.points))
                 yield rows
@@ -122,7 +122,7 @@ def _header(path) -> _Vertices:
     with path.open("rb") as file:
         head = file.read(1 << 16).split(b"end_header", 1)
         if not head[0].startswith(b"ply") or len(head) < 2:
-            raise ValueError(f"{path} is no PLY: it has no header from ply to end_header.")
+            raise ValueError(f"{path} is not a PLY file: it has no header from ply to end_header.")
         start = len(head[0]) + len(b"end_header\n")
         if head[1].startswith(b"\r\n"):
             start += 1
@@ -137,8 +137,8 @@ def _header(path) -> _Vertices:
     is_plain = all(len(line) == 3 and line[1] in KINDS for line in rows)
     if form not in ORDERS or not count.isdigit() or int(count) == 0 or not rows or not is_plain:
         raise ValueError(
-            f"{path} is a PLY without points of plain numbers in its first element, vertex. Export "
-            "the cloud as a binary PLY with x, y, z and gps_time as double, or as LAS."
+            f"{path} is a PLY whose first element is not vertex with plain numbers. Export the "
+            "cloud as a binary PLY with x, y, z and gps_time as double, or as LAS."
         )
     kind = np.dtype([(line[2], ORDERS[form] + KINDS[line[1]]) for line in rows])
     vertices = _Vertices(path, start, int(count), form == "ascii", kind)
@@ -151,7 +151,10 @@ def _header(path) -> _Vertices:
 
 
 def _cut_off(path, there, announced):
-    return f"{path} is cut off: it holds {there} of its header's {announced} points. Copy it anew."
+    return (
+        f"{path} is truncated: it has {there} of the {announced} points stated in its header. "
+        "Copy it again."
+    )
 
 
 def _intensities(vertices, intensity, size) -> Iterator[np.ndarray]:

@@ -98,13 +98,13 @@ def check_unchanged(inputs: Sequence[InputFile]) -> None:
     if changed:
         file = changed[0]
         state = _state(changed[0].path)
-        size = "it is gone"
+        size = "it was removed"
         if any(state):
-            size = f"{state[0]} bytes now, {file.state[0]} then"
+            size = f"{state[0]} bytes now, {file.state[0]} before"
         raise OSError(
-            f"{len(changed)} of {len(inputs)} input files were replaced or changed since they were "
-            f"read (first: the {file.what} {file.path}, {size}): another program may still be "
-            "writing. Nothing was written; run again when all files are whole."
+            f"{len(changed)} of {len(inputs)} input files changed after they were read (first: "
+            f"the {file.what} {file.path}, {size}); another program may still be writing. "
+            "Nothing was written. Run again when the files are complete."
         )
 
 

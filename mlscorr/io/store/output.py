@@ -55,18 +55,19 @@ def check_output(
     """
     if is_remote(out):
         raise ValueError(
-            f"{out} is a URL, and these results go to a folder of a disk. Those of a project.toml "
-            'may go to a store, and two lines make one: [[drive]] and survey = "survey.toml".'
+            f"{out} is a URL, but these results need a folder on a disk. Results of a "
+            "project.toml can go to a store, and two lines make one: [[drive]] and survey = "
+            '"survey.toml".'
         )
     out = Path(out)
     for path in (out, *out.parents):
         if path.is_symlink() and not path.exists():
             raise ValueError(
-                f"{path} is a link to {os.readlink(path)}, which does not exist. Make that folder, "
-                "or choose another name."
+                f"{path} is a link to {os.readlink(path)}, which does not exist. Create that "
+                "folder, or choose another name."
             )
     if out.exists() and not out.is_dir():
-        raise ValueError(f"{out} is a file; the results need a folder. Choose another name.")
+        raise ValueError(f"{out} is a file, but the results need a folder. Choose another name.")
     files = [Path(path) for path in inputs if not is_remote(path)]
     # a link to an input counts at both ends
     places = [(path.resolve().parent, path.parent.resolve()) for path in files]
@@ -106,11 +107,11 @@ def _place(out):
     except OSError as error:
         if out.is_dir() and os.access(out, os.W_OK):
             return out.resolve()
-        lacks = "used" if out.is_dir() else "made"
+        lacks = "used" if out.is_dir() else "created"
         if probe.exists():
-            refusal = f"{out} takes no folder (not writable)"
+            refusal = f"{out} is not writable"
         else:
-            refusal = f"{above} takes no folder ({error.strerror})"
+            refusal = f"no folder can be created in {above} ({error.strerror})"
         raise OSError(
             f"the output folder {out} can't be {lacks}: {refusal}. Choose another place."
         ) from None
@@ -217,8 +218,9 @@ def _finish(part, out, overwrite):
             raise
     if not overwrite and (present := _entries(out)):
         raise FileExistsError(
-            f"another run wrote {len(present)} entries into {out} meanwhile (first: {present[0]}). "
-            "They were left as they are, and nothing of this run was kept. Choose another folder."
+            f"another run wrote {len(present)} entries into {out} in the meantime (first: "
+            f"{present[0]}). They were not changed, and nothing of this run was kept. Choose "
+            "another folder."
         )
     if is_inside:
         _move_into(out, part)
@@ -234,7 +236,7 @@ def _take_along(out: Path, part: Path) -> None:
         is_folder = path.is_dir() and not path.is_symlink()
         if os.path.lexists(twin):
             if is_folder != twin.is_dir():
-                raise IsADirectoryError(f"{path} is a folder, where a file belongs.")
+                raise IsADirectoryError(f"{path} is a folder, but a file is needed there.")
         elif is_folder:
             twin.mkdir()
         else:
@@ -267,7 +269,7 @@ def _move_into(out: Path, part: Path) -> None:
                 (out / file).parent.mkdir()
                 made.append(file.parent)
             if (out / file).is_dir():
-                raise IsADirectoryError(f"{out / file} is a folder, where a file belongs.")
+                raise IsADirectoryError(f"{out / file} is a folder, but a file is needed there.")
             if (out / file).exists():
                 (replaced / file).parent.mkdir(exist_ok=True)
                 os.replace(out / file, replaced / file)

@@ -118,7 +118,7 @@ def check_store_output(
     """
     if cast(Any, out).protocol in WEB:
         raise ValueError(
-            f"{out} is of a web server, which takes no results: name a store or a disk."
+            f"{out} is on a web server, which can't store results. Give a store or a disk."
         )
     present = names_in(out)
     own = {out: Path(), **{out / name: Path(name) for name in folders}}
@@ -144,14 +144,14 @@ def check_contents(out: Path, held: Sequence[str], present: Sequence[str]) -> No
     """
     if held:
         raise ValueError(
-            f"The output folder {out} holds the input {held[0]}, which must stay as it is. "
+            f"The output folder {out} contains the input {held[0]}, which must not be changed. "
             "Choose another folder."
         )
     if present:
         raise ValueError(
-            f"The output folder {out} holds {counted(len(present), 'entry')} already (first: "
-            f"{present[0]}). Choose another folder, or allow with --overwrite that files of the "
-            "same name are replaced."
+            f"The output folder {out} already contains {counted(len(present), 'entry')} (first: "
+            f"{present[0]}). Choose another folder, or replace files of the same name with "
+            "--overwrite."
         )
 
 
@@ -279,8 +279,8 @@ def _wait_for_end(lock, beat):
             return
         if now != first:
             raise ValueError(
-                f"Another run is at work in {lock.parent.parent} ({now.splitlines()[0]}): wait for "
-                "its end, or end it first. mlscorr status tells how far it has come."
+                f"Another run is active in {lock.parent.parent} ({now.splitlines()[0]}). Wait "
+                "until it ends, or stop it first; mlscorr status shows its progress."
             )
 
 

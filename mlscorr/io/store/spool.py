@@ -173,7 +173,7 @@ class NpzWriter:
         file, none = self._growing[name]
         if (rows.dtype, rows.shape[1:]) != (none.dtype, none.shape[1:]):
             raise ValueError(
-                f"Rows of {rows.dtype} {rows.shape[1:]} don't fit those of {none.dtype} "
+                f"Rows of {rows.dtype} {rows.shape[1:]} do not match the rows of {none.dtype} "
                 f"{none.shape[1:]} before them."
             )
         file.write(rows.data)
@@ -215,7 +215,7 @@ def check_space(folder: Path, needed: int, what: str) -> None:
     free = shutil.disk_usage(folder).free
     if free < needed:
         raise OSError(
-            f"{folder} has {free / 1e9:.1f} GB free of {needed / 1e9:.1f} GB that are needed {what}"
+            f"{folder} has {free / 1e9:.1f} GB free; {needed / 1e9:.1f} GB are needed {what}"
         )
 
 
@@ -238,7 +238,7 @@ def telling_space(folder: Path) -> Iterator[None]:
             raise
         free = shutil.disk_usage(folder).free / 1e6
         raise OSError(
-            f"{error.strerror}: the disk of {folder} has {free:.1f} MB free. Corrected clouds take "
-            "as much as those they are made of (mlscorr check tells how much). Make room, and "
-            "--resume goes on."
+            f"{error.strerror}: the disk of {folder} has {free:.1f} MB free. Corrected clouds "
+            "need as much space as the input clouds (mlscorr check states how much). Free some "
+            "space and continue with --resume."
         ) from error

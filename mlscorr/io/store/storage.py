@@ -79,19 +79,19 @@ def as_path(name: str | Path) -> Path:
         from upath import UPath
     except ImportError:
         raise ImportError(
-            f"{name} is a URL, which needs fsspec and universal_pathlib: {EXTRA}"
+            f"{name} is a URL, which requires fsspec and universal_pathlib: {EXTRA}"
         ) from None
     try:
         get_filesystem_class(scheme)
     except ImportError as error:
         raise ImportError(
-            f"{name} can't be read, as the package for {scheme}:// is missing ({error}): {EXTRA} "
-            "has those of s3:// and https://, pip install gcsfs or adlfs that of gs:// or az://"
+            f"{name} can't be read: the package for {scheme}:// is missing ({error}). {EXTRA} "
+            "installs s3:// and https://, pip install gcsfs or adlfs installs gs:// or az://"
         ) from None
     except ValueError:
         raise ValueError(
             f"{name} has the unknown scheme {scheme}://; known are s3://, gs://, az://, https:// "
-            "and what else fsspec has a package for."
+            "and other fsspec packages."
         ) from None
     path = UPath(name)
     if scheme in ("file", "local"):
@@ -225,13 +225,13 @@ def asking(path: Any) -> Iterator[None]:
             raise FileNotFoundError(f"{path} does not exist.") from error
         if isinstance(error, PermissionError) or "Credentials" in type(error).__name__:
             raise PermissionError(
-                f"{path} may not be reached ({text}). Are the credentials in the environment, as "
-                "the store's own tools read them, and in that of the workers? A public one in S3 "
-                "needs none: FSSPEC_S3_ANON=true."
+                f"Access to {path} was denied ({text}). Check the credentials in the "
+                "environment, also of the workers. Public data in S3 needs none: "
+                "FSSPEC_S3_ANON=true."
             ) from error
         raise OSError(
-            f"{path} can't be reached ({text}), also when tried again: the network, the endpoint "
-            "or the store itself. Run again when it answers; of a project --resume goes on."
+            f"{path} can't be reached, even after retries ({text}). Check the network, the "
+            "endpoint and the store, and run again; continue a project with --resume."
         ) from error
 
 
@@ -304,7 +304,10 @@ class _Ranges(io.RawIOBase):
             how = {"block_size": block_size, "cache_type": "blockcache"}
             self._path, self._file = path, path.fs.open(path.path, "rb", **how)
         if not self._file.seekable():
-            raise OSError(f"{path} can't be read by ranges: its server has none. Copy it first.")
+            raise OSError(
+                f"{path} can't be read in parts, because its server does not support "
+                "byte ranges. Download it first."
+            )
 
     def readable(self):
         return True
@@ -400,7 +403,7 @@ def files_like(folder: Path, pattern: str) -> list[Path]:
     path: Any = as_path(pattern) if is_url(pattern) else resolved(folder / pattern)
     if path.protocol in WEB:
         raise ValueError(
-            f"{path} is a pattern of a web server, which lists nothing: name each file."
+            f"{path} is a pattern on a web server, which can't list files. Name each file."
         )
     with asking(path):
         path.fs.invalidate_cache()

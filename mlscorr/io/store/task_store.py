@@ -258,8 +258,8 @@ class TaskStore:
                     fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 raise ValueError(
-                    f"Another run is at work in {self.folder.parent}: wait for its end, or end it "
-                    "first. mlscorr status tells how far it has come."
+                    f"Another run is active in {self.folder.parent}. Wait until it ends, or stop "
+                    "it first; mlscorr status shows its progress."
                 ) from None
             for folder in self.folder.glob("part.*"):
                 remove(folder)

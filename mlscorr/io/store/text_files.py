@@ -137,7 +137,7 @@ def warn_of_cut(path: str | Path) -> None:
         last = file.read()
     if last not in (b"", b"\n", b"\r"):
         warnings.warn(
-            f"The last line of {path} has no end: the file of {size} bytes may have been cut off "
-            "there, within a number too. Compare it with its source.",
+            f"The last line of {path} has no line end: the file of {size} bytes may be "
+            "truncated, even within a number. Compare it with its source.",
             stacklevel=3,
         )

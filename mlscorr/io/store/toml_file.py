@@ -74,17 +74,18 @@ def read_toml(path: str | Path, model: type[Model], kind: str) -> Model:
         document = tomllib.loads(read_bytes(path).decode(ENCODING))
     except UnicodeDecodeError:
         raise ValueError(
-            f"{path} is not a text file in UTF-8; a TOML file is expected. Save it in UTF-8, or "
-            "let `mlscorr init FOLDER` write that of a survey."
+            f"{path} is not a TOML file in UTF-8. Save it in UTF-8, or create a new one with "
+            "`mlscorr init FOLDER`."
         ) from None
     except tomllib.TOMLDecodeError as error:
         raise ValueError(
-            f"{path} is not valid TOML: {error}. Text and paths stand in quotation marks, paths "
-            "with / for each backslash, and decimals have points."
+            f"{path} is not valid TOML: {error}. Put text and paths in quotation marks, write / "
+            "instead of backslashes in paths, and use decimal points."
         ) from None
     except (RecursionError, ValueError):
         raise ValueError(
-            f"{path} can't be read: brackets are nested too deep, or a number has too many digits."
+            f"{path} can't be read: brackets are nested too deeply, or a number has too many "
+            "digits."
         ) from None
     _check_answered(path, document)
     validated = validate(str(path), document, model)
@@ -133,10 +134,12 @@ def _sentence(item, model):
         near = nearest(name, keys)
         tail = name.rpartition(".")[2]
         if "." in name and tail in keys and not _sections(model.model_fields[tail].annotation):
-            return f"{shown(key)} is an unknown key; {tail} stands above the first [section]."
+            return f"{shown(key)} is an unknown key; {tail} belongs above the first [section]."
         if near == name:
             section = name.split(".")[0]
-            return f"{key} is a key of one of several: write [[{section}]], not [{section}]."
+            return (
+                f"{key} belongs to one of several sections: write [[{section}]], not [{section}]."
+            )
         if near is None:  # nothing similar: the keys of the same section
             path = name.rpartition(".")[0]
             known = [k.rpartition(".")[2] for k in keys if k.rpartition(".")[0] == path]
@@ -155,7 +158,7 @@ def _sentence(item, model):
     message = re.sub(r"valid dictionary or instance of \w+", "section, in brackets", message)
     message = re.sub("(Input|List|Tuple) should", "it should", message)
     message = message.replace(" after validation", "")
-    return f"{key} = {shown(repr(item['input']))} can't be used: {message[0].lower()}{message[1:]}."
+    return f"{key} = {shown(repr(item['input']))} is invalid: {message[0].lower()}{message[1:]}."
 
 
 def _keys(model, prefix=""):
@@ -270,7 +273,7 @@ def _check_answered(path: Path, document: Mapping[str, Any]) -> None:
         number = counted(len(keys), "open place")
         raise SurveyFileError(
             f'{path} has {number}: {", ".join(keys)}. Replace each "{MARK}" with the value; the '
-            "comment behind it names what is possible."
+            "comment after it lists the choices."
         )
 
 

@@ -28,9 +28,9 @@ def check_area(crs: CRS, trajectory: Trajectory) -> None:
     longitude, latitude = map_of(crs)(east, north, inverse=True)
     if not np.isfinite([longitude, latitude]).all():
         raise ValueError(
-            f"The trajectory (E {east:.0f}, N {north:.0f} m) lies nowhere on the map of "
-            f"{crs_name(crs)}. Does a zone's number stand in front of its eastings? "
-            "Take it off clouds, trajectory and control, or give the crs that has it: EPSG:4647."
+            f"The trajectory (E {east:.0f}, N {north:.0f} m) is outside the map of "
+            f"{crs_name(crs)}. If its eastings have a zone prefix, remove it from clouds, "
+            "trajectory and control, or set the crs with that prefix: EPSG:4647."
         )
     # deg, by which zones are used beyond their edges
     area = crs.area_of_use
@@ -41,10 +41,10 @@ def check_area(crs: CRS, trajectory: Trajectory) -> None:
     ):
         return
     warnings.warn(
-        f"The trajectory (E {east:.0f}, N {north:.0f} m) lies at longitude {longitude:.2f}, "
-        f"latitude {latitude:.2f} deg by {crs_name(crs)}, which was made for "
-        f"{area.west:g} to {area.east:g} and {area.south:g} to {area.north:g} deg: crs in "
-        "survey.toml may be of another zone, or easting and northing exchanged.",
+        f"By {crs_name(crs)}, the trajectory (E {east:.0f}, N {north:.0f} m) is at longitude "
+        f"{longitude:.2f}, latitude {latitude:.2f} deg, outside its area of {area.west:g} to "
+        f"{area.east:g} and {area.south:g} to {area.north:g} deg. Possibly crs in survey.toml is "
+        "of another zone, or easting and northing are swapped.",
         stacklevel=3,
     )
 
@@ -66,9 +66,9 @@ def check_scale(crs: CRS, trajectory: Trajectory) -> None:
     scale = map_of(crs).get_factors(longitude, latitude).meridional_scale
     if 0.005 < abs(scale - 1) < np.inf:  # 5 mm of a lever arm of 1 m; the limit of zones near UTM's
         warnings.warn(
-            f"A metre on the ground is {scale:.3f} m on the map of {crs_name(crs)} "
-            "at the trajectory, and lever arm, ranges and target sizes are metres on the ground: "
-            "bring trajectory, cloud and control into the UTM zone or a national grid.",
+            f"The scale of {crs_name(crs)} at the trajectory is {scale:.3f}, but lever arm, "
+            "ranges and target sizes are in meters on the ground. Transform trajectory, cloud "
+            "and control to the UTM zone or a national grid.",
             stacklevel=3,
         )
 
@@ -91,10 +91,11 @@ def describe_projection(crs: str) -> tuple[str, str, str]:
     else:
         heights = "The trajectory's ellipsoidal heights were kept."
     return (
-        f"The trajectory's latitude and longitude are taken as {projected.geodetic_crs.name}, "
-        f"the datum of {projected.name}; nothing in an SBET says otherwise.",
+        "The trajectory's latitudes and longitudes are assumed to be in "
+        f"{projected.geodetic_crs.name}, the datum of {projected.name}; an SBET does not state "
+        "its datum.",
         heights,
-        "Headings were turned from the platform to grid north: minus wander angle, "
+        "Headings were converted from platform heading to grid heading: minus wander angle, "
         "minus meridian convergence.",
     )
 
@@ -128,9 +129,10 @@ def _check_datum(crs, trajectory):
     east, north = to_map.transform(*map_of(crs)(*place, inverse=True)) - place
     if 5 < np.hypot(east, north) < np.inf:  # m; plates and realizations cause less
         warnings.warn(
-            f"The trajectory's latitudes and longitudes are taken as {crs.geodetic_crs.name}, the "
-            f"datum of {crs.name}; as those of GNSS (WGS 84, ETRS89) they would lie {east:+.0f} m "
-            f"east and {north:+.0f} m north of there. If they are these, export the trajectory in "
-            f"{crs.name}, as a table of eastings and northings.",
+            "The trajectory's latitudes and longitudes are assumed to be in "
+            f"{crs.geodetic_crs.name}, the datum of {crs.name}. If they are GNSS coordinates "
+            f"(WGS 84, ETRS89), they would be shifted by {east:+.0f} m E and {north:+.0f} m N. "
+            f"In that case, export the trajectory in {crs.name}, as a table of eastings and "
+            "northings.",
             stacklevel=3,
         )

@@ -41,7 +41,7 @@ OTHER_WORKBOOKS = (".xls", ".ods")
 TRAJECTORIES = (".sbet", ".trj", ".tum", POF_SUFFIX, ".pofx", POSITION_SUFFIX)
 RECORDS = (".out", ".smrmsg", ".bin")
 RESULTS = ("report.json", "calibration.json", "targets.json", "ties.json")
-SIMULATED = "a simulated survey, which is one by itself"
+SIMULATED = "a simulated survey of its own"
 LEFT_OUT = {"truth.json": SIMULATED, **dict.fromkeys(RESULTS, "results of a run")}
 
 
@@ -104,8 +104,8 @@ def _role(path) -> FileRole:
     if suffix in RECORDS:
         return next(_records(path), FileRole(path, "none", "no whole records of SBET or smrmsg"))
     if suffix in OTHER_WORKBOOKS:
-        return FileRole(path, "table", "a workbook that is read once it is saved as .xlsx")
-    return FileRole(path, "none", "nothing that a survey.toml names")
+        return FileRole(path, "table", "a workbook, readable once saved as .xlsx")
+    return FileRole(path, "none", "not a file that survey.toml uses")
 
 
 def _cloud(path):
@@ -128,7 +128,7 @@ def _records(path) -> Iterator[FileRole]:
     if not size % (8 * len(SMRMSG_FIELDS)) and _is_timed(path, SMRMSG_FIELDS, np.inf):
         yield FileRole(path, "accuracy", "whole smrmsg records with increasing times")
     if size > 2 * sbet and _is_timed(path, SBET_FIELDS, 2 * np.pi):  # its reader reports the rest
-        yield FileRole(path, "trajectory", "SBET records with increasing times, cut off")
+        yield FileRole(path, "trajectory", "truncated SBET records with increasing times")
 
 
 def _is_timed(path, fields, limit):
@@ -149,9 +149,9 @@ def _table(path) -> tuple[Role, str]:
     if is_oriented or ("gps_time" in driven and position_file(path)):  # its reader names the gap
         return "trajectory", f"columns {', '.join(sorted(driven))}"
     if find_layout(path, {}, lambda _: ["gps_time"], {}, tum_columns) is not None:
-        return "trajectory", "rows of eight numbers, as time, place and quaternion"
+        return "trajectory", "rows of eight numbers, such as time, position and quaternion"
     if find_layout(path, {}, lambda _: ["gps_time"], {}, _unnamed_epoch) is not None:
-        return "table", "rows of numbers without names of columns, as of a trajectory"
+        return "table", "rows of numbers without column names, as in a trajectory"
     header = likely_header(path, CONTROL_NAMES)
     surveyed = set(find_meanings(header, CONTROL_NAMES))
     if "name" in surveyed and ({"easting", "northing"} <= surveyed or {"x", "y"} <= surveyed):
@@ -163,7 +163,7 @@ def _table(path) -> tuple[Role, str]:
         return "control", str(error)
     if len(header) > 1 and (len(driven | surveyed) > 1 or path.suffix.lower() == ".csv"):
         return "table", f"its columns are {listed(header, SETTINGS.named_columns)}"
-    return "none", "no table of places"
+    return "none", "not a table of coordinates"
 
 
 def _unnamed_epoch(cells):

@@ -54,7 +54,8 @@ def own_clouds(
         named = [cloud for cloud in clouds if resolved(cloud.path) in there]
         if not named:
             raise SurveyFileError(
-                f"{key} of {path}: {pattern}{owner} is none of the {len(clouds)} files of [cloud]."
+                f"{key} of {path}: {pattern}{owner} is not among the {len(clouds)} files of "
+                "[cloud]."
             )
         own += named
     return own
@@ -117,18 +118,18 @@ def check_belongings(
         if not outside.any():
             continue
         sentence = (
-            f"{outside.sum()} of {belongs.sum()} points sampled from {cloud.path.name} lie outside "
-            f"{' and '.join(names)}, to which {path.name} says they belong (first: "
+            f"{outside.sum()} of {belongs.sum()} points sampled from {cloud.path.name} are "
+            f"outside {' and '.join(names)}, to which {path.name} assigns them (first: "
             f"{times[np.argmax(outside)]:.3f} s)"
         )
         if outside.sum() > (1 - SETTINGS.covered_share) * belongs.sum():
             raise SurveyFileError(
-                f"{sentence}: another trajectory is theirs, or it is of another time system. "
-                "Correct files or point_source_ids under [[trajectory]], or leave them out: the "
-                "time of a point tells its trajectory."
+                f"{sentence}. They belong to another trajectory or time system. Correct files or "
+                "point_source_ids under [[trajectory]], or omit them to assign points by time."
             )
         warnings.warn(
-            f"{sentence}: the trajectory that covers their times is taken, where one does.",
+            f"{sentence}. The trajectory that covers their times is used instead, where there is "
+            "one.",
             stacklevel=3,
         )
 
@@ -190,9 +191,9 @@ def _measured(path, sections, clouds):
     ]
     if wrong:
         raise SurveyFileError(
-            f"{len(wrong)} of the {len(clouds)} files of [cloud] in {path} are not of exactly one "
-            f"[[scanner]]: {', '.join(wrong)}. Name each in the files of the one that wrote it, or "
-            "the point_source_ids of each scanner in it."
+            f"{len(wrong)} of the {len(clouds)} files of [cloud] in {path} do not belong to "
+            f"exactly one [[scanner]]: {', '.join(wrong)}. List each file under its scanner, or "
+            "give the point_source_ids of each scanner in it."
         )
     measured = {name: [] for name, _ in sections}
     for cloud, own in claims.items():
@@ -217,16 +218,16 @@ def _parts(path, cloud, own):
     if doubled:
         owners = [name for name, numbers in own.items() if doubled[0] in numbers]
         raise SurveyFileError(
-            f"point_source_id {doubled[0]} of {cloud.path.name} is of scanners "
-            f"{' and '.join(owners)} in {path}: each point is of one."
+            f"point_source_id {doubled[0]} of {cloud.path.name} is assigned to scanners "
+            f"{' and '.join(owners)} in {path}. Assign it to one."
         )
     counts = count_sources(read_layout(cloud.path))
     other = np.setdiff1d(np.flatnonzero(counts), ids)
     if len(other):
         raise SurveyFileError(
             f"{counts[other].sum()} of the {cloud.points} points of {cloud.path.name} have a "
-            f"point_source_id that no [[scanner]] of {path} names ({_listed(other)}; those named "
-            f"are {_listed(ids)}). Add each to the scanner that measured these points."
+            f"point_source_id that no [[scanner]] of {path} lists ({_listed(other)}; listed are "
+            f"{_listed(ids)}). Add each to the scanner that measured these points."
         )
     parts = [
         (name, replace(cloud, points=int(n), point_source_ids=tuple(sorted(set(numbers)))))

@@ -77,11 +77,12 @@ class DriveSection(TomlSection):
         given = [name for name in own if getattr(self, name) is not None]
         if self.survey is not None and given:
             raise ValueError(
-                f"a drive is a survey.toml or has {given[0]} of its own, not both: say it there"
+                f"a drive has either a survey.toml or its own {given[0]}, not both. Move it into "
+                "survey.toml"
             )
         if self.survey is None and (self.files is None or self.trajectory is None):
             raise ValueError(
-                "give a drive its survey (a survey.toml), or files and [drive.trajectory]"
+                "a drive needs survey (a survey.toml), or files and [drive.trajectory]"
             )
         return self
 
@@ -98,13 +99,13 @@ class ProjectFile(survey_sections.CommonSections):
         count = Counter(map(str.casefold, names))
         if doubled := [name for name, number in count.items() if number > 1]:
             raise ValueError(
-                f"the {len(names)} [[drive]] need names of their own, as each is a folder of the "
-                f"results: {len(doubled)} in use twice or more (first: {doubled[0]})"
+                f"the {len(names)} [[drive]] need unique names, because each is a result folder: "
+                f"{len(doubled)} names are repeated (first: {doubled[0]})"
             )
         if wrong := [n for n in names if n.casefold() in RESERVED or not FOLDER_NAME.fullmatch(n)]:
             raise ValueError(
-                f"{len(wrong)} of the {len(names)} drives have a name that can't be a folder of "
-                f"the results (first: {wrong[0]!r})"
+                f"{len(wrong)} of the {len(names)} drives have a name that can't be a folder "
+                f"name (first: {wrong[0]!r})"
             )
         return self
 
@@ -319,8 +320,8 @@ def _stated(path, settings, name, section):
             own = whole.control.file
             if settings.control is None:
                 raise ValueError(
-                    f"{toml} has a [control] of its own ({own}), and {path} none: a project has "
-                    "one list for all drives. Name it there."
+                    f"{toml} has its own [control] ({own}), and {path} has none. A project has "
+                    "one list for all drives: add it to the project file."
                 )
             notes = (f"Control points are those of the project, not {own}.",)
         given |= {"control": None, "name": name, "crs": whole.crs or settings.crs}
@@ -336,9 +337,9 @@ def _ids(path, name, section, settings):
         return None
     if isinstance(settings.scanner, list) and any(s.point_source_ids for s in settings.scanner):
         raise ValueError(
-            f"point_source_ids of drive {name} in {path} tell its points, and those of its "
-            "[[scanner]] which scanner measured them: an id can't tell both. Write the points of "
-            "each scanner, or of each drive, into files of their own."
+            f"The point_source_ids of drive {name} in {path} identify its points and those of "
+            "its [[scanner]] the scanner; one id can't do both. Write the points of each "
+            "scanner, or of each drive, to separate files."
         )
     return tuple(sorted(set(ids)))
 
@@ -354,31 +355,33 @@ def _check_tiles(path, settings, drives):
         if len(set(ids)) < len(ids) or any(drive.ids is None for drive in both):
             raise ValueError(
                 f"{copy}, of drive {owners[copy][0].name}, is a copy of {first}, of drive "
-                f"{owners[first][0].name}: all of its points would count twice. Leave it out of "
+                f"{owners[first][0].name}, so all its points would count twice. Remove it from "
                 f"the [[drive]] of {path} whose trajectory does not cover it."
             )
     shared = {file: own for file, own in owners.items() if len(own) > 1}
     if doubtful := [file for file, own in shared.items() if any(d.ids is None for d in own)]:
         names = " and ".join(drive.name for drive in shared[doubtful[0]])
         raise ValueError(
-            f"{len(doubtful)} of {len(owners)} cloud files of {path} are of two drives (first: "
-            f"{doubtful[0]}, of {names}), and nothing tells whose their points are. Name each in "
-            "one [[drive]], or give each drive its point_source_ids."
+            f"{len(doubtful)} of {len(owners)} cloud files of {path} belong to two drives "
+            f"(first: {doubtful[0]}, of {names}). List each in one [[drive]], or give each drive "
+            "its point_source_ids."
         )
     for file, own in shared.items():
         number, count = Counter(number for drive in own for number in drive.ids).most_common(1)[0]
         if count > 1:
             names = " and ".join(drive.name for drive in own if number in drive.ids)
             raise ValueError(
-                f"point_source_id {number} of {file} is of {names} in {path}: a point is of one."
+                f"point_source_id {number} of {file} is assigned to {names} in {path}. Assign it "
+                "to one drive."
             )
     if shared:
         check_distinct(path, [*shared])
     named = [f for name in settings.cloud.files or () for f in matching(path, "cloud.files", name)]
     if orphans := [file for file in named if resolved(file) not in owners]:
         raise ValueError(
-            f"{len(orphans)} of {len(named)} files under [cloud] in {path} are of no drive (first: "
-            f"{orphans[0]}). Name them in files of the [[drive]] whose trajectory covers them."
+            f"{len(orphans)} of {len(named)} files under [cloud] in {path} belong to no drive "
+            f"(first: {orphans[0]}). List them in files of the [[drive]] whose trajectory covers "
+            "them."
         )
 
 
@@ -387,9 +390,10 @@ def _check_crs_alike(path, settings, drives):
     crs = settings.crs or drives[0].settings.crs
     if other := [drive for drive in drives if drive.settings.crs != crs]:
         raise ValueError(
-            f"{len(other)} of {len(drives)} drives of {path} are in another CRS than the project, "
-            f"{crs} (first: {other[0].name}, {other[0].settings.crs}). Bring their clouds into one "
-            "CRS, and say it in their survey.toml: an SBET is projected into it by itself."
+            f"{len(other)} of {len(drives)} drives of {path} are in another CRS than the "
+            f"project, {crs} (first: {other[0].name}, {other[0].settings.crs}). Transform their "
+            "clouds to one CRS and set it in their survey.toml; an SBET is projected "
+            "automatically."
         )
 
 
@@ -402,8 +406,8 @@ def _with_beliefs(path, drives):
         unlike = [d.name for d, own in zip(stated, values, strict=True) if own != values[0]]
         if unlike:
             raise ValueError(
-                f"[{what}] of {unlike[0]} is not that of {stated[0].name}, and drives of a project "
-                f"share it: say under [{what}] in {path} what holds for all {len(drives)}."
+                f"[{what}] differs between {unlike[0]} and {stated[0].name}, but all "
+                f"{len(drives)} drives of a project share it. Set [{what}] in {path}."
             )
         if values:
             beliefs[what] = values[0]

@@ -36,7 +36,9 @@ def simulated_survey(path: Path | str, survey: Survey) -> Survey:
     if survey.crs is not None:
         for cloud in clouds:
             if conflict := crs_conflict(read_layout(cloud), survey.crs):
-                raise ValueError(f"Bring the simulated clouds into the survey's CRS. {conflict}")
+                raise ValueError(
+                    f"Transform the simulated clouds to the CRS of the survey. {conflict}"
+                )
     with warnings.catch_warnings(action="ignore"):  # of the CRS, which agrees
         try:
             given = survey.trajectory, "auto", survey.crs, None, survey.clouds[0].noise_classes
@@ -57,21 +59,21 @@ def _clouds_of(path, survey):
         _check_trajectory(simulated, survey)
         return simulated.cloud_paths
     if not path.exists():
-        raise FileNotFoundError(f"{path} does not exist; give the simulated clouds, or a folder.")
+        raise FileNotFoundError(
+            f"{path} does not exist. Give the simulated clouds or their folder."
+        )
     files = [path] if path.is_file() else sorted(path.iterdir())
     clouds = [file for file in files if file.suffix.lower() in SUFFIXES]
     if not clouds:
-        raise FileNotFoundError(
-            f"{path} holds no LAS or LAZ file and no {FILE_NAME}: nothing was simulated there."
-        )
+        raise FileNotFoundError(f"{path} contains no LAS or LAZ file and no {FILE_NAME}.")
     return clouds
 
 
 def _check_crs(simulated, survey):
     if None not in (simulated.crs, survey.crs) and simulated.crs != survey.crs:
         raise ValueError(
-            f"{simulated.path} is in {simulated.crs}, {survey.path} in {survey.crs}: simulate in "
-            "the survey's CRS."
+            f"{simulated.path} is in {simulated.crs}, {survey.path} in {survey.crs}. Simulate in "
+            "the CRS of the survey."
         )
 
 
@@ -84,13 +86,13 @@ def _check_trajectory(simulated, survey):
         start, end = other.gps_time[[0, -1]]
         first, last = recorded.gps_time[[0, -1]]
         raise ValueError(
-            f"{simulated.path} simulates another survey: its trajectory runs from {start:.1f} to "
-            f"{end:.1f} s, that of {survey.path} from {first:.1f} to {last:.1f} s."
+            f"{simulated.path} is a simulation of another survey: its trajectory covers "
+            f"{start:.1f} to {end:.1f} s, that of {survey.path} {first:.1f} to {last:.1f} s."
         )
     apart = other.at(inside).position - recorded.at(inside).position
     distance = float(np.median(np.linalg.norm(apart, axis=1)))
     if distance > NEAREST:
         raise ValueError(
-            f"{simulated.path} simulates another survey, or is in another CRS: its trajectory lies "
-            f"{distance:.1f} m from that of {survey.path} in the median."
+            f"{simulated.path} is a simulation of another survey, or in another CRS: the median "
+            f"distance of its trajectory from that of {survey.path} is {distance:.1f} m."
         )

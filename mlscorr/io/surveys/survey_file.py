@@ -52,8 +52,8 @@ from mlscorr.survey import (
 
 FILE_NAME = "survey.toml"
 UNKNOWN_POS = (
-    f"Nothing says how well the POS is known: {Pos.position_sigma} m over "
-    f"{Pos.correlation_time:.0f} s are assumed. Give the trajectory's sigmas, or [pos]."
+    f"The accuracy of the POS is not given: {Pos.position_sigma} m with a correlation time of "
+    f"{Pos.correlation_time:.0f} s are assumed. Add sigmas to the trajectory, or set [pos]."
 )
 
 
@@ -302,8 +302,8 @@ def survey_toml(path: str | Path) -> Path:
         path = path / FILE_NAME
     if not is_there(path):
         raise FileNotFoundError(
-            f"{path} does not exist; a survey is a folder with {FILE_NAME}, "
-            "which mlscorr init makes."
+            f"{path} does not exist. A survey is a folder with {FILE_NAME}; mlscorr init creates "
+            "one."
         )
     return path
 
@@ -345,8 +345,8 @@ def cloud_file(
     file = CloudFile(path, layout.points, layout.time_offset, "", ids, noise_classes=noise_classes)
     if layout.scale.max() > 0.002:  # m, half of the accuracy of a scanner's ranges
         warnings.warn(
-            f"The coordinates of {path.name} are in steps of {layout.scale.max():g} m: neither "
-            "targets nor corrected points are better than that. Export the cloud in steps of "
+            f"The coordinates of {path.name} have a resolution of {layout.scale.max():g} m, "
+            "which limits targets and corrected points. Export the cloud with a resolution of "
             "0.001 m.",
             stacklevel=2,
         )
@@ -369,7 +369,7 @@ def cloud_file(
     )
     taken = ""
     if layout.time_offset:
-        taken = f"; written less {ADJUSTMENT + layout.time_offset:.0f} s, as its header states"
+        taken = f"; stored minus {ADJUSTMENT + layout.time_offset:.0f} s, as stated in its header"
     return file, f"gps_time of {path.name}: {match}{taken}."
 
 
@@ -412,8 +412,8 @@ def _scaled(points, section, crs):
     if section.scale_factor == "ground":
         if crs is None:
             raise SurveyFileError(
-                'scale_factor = "ground" under [control] takes the scale of the map, and '
-                "survey.toml has no crs: add it, or give scale_factor as a number."
+                'scale_factor = "ground" under [control] needs the map scale, and survey.toml '
+                "has no crs. Add it, or give scale_factor as a number."
             )
         ground = map_factors(crs, middle)
         factor = ground.combined

@@ -144,12 +144,12 @@ def matching(path: Path, key: str, name: str) -> list[Path]:
         matches = [file for file in matches if file.parent not in results]
         if results:
             warnings.warn(
-                f"{key} of {path}: {name} leaves out results of an earlier run in "
+                f"{key} of {path}: {name} excludes results of an earlier run in "
                 f"{', '.join(sorted(map(str, results)))}.",
                 stacklevel=2,
             )
     if not matches:
-        raise FileNotFoundError(f"{key} of {path}: no file is like {there}.")
+        raise FileNotFoundError(f"{key} of {path}: no file matches {there}.")
     return matches
 
 
@@ -191,13 +191,13 @@ def existing(path: Path, key: str, name: str) -> Path:
 def _lack(there):
     """Explain why there is no file with a name, and suggest another."""
     if is_folder(there):
-        return "is a folder: name a file in it, or its clouds by a pattern, as FOLDER/*.laz"
+        return "is a folder: give a file in it, or its clouds as a pattern, such as FOLDER/*.laz"
     others = []
     if not is_remote(there) and there.parent.is_dir():
         others = os.listdir(there.parent)
     near = nearest(there.name, others)
     if near:
-        return f"does not exist; the nearest there is {near}"
+        return f"does not exist; the nearest existing name is {near}"
     return "does not exist"
 
 
@@ -219,7 +219,7 @@ def check_distinct(path: Path, clouds: list[Path], key: str = "cloud.files") -> 
     places = [str(resolved(cloud)) for cloud in clouds]
     place, count = Counter(places).most_common(1)[0]
     if count > 1:
-        raise ValueError(f"{key} of {path} names the file {place} ({count} times). Name it once.")
+        raise ValueError(f"{key} of {path} lists the file {place} {count} times. List it once.")
     if copies := find_copies(clouds):
         raise ValueError(_copies_sentence(path, key, copies))
     written = [written_name(cloud).casefold() for cloud in clouds]
@@ -227,20 +227,20 @@ def check_distinct(path: Path, clouds: list[Path], key: str = "cloud.files") -> 
     if count > 1:
         homonyms = {place for place, own in zip(places, written, strict=True) if own == name}
         raise ValueError(
-            f"{key} of {path} has files whose results would have the same name: {name} ({count} "
-            f"times): {', '.join(sorted(homonyms)[:4])}. Rename one."
+            f"{key} of {path} has {count} files whose results would have the same name, {name}: "
+            f"{', '.join(sorted(homonyms)[:4])}. Rename them."
         )
 
 
 def _copies_sentence(path: Path, key: str, copies: dict[Path, Path]) -> str:
     """Sentence on clouds with the points of others, and on which to remove."""
     limit = SETTINGS.named_faults
-    pairs = [f"{copy}, which is a copy of {first}" for copy, first in list(copies.items())[:limit]]
+    pairs = [f"{copy}, a copy of {first}" for copy, first in list(copies.items())[:limit]]
     surplus = len(copies) - len(pairs)
     more = f"; and {surplus} more" if surplus else ""
     pronoun = "it" if len(copies) == 1 else "them"
     return (
-        f"{key} of {path} names {counted(len(copies), 'copy')} of other clouds (the same number, "
-        f"bounds and times of points): {'; '.join(pairs)}{more}. Remove {pronoun} from {key}: each "
-        "point would count twice, as a pass of its own."
+        f"{key} of {path} lists {counted(len(copies), 'copy')} of other clouds (same number, "
+        f"bounds and times of points): {'; '.join(pairs)}{more}. Remove {pronoun} from {key}: "
+        "each point would count twice, as a separate pass."
     )

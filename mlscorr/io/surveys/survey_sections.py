@@ -59,11 +59,14 @@ class CalibratedMountingSection(MountingSection):
     def _can_be(self) -> Self:
         if self.correlation is not None:
             if self.lever_arm_sigma is None or self.boresight_sigma is None:
-                raise ValueError("correlation needs both, lever_arm_sigma and boresight_sigma")
+                raise ValueError("correlation needs both lever_arm_sigma and boresight_sigma")
             matrix = np.array(self.correlation)
             rounding = 0.5e-6 * len(matrix)  # of an eigenvalue with six decimals
             if not np.array_equal(matrix, matrix.T) or np.linalg.eigvalsh(matrix)[0] < -rounding:
-                raise ValueError("correlation is no correlation matrix: lopsided, or impossible")
+                raise ValueError(
+                    "correlation is not a correlation matrix: it is not symmetric "
+                    "or not positive semidefinite"
+                )
         return self
 
     def mounting(self) -> Mounting:
@@ -119,8 +122,8 @@ class MountedScannerSection(ScannerSection):
     def _has_points(self) -> Self:
         if self.files is None and self.point_source_ids is None:
             raise ValueError(
-                "files is missing: name those that the scanner wrote, or its point_source_ids in "
-                "files with the points of several"
+                "files is missing: list the files of the scanner, or its point_source_ids if "
+                "files contain points of several"
             )
         return self
 
@@ -222,13 +225,13 @@ class PlannedSurveyFile(CommonSections):
         names = [name for name, _ in self.scanners]
         if names and self.mounting is not None:
             raise ValueError(
-                "[mounting] is that of one scanner; with [[scanner]] each has its own, written "
-                "[scanner.mounting] below it"
+                "[mounting] applies to a single scanner; with several, give each its own "
+                "[scanner.mounting] below its [[scanner]]"
             )
         if len(names) > len(set(names)):
             raise ValueError(
-                f"the {len(names)} [[scanner]] need names of their own, and these are "
-                f"{', '.join(names)} (without a name it is the number)"
+                f"the {len(names)} [[scanner]] need unique names, and these are "
+                f"{', '.join(names)} (the number is used if there is no name)"
             )
         return self
 

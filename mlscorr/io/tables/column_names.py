@@ -188,7 +188,7 @@ class OfficeWord(NamedTuple):
             kinds = ", ".join(WORDS["kind"])
             roles = " or ".join(WORDS["role"])
             raise ValueError(
-                f"'{shown(text)}' is no meaning of a word: give a kind ({kinds}) and its size in "
+                f"'{shown(text)}' is not a valid meaning: give a kind ({kinds}) and its size in "
                 f'm, as "circle 0.6", or a role ({roles})'
             )
         return cls(column, meant(column, word), number)
@@ -237,7 +237,7 @@ class PlaceColumns(TomlSection):
     @model_validator(mode="after")
     def _are_of_one_kind(self) -> Self:
         if len({type(column) for column in self.chosen.values()}) > 1:
-            raise ValueError("give names of columns or numbers of columns, not both")
+            raise ValueError("give names or numbers of columns, not both")
         return self
 
     @property

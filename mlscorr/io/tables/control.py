@@ -44,8 +44,8 @@ from mlscorr.io.tables.layout_search import read_layout
 from mlscorr.io.tables.table_rows import SUFFIX, read_rows
 from mlscorr.survey import AXES, ControlPoints, Trajectory
 
-_OWN_WORDS = "Say under [control] words in survey.toml what an office's own words mean."
-_AMBIGUOUS = {"cp": " It is short for control point and for check point alike: write gcp or check."}
+_OWN_WORDS = "Define the list's own words under [control] words in survey.toml."
+_AMBIGUOUS = {"cp": " It may mean control point or check point: write gcp or check."}
 COLUMNS = ("name", *AXES, *SIGMAS, "kind", "size", "role")
 _ROLES = tuple(WORDS["role"])
 _SEXAGESIMAL = re.compile(r"-?\d{1,3}[°: ]\s*\d{1,2}['′: ]")  # degrees and minutes
@@ -175,7 +175,7 @@ def _values(layout, lines, meanings):
         if word is not None and word.size is not None:
             size = row.setdefault("size", word.size)
             if size != word.size:
-                what = f"has the size {size:g} m, and the word for its kind means {word.size:g} m."
+                what = f"has the size {size:g} m, but its kind implies {word.size:g} m."
                 faults.append((line, what))
         rows.append(row)
     return rows, faults
@@ -261,7 +261,7 @@ def _refuse(
     if number > 1:
         sentences = [f"{path} has {number} faults.", *sentences[:limit]]
     if number > limit:
-        sentences.append(f"And {number - limit} more like these.")
+        sentences.append(f"And {number - limit} more of this kind.")
     if places:
         sentences.append(_OWN_WORDS)
     if sentences:
@@ -274,7 +274,7 @@ def _doubled_names(path, rows):
     doubled = [name for name, number in count.items() if number > 1 and name]
     if doubled:
         names = shown(", ".join(doubled))
-        yield path, f"names {names} more than once; every point needs a name of its own."
+        yield path, f"lists {names} more than once; every point needs its own name."
 
 
 def _row_faults(row):
@@ -284,7 +284,7 @@ def _row_faults(row):
         if row[key] not in words:
             hint = _AMBIGUOUS.get(row[key], "")
             if key == "kind" and (near := nearest(row[key], words)):  # roles are similar
-                hint = f" Is {near} meant?{hint}"
+                hint = f" Did you mean {near}?{hint}"
             yield f"has the unknown {key} '{shown(row[key])}'; known are {_known(words)}.{hint}"
     if not smallest <= row["size"] <= largest:
         yield (
@@ -294,8 +294,8 @@ def _row_faults(row):
     for key in AXES:
         if abs(row[key]) > SETTINGS.largest_coordinate:
             yield (
-                f"has the {key} {row[key]:g} m, beyond {SETTINGS.largest_coordinate:g} m: "
-                "no map reaches that far (millimetres?)."
+                f"has the {key} {row[key]:g} m, beyond {SETTINGS.largest_coordinate:g} m, the "
+                "largest on any map (millimeters?)."
             )
     for key in SIGMAS:
         if row[key] <= 0:
@@ -315,14 +315,14 @@ def _known(words):
 def _likely_unit(size):
     """Likely unit of a size that cannot be in meters."""
     if size <= 0:
-        return "a diameter or edge is positive."
+        return "it must be positive."
     smallest, largest = SETTINGS.target_size
-    sizes = {"centimetres": size / 100, "millimetres": size / 1000}
+    sizes = {"centimeters": size / 100, "millimeters": size / 1000}
     usual = np.sqrt(smallest * largest)
     unit = min(sizes, key=lambda unit: abs(np.log(sizes[unit] / usual)))
     if smallest <= sizes[unit] <= largest:
         return f"{unit}? Then give {sizes[unit]:g}."
-    return "sizes are in metres; is the decimal point misplaced, or another unit meant?"
+    return "sizes are in meters; the decimal point may be misplaced or the unit wrong."
 
 
 def _row_doubts(path, rows):
@@ -332,10 +332,10 @@ def _row_doubts(path, rows):
         row, key = coarse[0]
         others = ""
         if len(coarse) > 1:
-            others = f", nor will {len(coarse) - 1} more sigmas"
+            others = f"; {len(coarse) - 1} more sigmas are as large"
         yield (
-            f"{shown(row['name'])} of {path} has the {key} {row[key]:g} m and will hardly count "
-            f"(millimetres?){others}."
+            f"{shown(row['name'])} of {path} has the {key} {row[key]:g} m and almost no weight "
+            f"(millimeters?){others}."
         )
     smallest = SETTINGS.target_size[0]  # m: two targets cannot be closer together
     near = cKDTree([[row[axis] for axis in AXES] for row in rows]).query_pairs(smallest)
@@ -343,6 +343,6 @@ def _row_doubts(path, rows):
     twice = [f"{a['name']} and {b['name']}" for a, b in pairs if a["kind"] == b["kind"]]
     if twice:
         yield (
-            f"{path} gives one place two names: {shown(', '.join(twice))}. No observation tells "
-            "them apart, so neither counts: leave one of the two out."
+            f"{path} has two names for one position: {shown(', '.join(twice))}. Observations "
+            "can't distinguish them, so neither is used: remove one of the two."
         )

@@ -26,7 +26,7 @@ from mlscorr.survey import AXES, SurveyFileError, Trajectory
 
 SIGMAS = ("sigma_horizontal", "sigma_vertical")
 NORMAL = ("normal_e", "normal_n", "normal_h")
-HINTS = {("easting", "latitude"): (" Latitude and longitude must be projected first.", ())}
+HINTS = {("easting", "latitude"): (" Project latitude and longitude first.", ())}
 _EXAMPLES = {
     **dict.fromkeys(SIGMAS, "sigma = [0.003, 0.004] (horizontal, vertical)"),
     **{"kind": 'kind = "circle"', "size": "size = 0.6"},
@@ -34,7 +34,7 @@ _EXAMPLES = {
 _PLACES = {
     **dict.fromkeys(
         SIGMAS,
-        OpenPlace(("control", "sigma"), ([0.003, 0.004],), "m, one sigma: E and N each, height"),
+        OpenPlace(("control", "sigma"), ([0.003, 0.004],), "m, 1 sigma: E and N each, height"),
     ),
     "kind": OpenPlace(("control", "kind"), tuple(WORDS["kind"]), "shape of all targets"),
     "size": OpenPlace(("control", "size"), (0.6,), "m, diameter or edge of all targets"),
@@ -153,7 +153,7 @@ def _unstated(layout, rows, missing, meanings):
     sentence = missing_sentence(layout.path, header, missing, used, CONTROL_NAMES, seeming)
     values = ", ".join(dict.fromkeys(_EXAMPLES[name] for name in missing))
     sentence += (
-        f" A value for all points may stand under [control] in survey.toml, lengths in m: {values}."
+        f" Values for all points can be set under [control] in survey.toml, lengths in m: {values}."
     )
     places = []
     if "kind" in missing and "kind" not in seeming and (column := _likely_kinds(layout, rows)):
@@ -161,8 +161,8 @@ def _unstated(layout, rows, missing, meanings):
         words = {same_word(cell): cell for cell in _cells(rows, column)}
         first_words = listed(list(words.values()), SETTINGS.named_faults)
         sentence += (
-            f" The column {shown(header[column])} holds {first_words}: name it as columns.kind, "
-            "and give each word its meaning under [control] words."
+            f" The column {shown(header[column])} contains {first_words}: set it as "
+            "columns.kind, and define each word under [control] words."
         )
         places = word_places([("kind", cell) for cell in words.values()])
     elif "kind" in layout.columns:  # its words are also unknown
@@ -275,9 +275,9 @@ def check_unused(
             column = shown(layout.header[i])
             key = ("control", "columns", name)
             raise OpenQuestion(
-                f"The column {column} of {layout.path} seems to be the {name}, for it holds "
-                f"{', '.join(sorted(cells))}: name it {name}, or say so under [control] in "
-                f"survey.toml, as columns.{name} = '{column}'.",
+                f"The column {column} of {layout.path} seems to be the {name}, because it "
+                f"contains {', '.join(sorted(cells))}. Rename it {name}, or set columns.{name} = "
+                f"'{column}' under [control] in survey.toml.",
                 [OpenPlace(key, (layout.header[i],), f"column of the {name}")],
             )
 
@@ -300,10 +300,9 @@ def role_doubts(layout: TableLayout, rows: Sequence[Sequence[str]]) -> Iterator[
         is_check = any(meant("role", word) == "check" for word in words)
         if is_check or (is_few and all(word.isalpha() for word in words)):
             yield (
-                f"The column {column} of {layout.path} is not used, and all points are control "
-                "points, though it may tell check points: it holds "
-                f"{shown(', '.join(sorted(words)))}. If so, say columns.role = '{column}' under "
-                "[control]."
+                f"The column {column} of {layout.path} is not used, so all points are control "
+                f"points, but it contains {shown(', '.join(sorted(words)))} and may identify "
+                f"check points. If so, set columns.role = '{column}' under [control]."
             )
 
 
@@ -342,7 +341,9 @@ def with_check_points(
     for pattern in patterns:
         places = [i for i, row in enumerate(rows) if fnmatchcase(row["name"], pattern)]
         if not places:
-            raise SurveyFileError(f"control.check names '{shown(pattern)}', no point of {path}.")
+            raise SurveyFileError(
+                f"control.check lists '{shown(pattern)}', but {path} has no such point."
+            )
         for i in places:
             rows[i] = rows[i] | {"role": "check"}
     return rows
@@ -393,18 +394,19 @@ def _axes_east_and_north(layout, rows, trajectory):
         return _UNNAMED_AXES[::-1]
     x, y = (layout.name_of(axis) for axis in _UNNAMED_AXES)
     places = []
-    orders = "neither order lies"
+    orders = "neither order is"
     if is_near:
-        orders = "both orders lie"
+        orders = "both orders are"
         if layout.header:
             places = [
                 OpenPlace(("control", "columns", our), (x, y), f"column of the {our}")
                 for our in AXES[:2]
             ]
     raise AxesError(
-        f"{layout.path} does not say which of {x} and {y} is easting, for X points east here and "
-        f"north there, and {orders} within {SETTINGS.near / 1e3:g} km of the trajectory. Name "
-        "them easting and northing, or say which is which under [control.columns] in survey.toml.",
+        f"{layout.path} does not state which of {x} and {y} is easting (X is east in some "
+        f"countries and north in others), and {orders} within {SETTINGS.near / 1e3:g} km of the "
+        "trajectory. Rename them easting and northing, or set them under [control.columns] in "
+        "survey.toml.",
         places,
     )
 
@@ -425,7 +427,7 @@ def sentence_on(
     """
     parts = [str(layout)]
     if has_axes:
-        parts.append(", easting and northing told by the trajectory")
+        parts.append(", easting and northing identified by the trajectory")
     values = []
     for name, value in given.items():
         if isinstance(value, str):
@@ -433,7 +435,7 @@ def sentence_on(
         else:
             values.append(f"{name} {value:g} m")
     if patterns:
-        values.append(f"but check for {shown(', '.join(patterns))}")
+        values.append(f"except check for {shown(', '.join(patterns))}")
     if values:
-        parts.append(f"; of all points: {', '.join(values)}")
+        parts.append(f"; for all points: {', '.join(values)}")
     return f"{''.join(parts)}{layout.not_used}."

@@ -130,8 +130,8 @@ def read_header(path: str | Path) -> tuple[list[str], int]:
             for number, line in enumerate(iter(lambda: file.readline(longest), ""), start=1):
                 if len(line) == longest:
                     raise ValueError(
-                        f"Line {number} of {path} has {longest} characters or more, where the "
-                        "names of columns belong: it is no table of comma-separated values."
+                        f"Line {number} of {path} has {longest} or more characters where column "
+                        "names are expected: the file is not a table of comma-separated values."
                     )
                 if line.strip():
                     return [cell.strip().strip('"').casefold() for cell in line.split(",")], number
@@ -148,8 +148,8 @@ def _own_columns(path, header, required, groups):
         if present and len(present) < len(group):
             absent = [name for name in group if name not in header]
             raise ValueError(
-                f"{path} has {', '.join(present)} but not {', '.join(absent)}: "
-                f"give all of {', '.join(group)}, or none."
+                f"{path} has {', '.join(present)} but not {', '.join(absent)}: give all of "
+                f"{', '.join(group)}, or none."
             )
         names += present
     doubled = [name for name in names if header.count(name) > 1]
@@ -197,8 +197,8 @@ def find_layout(
         positions = {name: int(number) - 1 for name, number in chosen.items()}
         if missing := lacking(positions):
             raise SurveyFileError(
-                f"{path} has numbers of columns in survey.toml, but none for {', '.join(missing)}: "
-                "number all that are needed, or none."
+                f"{path} has column numbers in survey.toml, but none for {', '.join(missing)}: "
+                "number all needed columns, or none."
             )
         unnamed = _numbered(positions)
     sheets = []
@@ -211,9 +211,7 @@ def find_layout(
             sheets.append(layout)
     if len(sheets) > 1:
         titles = ", ".join(shown(layout.sheet) for layout in sheets)
-        raise ValueError(
-            f"{path} has a table in {len(sheets)} sheets ({titles}): keep one of them."
-        )
+        raise ValueError(f"{path} has tables in {len(sheets)} sheets ({titles}). Keep only one.")
     return next(iter(sheets), None)
 
 
@@ -326,7 +324,7 @@ def _check_doubled(layout, meanings, rows, section):
             places.append(OpenPlace(key, tuple(doubled), f"column of the {name}"))
             way_out = f'choose, as {name} = "{doubled[0]}"'
         else:
-            way_out = f"number all that are needed, as {name} = {positions[0] + 1},"
+            way_out = f"number all needed columns, as {name} = {positions[0] + 1},"
         raise OpenQuestion(
             f"{layout.path} has {len(doubled)} columns that may be the {name} "
             f"({', '.join(doubled)}): {way_out} under [{section}.columns] in survey.toml.",
@@ -355,8 +353,8 @@ def _with_units_and_decimals(layout, units, rows):
         unit = units[i] if i < len(units) else None
         if unit is not None and unit not in UNITS:
             raise ValueError(
-                f"{path} has the {name} in '{unit}', where m, mm, deg, rad or s belong: "
-                "convert this column."
+                f"{path} has the {name} in '{unit}'; supported units are m, mm, deg, rad and s. "
+                "Convert this column."
             )
         if unit is not None and UNITS[unit] != 1.0:
             factors[name] = UNITS[unit]
@@ -364,12 +362,12 @@ def _with_units_and_decimals(layout, units, rows):
     cells = [row[i] for row in rows for i in places if i < len(row)]
     numbers = [cell for cell in cells if NUMBER.fullmatch(cell.replace(".", "").replace(",", ""))]
     if marked := [cell for cell in cells if _THOUSANDS.fullmatch(cell)]:
-        raise ValueError(f"{path} has thousands marks ('{shown(marked[0])}'): omit them.")
+        raise ValueError(f"{path} has thousands separators ('{shown(marked[0])}'). Remove them.")
     commas, points = ([cell for cell in numbers if mark in cell] for mark in ",.")
     if commas and points:
         raise ValueError(
             f"{path} has numbers with commas ('{shown(commas[0])}') and with points "
-            f"('{shown(points[0])}'): write decimals in one way, and leave out thousands marks."
+            f"('{shown(points[0])}'). Use one decimal separator and no thousands separators."
         )
     return replace(layout, factors=factors, decimal="," if commas else ".")
 
@@ -396,7 +394,7 @@ def _check_chosen(path: Path, missing: Collection[str], chosen: Mapping[str, str
     """Refuse columns that survey.toml names but the table does not have."""
     for name in sorted(set(missing) & set(chosen)):
         raise SurveyFileError(
-            f"{path} has no column '{chosen[name]}', which survey.toml names the {name}."
+            f"{path} has no column '{chosen[name]}', which survey.toml sets as the {name}."
         )
 
 
@@ -458,23 +456,23 @@ def missing_sentence(
             "easting = 2."
         )
     elif {"easting", "northing", "height"} <= set(missing):
-        hint = " It holds no coordinates: is another file meant?"
+        hint = " It has no coordinates; it may be the wrong file."
         if numbers == 2:
-            hint = " It seems to hold a plan without heights: each point needs its own."
+            hint = " It seems to be a plan without heights: each point needs a height."
     elif candidates:
         name = candidates[0]
         column = shown(near[candidates[0]])
         hint = (
-            f" {name} may be meant by '{column}': if so, say under [{section}] in survey.toml, as "
-            f"columns.{name} = '{column}'."
+            f" '{column}' may be the {name}: if so, set columns.{name} = '{column}' under "
+            f"[{section}] in survey.toml."
         )
     elif others:
         hint = (
-            f" If another one of these is meant, say which under [{section}] in survey.toml, as "
-            f"columns.{missing[0]} = '...'."
+            f" If one of these is meant, set columns.{missing[0]} = '...' under [{section}] in "
+            "survey.toml."
         )
     if "gps_time" in missing and "utc" in near.get("gps_time", "").casefold():
-        hint += " Times in UTC need trajectory.time_constant, too: 18 s since 2017."
+        hint += " Times in UTC also need trajectory.time_constant: 18 s since 2017."
     has = listed(header, SETTINGS.named_columns) or "no header"
     return f"{path} has no column {', '.join(missing)}; it has {has}.{hint}"
 

@@ -37,15 +37,15 @@ def check_together(path: Path, points: ControlPoints, trajectory: Trajectory) ->
         _check_order(path, points.position, trajectory, distance)
     if distance > SETTINGS.far:
         raise ValueError(
-            f"The control nearest to the trajectory lies {distance / 1e3:.1f} km from it "
-            f"(limit {SETTINGS.far / 1e3:.0f} km): {path} and the trajectory may be in different "
-            "CRS or zones. Bring both into the crs of survey.toml."
-            f"{_likely_change(points.position[:, :2], trajectory)}"
+            f"The nearest control point is {distance / 1e3:.1f} km from the trajectory (limit "
+            f"{SETTINGS.far / 1e3:.0f} km): {path} and the trajectory may be in different CRS or "
+            "zones. Transform both to the crs of "
+            f"survey.toml.{_likely_change(points.position[:, :2], trajectory)}"
         )
     if owner := _heights_in_feet(path, points.position, trajectory):
         warnings.warn(
-            f"The heights of {owner} may be in feet: only multiplied by {FOOT} are control and "
-            "trajectory at like heights. Convert them to m, or both to one system of heights.",
+            f"The heights of {owner} may be in feet: control and trajectory agree only if they "
+            f"are multiplied by {FOOT}. Convert them to m, or both to one height system.",
             stacklevel=2,
         )
 
@@ -57,16 +57,16 @@ def _check_order(path, position, trajectory, distance):
         swapped = distance_of(position[:, order[:2]], trajectory)
         if swapped >= SETTINGS.near:
             continue
-        under = [f"{AXES[i]} under {AXES[column]}" for i, column in enumerate(order)]
+        under = [f"{AXES[i]} in {AXES[column]}" for i, column in enumerate(order)]
         what = f"Columns ({', '.join(under)})"
         columns = "columns"
         if order == usual:
             what = "Easting and northing"
             columns = "two columns"
         raise ValueError(
-            f"{what} seem to be swapped in {path}: its nearest point lies {distance / 1e3:.0f} km "
-            f"from the trajectory as it stands, {swapped:.0f} m when they are exchanged. Exchange "
-            f"the {columns}, or say which is which under [control.columns] in survey.toml."
+            f"{what} seem to be swapped in {path}: its nearest point is {distance / 1e3:.0f} km "
+            f"from the trajectory, and {swapped:.0f} m when they are exchanged. Exchange the "
+            f"{columns}, or set them under [control.columns] in survey.toml."
         )
 
 
@@ -88,8 +88,8 @@ def _likely_change(position, trajectory):
     # Zone numbers precede six digits
     zone = round(float(np.median(position[:, 0] - trajectory.position[0, 0])) / 1e6)
     owners = ("these points", "the trajectory")
-    number = f"the number {abs(zone)} of a map zone taken off the eastings of {owners[zone < 0]}"
-    feet = f"multiply the coordinates by {FOOT} (by 1200/3937 where they are US survey feet)"
+    number = f"the zone number {abs(zone)} removed from the eastings of {owners[zone < 0]}"
+    feet = f"multiply the coordinates by {FOOT} (by 1200/3937 for US survey feet)"
     for what, factor, offset, remedy in (
         (number, 1.0, zone * 1e6, f"they are {abs(zone)} 000 000 m too large"),
         (f"{owners[0]} taken as feet", FOOT, 0.0, feet),
@@ -97,7 +97,7 @@ def _likely_change(position, trajectory):
     ):
         distance = distance_of(position * factor - [offset, 0], trajectory) * min(1.0, 1.0 / factor)
         if distance < SETTINGS.near:
-            return f" With {what} it is {distance:.0f} m: {remedy}."
+            return f" With {what}, the distance is {distance:.0f} m: {remedy}."
     return ""
 
 
@@ -121,14 +121,14 @@ def far_cloud(name: str, box: np.ndarray, trajectory: Trajectory) -> tuple[str, 
     apart = _box_distance(box, trajectory)
     if apart < SETTINGS.near:
         return "", False
-    sentence = f"{name} lies {apart / 1e3:.1f} km from the trajectory by its header"
+    sentence = f"{name} is {apart / 1e3:.1f} km from the trajectory, by its header"
     for change, other in (
         ("its coordinates taken as feet", box * FOOT),
         ("easting and northing exchanged", box[:, ::-1]),
     ):
         if _box_distance(other, trajectory) < SETTINGS.near:
-            return f"{sentence}, and beside it with {change}: bring both into one CRS.", True
-    return f"{sentence}: one of them may be in another CRS, or of another survey.", False
+            return f"{sentence}, but near it with {change}. Transform both to one CRS.", True
+    return f"{sentence}. It may be in another CRS, or belong to another survey.", False
 
 
 def _box_distance(box, trajectory):

@@ -160,8 +160,9 @@ def not_text(path: Path) -> str:
     path : Path
     """
     return (
-        f"{path} is not a text file in UTF-8. Save it anew as comma-separated values in UTF-8; "
-        "letters such as umlauts are the likely cause, or a workbook that is not .xlsx."
+        f"{path} is not a text file in UTF-8; it may contain letters such as umlauts in another "
+        "encoding, or be a workbook other than .xlsx. Save it as comma-separated values in "
+        "UTF-8."
     )
 
 
@@ -190,8 +191,8 @@ def read_sheets(path: str | Path) -> list[tuple[str, list[tuple[int, list[str]]]
         from openpyxl.utils.exceptions import InvalidFileException
     except ImportError:
         raise ValueError(
-            f"{path} is a workbook, and openpyxl, which reads it, is not installed: "
-            "pip install 'mlscorr[excel]', or save it as comma-separated values."
+            f"{path} is a workbook, and openpyxl, which reads it, is not installed: pip install "
+            "'mlscorr[excel]', or save it as comma-separated values."
         ) from None
 
     with warnings.catch_warnings(action="ignore"):  # of styles and rules, which are not read
@@ -199,8 +200,8 @@ def read_sheets(path: str | Path) -> list[tuple[str, list[tuple[int, list[str]]]
             book = load_workbook(path, read_only=True, data_only=True)
         except (zipfile.BadZipFile, InvalidFileException, ParseError, KeyError, ValueError):
             raise ValueError(
-                f"{path} is no workbook of Excel, or it is damaged: save it anew as .xlsx or as "
-                "comma-separated values."
+                f"{path} is not an Excel workbook, or it is damaged. Save it again as .xlsx or "
+                "as comma-separated values."
             ) from None
         sheets = []
         try:
@@ -265,12 +266,14 @@ def read_rows(layout: TableLayout, exact: bool = False) -> Iterator[tuple[str, l
         if is_strict and layout.separator != " " and 0 < width < len(cells):
             raise ValueError(_too_wide(line, len(cells), width))
         if len(cells) < least or (exact and len(cells) != width):
-            cause = "the file may be cut off, a separator may be missing, or a name may hold one"
+            cause = (
+                "the file may be truncated, a separator may be missing, or a name may contain one"
+            )
             if "latitude" in layout.columns and len(cells) > width:
                 cause = "angles may be in degrees, minutes and seconds: export decimal degrees"
             raise ValueError(
-                f"{line} has {len(cells)} columns where {width or least} belong: {cause} "
-                f"(columns are parted by {SEPARATORS[layout.separator]})."
+                f"{line} has {len(cells)} columns where {width or least} are expected: {cause} "
+                f"(columns are separated by {SEPARATORS[layout.separator]})."
             )
         yield line, cells
 
@@ -298,8 +301,8 @@ def _all_rows(layout):
             raise ValueError(not_text(layout.path)) from None
         except csv.Error as error:
             raise ValueError(
-                f"{layout.path} has a cell in line {layout.lines + reader.line_num} or behind it "
-                f"that never ends ({error}): a quotation mark may be missing."
+                f"{layout.path} has an unterminated cell in or after line "
+                f"{layout.lines + reader.line_num} ({error}): a quotation mark may be missing."
             ) from None
 
 
@@ -376,8 +379,8 @@ def _check_width(path, lines, width):
 
 def _too_wide(line, cells, width):
     return (
-        f"{line} has {cells} columns where the header has {width}: decimals must be separated by "
-        "points, not by commas, and a name with a comma stands in quotation marks."
+        f"{line} has {cells} columns where the header has {width}. Use decimal points, not "
+        "commas, and put names with a comma in quotation marks."
     )
 
 
@@ -392,10 +395,10 @@ def _first_bad(layout, converters):
                 converters.get(column, layout.number)(cell)
             except ValueError:
                 sentence = (
-                    f"{line} has '{shown(cell)}' where a number belongs (column {column + 1})."
+                    f"{line} has '{shown(cell)}' where a number is expected (column {column + 1})."
                 )
                 if _DATE.match(cell):
-                    sentence += " It seems to be a date or a time of day: give seconds."
+                    sentence += " It seems to be a date or time of day: give seconds."
                 return sentence
     return ""
 
@@ -419,7 +422,7 @@ def check_finite(path: str | Path, table: np.ndarray, row: str) -> None:
     bad = ~np.isfinite(table).all(axis=1)
     if bad.any():
         raise ValueError(
-            f"{bad.sum()} of {len(table)} {row}s of {path} hold values that are not numbers "
+            f"{bad.sum()} of {len(table)} {row}s of {path} have values that are not numbers "
             f"(first: {row} {np.argmax(bad) + 1})."
         )
 
@@ -443,6 +446,6 @@ def check_increasing(path: str | Path, gps_time: np.ndarray, row: str) -> None:
     back = np.diff(gps_time) <= 0
     if back.any():
         raise ValueError(
-            f"The times of {path} must increase: {back.sum()} {row}s do not come after the one "
+            f"The times of {path} must increase: {back.sum()} {row}s are not later than the one "
             f"before (first: {row} {np.argmax(back) + 2})."
         )

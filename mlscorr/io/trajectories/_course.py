@@ -43,7 +43,7 @@ def checked_motion(path: Path, trajectory: Trajectory) -> Trajectory:
     speed = length / np.diff(trajectory.gps_time)
     if np.ptp(trajectory.gps_time) > WEEK and speed.max() < SETTINGS.moving:
         raise ValueError(
-            f"{path} lasts {np.ptp(trajectory.gps_time) / DAY:.1f} days, and is never faster than "
+            f"{path} lasts {np.ptp(trajectory.gps_time) / DAY:.1f} days at no more than "
             f"{speed.max():.2g} m/s: its times may be in milli- or microseconds. Give seconds."
         )
     is_fast = np.concatenate([[True], speed > SETTINGS.fastest, [True]])
@@ -52,9 +52,9 @@ def checked_motion(path: Path, trajectory: Trajectory) -> Trajectory:
         worst = int(np.argmax(np.where(bad, speed, 0.0)))
         raise ValueError(
             f"{bad.sum()} of {len(bad)} steps of {path} are faster than {SETTINGS.fastest:.0f} "
-            f"m/s, which no vehicle is (fastest: {length[worst]:.1f} m at {speed[worst]:.3g} m/s, "
-            f"at {trajectory.gps_time[worst]:.3f} s): an epoch is wrong, or the units are not m "
-            "and s. Remove it, or export the trajectory anew."
+            f"m/s (fastest: {length[worst]:.1f} m at {speed[worst]:.3g} m/s, at "
+            f"{trajectory.gps_time[worst]:.3f} s). An epoch is wrong, or the units are not m and "
+            "s: remove it, or export the trajectory again."
         )
     check_heading(path, trajectory)
     return trajectory
@@ -69,8 +69,8 @@ def _distinct_epochs(path, trajectory):
     if not is_same.any():
         return trajectory
     warnings.warn(
-        f"{is_same.sum()} of {len(trajectory)} epochs of {path} come within a microsecond of the "
-        f"one before (first: {trajectory.gps_time[np.argmax(is_same)]:.6f} s): they are left out.",
+        f"{is_same.sum()} of {len(trajectory)} epochs of {path} are within a microsecond of the "
+        f"one before (first: {trajectory.gps_time[np.argmax(is_same)]:.6f} s). They were omitted.",
         stacklevel=5,
     )
     return Trajectory.concatenate([trajectory.select(~is_same)])
@@ -101,10 +101,10 @@ def check_units(path: Path, gps_time: np.ndarray, position: np.ndarray, angles: 
     tolerance = SETTINGS.course_tolerance
     if np.abs(angles).max() <= 2 * np.pi and radians < tolerance <= degrees:
         raise OpenQuestion(
-            f"The angles of {path} seem to be radians where degrees belong: none exceeds 2 pi, "
-            f"and the heading fits the course over ground to {radians:.1f} deg when taken as "
-            f"radians, to {degrees:.1f} deg when taken as degrees. If so, write "
-            'angles = "rad" under [trajectory] in survey.toml.',
+            f"The angles of {path} seem to be in radians: none exceeds 2 pi, and the heading "
+            f"agrees with the course over ground to {radians:.1f} deg as radians, to "
+            f'{degrees:.1f} deg as degrees. If so, set angles = "rad" under [trajectory] in '
+            "survey.toml.",
             [OpenPlace(("trajectory", "angles"), ("rad", "deg"), "unit of the angles")],
         )
     beside = _folded(np.radians(heading) - course)  # for a rotated POS it scatters like any other
@@ -113,10 +113,9 @@ def check_units(path: Path, gps_time: np.ndarray, position: np.ndarray, angles: 
     # a rotated POS scatters like a car
     if degrees > SETTINGS.course_offset and gon < scatter / 2:
         raise OpenQuestion(
-            f"The angles of {path} seem to be gon where degrees belong: the heading fits the "
-            f"course over ground to {gon:.1f} deg when taken as gon, to {degrees:.1f} deg when "
-            'taken as degrees (medians). If so, write angles = "gon" under [trajectory] in '
-            "survey.toml.",
+            f"The angles of {path} seem to be in gon: the heading agrees with the course over "
+            f"ground to {gon:.1f} deg as gon, to {degrees:.1f} deg as degrees (medians). If so, "
+            'set angles = "gon" under [trajectory] in survey.toml.',
             [OpenPlace(("trajectory", "angles"), ("gon", "deg"), "unit of the angles")],
         )
 
@@ -149,9 +148,10 @@ def check_heading(path: Path, trajectory: Trajectory) -> None:
     reverses = folded < SETTINGS.course_tolerance and forward > SETTINGS.forward_share
     if misfit >= SETTINGS.course_tolerance and not reverses:
         warnings.warn(
-            f"The heading of {path} differs from the course over ground by {misfit:.0f} "
-            f"deg (median of {len(course)} epochs). Unless the vehicle drifts or reverses, the "
-            "heading may not be clockwise from grid north, or easting and northing may be swapped.",
+            f"The heading of {path} differs from the course over ground by {misfit:.0f} deg "
+            f"(median of {len(course)} epochs). Unless the vehicle drifts or reverses, the "
+            "heading may not be clockwise from grid north, or easting and northing may be "
+            "swapped.",
             stacklevel=5,
         )
         return
@@ -160,10 +160,10 @@ def check_heading(path: Path, trajectory: Trajectory) -> None:
     if np.abs(np.degrees(offset)) <= limit:
         return
     warnings.warn(
-        f"The heading of {path} is {np.degrees(offset):+.1f} deg beside the course over ground all "
-        f"along (median of {len(course)} epochs): {_cause(heading, course, is_paired)}. If it is "
-        "wrong, correct it under [trajectory] in survey.toml or export it anew, as trajectory.csv "
-        "keeps it.",
+        f"The heading of {path} deviates from the course over ground by "
+        f"{np.degrees(offset):+.1f} deg throughout (median of {len(course)} epochs): "
+        f"{_cause(heading, course, is_paired)}. If it is wrong, correct it under [trajectory] in "
+        "survey.toml or export it again; trajectory.csv keeps it otherwise.",
         stacklevel=5,
     )
 
@@ -173,16 +173,16 @@ def _cause(heading, course, is_paired):
     gon = np.degrees(median_difference(GON * np.mod(heading, 2 * np.pi), course))
     if gon < SETTINGS.course_offset:
         return (
-            f'its angles may be gon, as which it would fit to {gon:.1f} deg (angles = "gon"), or '
-            "the POS is mounted turned about its vertical axis"
+            f"its angles may be gon, with which it would agree to {gon:.1f} deg (angles = "
+            '"gon"), or the POS is mounted rotated about its vertical axis'
         )
     cause = (
-        "the POS may be mounted turned about its vertical axis, or headings from true north lack "
-        "the meridian convergence"
+        "the POS may be mounted rotated about its vertical axis, or headings from true north "
+        "lack the meridian convergence"
     )
     if is_paired:
         return cause
-    return f"{cause}, or wind or current sets the vehicle aside"
+    return f"{cause}, or wind or current pushes the vehicle sideways"
 
 
 def _folded(angle):

@@ -39,13 +39,13 @@ def read_trj(path: str | Path) -> dict[str, np.ndarray]:
     mark, version, header, count, width = struct.unpack("<8s4i", data[:start].ljust(start, b"\0"))
     if mark != MARK or version != VERSION or width < 8 * len(FIELDS) or header < start or count < 1:
         raise ValueError(
-            f"{path} is no TerraScan trajectory of version {VERSION} (version {version}, {count} "
-            f"records of {width} bytes): export it as text from TerraScan."
+            f"{path} is not a TerraScan trajectory of version {VERSION} (version {version}, "
+            f"{count} records of {width} bytes). Export it as text from TerraScan."
         )
     if len(data) != header + count * width:
         raise ValueError(
-            f"{path} has {len(data)} bytes where its header announces {header + count * width}: it "
-            "was cut off."
+            f"{path} is truncated: it has {len(data)} bytes where its header states "
+            f"{header + count * width}."
         )
     record = np.dtype({"names": FIELDS, "formats": ["<f8"] * len(FIELDS), "itemsize": width})
     table = np.frombuffer(data, record, count, header)

@@ -200,7 +200,9 @@ def attitude_of_quaternions(
     """
     quaternion = np.column_stack([table[name] for name in QUATERNION])
     if not np.isclose(np.linalg.norm(quaternion, axis=1), 1.0, atol=UNIT_TOLERANCE).all():
-        raise ValueError(f"{path} has quaternions whose length is not one: they are no attitudes.")
+        raise ValueError(
+            f"{path} has quaternions whose length is not one, so they are not attitudes."
+        )
     recorded = Rotation.from_quat(quaternion)
     convergence = 0.0
     if "latitude" in table:
@@ -219,8 +221,8 @@ def attitude_of_quaternions(
             fitting.append((name, angles))
     if len(fitting) != 1:
         raise OpenQuestion(
-            f"{path} has quaternions whose body axes the course over ground does not tell: name "
-            f"them under [trajectory] in survey.toml, as axes = one of {', '.join(OUR_AXES)}.",
+            f"{path} has quaternions, and the course over ground does not identify their body "
+            f"axes. Set axes under [trajectory] in survey.toml to one of {', '.join(OUR_AXES)}.",
             [OpenPlace(("trajectory", "axes"), tuple(OUR_AXES), "body axes of the quaternions")],
         )
     name, angles = fitting[0]

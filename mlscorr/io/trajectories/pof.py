@@ -77,11 +77,11 @@ def read_pof(path: str | Path) -> tuple[dict[str, np.ndarray], float, str]:
     whole = int(header["offset"]) + count * width
     if len(data) != whole:
         if len(data) < whole:
-            cause = "it was cut off"
+            cause = "it is truncated"
         else:
             cause = "its version may have another layout"
         raise ValueError(
-            f"{path} has {len(data)} bytes where its header announces {count} records of {width} "
+            f"{path} has {len(data)} bytes where its header states {count} records of {width} "
             f"bytes, {whole} in all: {cause}. {WAY_OUT}"
         )
     table = np.frombuffer(data, "<f8", count * len(names), header["offset"]).reshape(count, -1)
@@ -90,8 +90,8 @@ def read_pof(path: str | Path) -> tuple[dict[str, np.ndarray], float, str]:
         ends = values.min(), values.max()
         if not (np.isclose(ends, (low, high)) | (ends[0] >= low, ends[1] <= high)).all():
             raise ValueError(
-                f"{path} has {name}s of {ends[0]:.6f} to {ends[1]:.6f} where its header says "
-                f"{low:.6f} to {high:.6f}: it is damaged, or no POF of RIEGL. {WAY_OUT}"
+                f"{path} has {name}s of {ends[0]:.6f} to {ends[1]:.6f} where its header states "
+                f"{low:.6f} to {high:.6f}: it is damaged, or not a POF of RIEGL. {WAY_OUT}"
             )
     constant, layout = _constant(path, header, day)
     record = dict(zip(FIELDS, table.T.astype(float), strict=False))
@@ -130,7 +130,7 @@ def read_poq(path: str | Path) -> dict[str, np.ndarray]:
         raise ValueError(
             f"{path} has {len(data)} bytes, {max(rest, 0)} more than a header of {start} and "
             f"{max(count, 0)} whole POQ records of {kind.itemsize} bytes of version "
-            f"{header['major']}.{header['minor']}: it was cut off, or is no POQ of RIEGL."
+            f"{header['major']}.{header['minor']}: it is truncated, or not a POQ of RIEGL."
         )
     table = np.frombuffer(data, kind, count, start)["values"]
     check_finite(path, table, "POQ record")
@@ -150,10 +150,11 @@ def _header(path, data):
     is_placed = header["offset"] >= whole and header["entries"] > 0
     if len(data) < whole or header["major"] != 1 or day is None or not is_timed or not is_placed:
         raise ValueError(
-            f"{path} is no POF of RIEGL of version 1 ({len(data)} bytes, version "
-            f"{header['major']}.{header['minor']}, date {header['year']}-{header['month']:02}-"
-            f"{header['day']:02}, {header['entries']} records, from byte {header['offset']} on): "
-            f"it was cut off, or is of another kind. {WAY_OUT}"
+            f"{path} is not a POF of RIEGL of version 1 ({len(data)} bytes, version "
+            f"{header['major']}.{header['minor']}, date "
+            f"{header['year']}-{header['month']:02}-{header['day']:02}, {header['entries']} "
+            f"records, from byte {header['offset']} on): it is truncated, or of another format. "
+            f"{WAY_OUT}"
         )
     return header, day
 
@@ -165,13 +166,13 @@ def _constant(path, header, day):
     version = f"{path.name} was read as RIEGL's POF {header['major']}.{header['minor']} of {day}"
     if header["unit"] == 0:
         raise ValueError(
-            f"{path} has normalized time, from a start that it does not name. Export it with "
-            "seconds of the GPS week."
+            f"{path} has normalized time with an unknown start. Export it with seconds of the "
+            "GPS week."
         )
     if system == "unknown":
         warnings.warn(
-            f"{path} does not know whether its times are GPS or UTC: they are taken as GPS, which "
-            "is 18 s ahead since 2017. Export it with seconds of the GPS week.",
+            f"{path} does not state whether its times are GPS or UTC. GPS time is assumed, 18 s "
+            "ahead of UTC since 2017; if this is wrong, export it with seconds of the GPS week.",
             stacklevel=4,
         )
     # GPS weeks start on Sunday

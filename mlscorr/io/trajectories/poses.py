@@ -95,7 +95,7 @@ def _checked(path, table):
     """Poses of a table (n, 4) of times and positions, without attitude."""
     check_finite(path, table, "epoch")
     if len(table) < 2:
-        raise ValueError(f"{path} has {len(table)} epochs; a path needs at least 2 epochs.")
+        raise ValueError(f"{path} has {len(table)} epochs; a path needs at least 2.")
     gps_time, _ = count_on(table[:, 0])
     check_increasing(path, gps_time, "epoch")
     return Poses(gps_time, table[:, 1:])
@@ -109,7 +109,7 @@ def _read_pos(path):
         table = np.loadtxt(path, usecols=range(4), ndmin=2, encoding=ENCODING, comments=("%", "#"))
         if not len(table) or np.abs(table[:, 1]).max() > 90 or np.abs(table[:, 2]).max() > 360:
             raise ValueError(
-                "its second and third columns are no latitude and longitude in degrees."
+                "its second and third columns are not latitude and longitude in degrees."
             )
     except ValueError as error:
         raise ValueError(
@@ -205,7 +205,7 @@ def read_pos_error_series(path: str | Path) -> PosErrorSeries:
     if len(table) < 2 or table.shape[1] != len(_SERIES_COLUMNS):
         raise ValueError(
             f"{path} has {len(table)} rows of {table.shape[-1]} columns; at least 2 rows of "
-            f"{len(_SERIES_COLUMNS)} are expected: {', '.join(_SERIES_COLUMNS)}."
+            f"{len(_SERIES_COLUMNS)} columns are expected: {', '.join(_SERIES_COLUMNS)}."
         )
     check_finite(path, table, "row")
     gps_time, north, east, down = table[:, :4].T

@@ -31,19 +31,19 @@ def check_crs(crs: str) -> CRS:
     axes = crs.axis_info
     if not crs.is_projected:
         raise ValueError(
-            f"crs {crs_name(crs)} is {crs.type_name}; a projected CRS is needed, "
-            "such as the UTM zone of the survey."
+            f"crs {crs_name(crs)} is a {crs.type_name}, but a projected CRS is needed, such as "
+            "the UTM zone of the survey."
         )
     for axis in axes:
         if axis.unit_name != "metre":
             raise ValueError(
-                f"crs {crs_name(crs)} has its {axis.name} in {axis.unit_name}, not in "
-                "metres. Bring clouds, trajectory and control into a CRS in metres."
+                f"crs {crs_name(crs)} has its {axis.name} in {axis.unit_name}, not in meters. "
+                "Transform clouds, trajectory and control to a CRS in meters."
             )
     if {axis.direction for axis in axes} - {"up"} != {"east", "north"}:
         raise ValueError(
-            f"crs {crs_name(crs)} counts {', '.join(axis.direction for axis in axes)}; "
-            "axes must point east and north, and up where there is a height."
+            f"crs {crs_name(crs)} has the axes {', '.join(axis.direction for axis in axes)}; "
+            "axes must point east and north, and up if there is a height."
         )
     return crs
 
@@ -123,7 +123,7 @@ def _parse_crs(crs):
     try:
         return CRS.from_user_input(crs)
     except CRSError:
-        raise ValueError(f"crs '{crs}' is unknown; give it like \"EPSG:32650\".") from None
+        raise ValueError(f"crs '{crs}' is unknown; give it as \"EPSG:32650\".") from None
 
 
 def crs_name(crs: CRS) -> str:
@@ -158,8 +158,8 @@ def _by_greenwich(crs):
     crs = check_crs(crs)
     if crs.prime_meridian.longitude != 0:
         raise ValueError(
-            f"{crs_name(crs)} counts longitudes from {crs.prime_meridian.name}: give "
-            "latitudes, longitudes and true headings with a CRS that counts from Greenwich."
+            f"{crs_name(crs)} counts longitudes from {crs.prime_meridian.name}. Give latitudes, "
+            "longitudes and true headings with a CRS that counts from Greenwich."
         )
     return crs
 
@@ -196,16 +196,16 @@ def project(crs: str, record: dict[str, np.ndarray]) -> tuple[np.ndarray, np.nda
         factors = map_of(crs).get_factors(longitude, latitude, errcheck=True)
     except ProjError as error:
         raise ValueError(
-            f"the trajectory can't be brought into {crs_name(crs)}: {error} "
-            "A geoid grid may be missing (projsync --file NAME installs it), or give the "
-            "horizontal CRS alone to keep ellipsoidal heights."
+            f"the trajectory can't be transformed to {crs_name(crs)}: {error} A geoid grid may "
+            "be missing (projsync --file NAME installs it); a horizontal CRS alone keeps "
+            "ellipsoidal heights."
         ) from None
     position = np.column_stack([easting, northing, height])
     outside = ~np.isfinite(position).all(axis=1)
     if outside.any():
         raise ValueError(
-            f"{outside.sum()} of {len(outside)} positions can't be expressed in {crs_name(crs)} "
-            f"(first: {latitude[outside][0]:.4f}, {longitude[outside][0]:.4f} deg)."
+            f"{outside.sum()} of {len(outside)} positions are outside {crs_name(crs)} (first: "
+            f"{latitude[outside][0]:.4f}, {longitude[outside][0]:.4f} deg)."
         )
     return position, np.radians(factors.meridian_convergence)
 
@@ -256,7 +256,7 @@ def to_geographic(crs: str, position: np.ndarray) -> tuple[dict[str, np.ndarray]
             easting, northing, height, errcheck=True
         )
     except ProjError as error:
-        raise ValueError(f"{crs} can't be left for latitude and longitude: {error}") from None
+        raise ValueError(f"{crs} can't be transformed to latitude and longitude: {error}") from None
     place = {"latitude": np.radians(latitude), "longitude": np.radians(longitude)}
     return place | {"height": height}, convergence_at(crs, *position[:, :2].T)
 

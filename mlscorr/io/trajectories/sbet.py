@@ -173,7 +173,7 @@ def _read_records(path, fields, what):
     if size % width:
         raise ValueError(
             f"{path} has {size} bytes, {size % width} more than {size // width} whole {what} "
-            f"records of {width} bytes: it was cut off, or it is not {what}."
+            f"records of {width} bytes: it is truncated, or it is not {what}."
         )
     table = read_doubles(path).reshape(-1, len(fields))
     check_finite(path, table, f"{what} record")
@@ -187,7 +187,7 @@ def _check_radians(path, record):
         if worst > limit * (1 + 1e-9):
             cause = "it may be in degrees" if worst <= 360 else "the file may not be an SBET"
             raise ValueError(
-                f"{path} has a {name} of {worst:.6g} where radians up to {limit:.4f} belong: "
+                f"{path} has a {name} of {worst:.6g}; radians up to {limit:.4f} are expected: "
                 f"{cause}."
             )
 
@@ -198,8 +198,8 @@ def _cause(accuracy, gps_time):
     if weeks := round(apart / WEEK):
         return f"they are {weeks:+d} weeks apart, so one of the two has the wrong GPS week"
     if 10 <= abs(apart) <= 40:
-        return f"they are {apart:+.1f} s apart, so one may be in UTC, which leap seconds set apart"
-    return "it belongs to another one"
+        return f"they are {apart:+.1f} s apart, so one may be in UTC, which differs by leap seconds"
+    return "it belongs to another trajectory"
 
 
 def _counted_on(accuracy, gps_time):
@@ -222,7 +222,7 @@ def _sigmas(path, gps_time, constant):
     times = _counted_on(record["gps_time"], gps_time - constant) + constant
     step = np.median(np.diff(times)) if len(times) > 1 else 0.0
     if (np.diff(times) <= 0).any():
-        raise ValueError(f"the times of the accuracy file {path} don't increase.")
+        raise ValueError(f"the times of the accuracy file {path} do not increase.")
     if times[0] - gps_time[0] > 2 * step or gps_time[-1] - times[-1] > 2 * step:
         raise ValueError(
             f"the accuracy file {path} covers [{times[0]:.1f}, {times[-1]:.1f}] s, not the "
@@ -233,7 +233,7 @@ def _sigmas(path, gps_time, constant):
     attitude = np.column_stack([at_epochs[name] for name in ("roll", "pitch", "heading")])
     if min(position.min(), attitude.min()) < 0:
         kind = "a POQ" if is_poq else "smrmsg"
-        raise ValueError(f"the accuracy file {path} holds negative sigmas: it may not be {kind}.")
+        raise ValueError(f"the accuracy file {path} has negative sigmas: it may not be {kind}.")
     if not is_poq:  # arc minutes
         attitude = np.radians(attitude / 60)
     return position, attitude

@@ -49,13 +49,13 @@ class TimeMatch:
         text = f"{NAMES[self.cloud_system]}, as in the trajectory"
         if self.constant != 0.0:
             text = (
-                f"{NAMES[self.cloud_system]}; {self.constant:+.0f} s gives the trajectory's "
-                f"{NAMES[self.trajectory_system]}"
+                f"{NAMES[self.cloud_system]}; {self.constant:+.0f} s converts to the "
+                f"trajectory's {NAMES[self.trajectory_system]}"
             )
         if self.new_week > -np.inf:
             text += (
-                f"; the GPS week ends in the file, {WEEK:.0f} s are added where its times start "
-                "again, and they are written as they came"
+                f"; the GPS week ends in the file, {WEEK:.0f} s are added after the rollover, "
+                "and times are written as in the input"
             )
         return text
 
@@ -125,15 +125,14 @@ def match_times(
     is_missing = lacks_time(stored)
     if is_missing.all():
         raise ValueError(
-            f"The points of {name} have gps_time {listed_times(stored)} throughout: it was written "
-            "without times. Export it anew with gps_time, which places points on the trajectory."
+            f"All points of {name} have gps_time {listed_times(stored)}, which means no time. "
+            "Export it with gps_time, which locates points on the trajectory."
         )
     if is_missing.any():
         warnings.warn(
             f"{is_missing.sum()} of {len(times)} points sampled from {name} have gps_time "
-            f"{listed_times(stored[is_missing])}: they were written without times, and its time "
-            "system is that of the others. Export them with gps_time, which places points on the "
-            "trajectory.",
+            f"{listed_times(stored[is_missing])}, which means no time; the time system is taken "
+            "from the others. Export all points with gps_time.",
             stacklevel=2,
         )
         times = times[~is_missing]
@@ -152,8 +151,8 @@ def match_times(
         match = _settle_equal(match, times)
         if match.cloud_system != flagged:
             warnings.warn(
-                f"The header of {name} says {NAMES[flagged]}, but its times "
-                f"[{times.min():.1f}, {times.max():.1f}] s fit the trajectory as {match}.",
+                f"The header of {name} states {NAMES[flagged]}, but its times "
+                f"[{times.min():.1f}, {times.max():.1f}] s were recognized as {match}.",
                 stacklevel=2,
             )
     return match
@@ -177,8 +176,8 @@ def _check_precision(name, times):
         return
     sentence = (
         f"The times of {name} [{times.min():.3f}, {times.max():.3f}] s were rounded to single "
-        f"precision, in steps of {step:.2g} s, in which a vehicle moves on: export gps_time in "
-        "double precision."
+        f"precision, in steps of {step:.2g} s, too coarse for a moving vehicle. Export gps_time "
+        "in double precision."
     )
     if usual_systems(times) != ("week",):
         raise ValueError(sentence)
@@ -271,7 +270,7 @@ def _nothing_fits(name, times, span, setting):
     shares = [(_inside(times, span, constant), cloud) for constant, cloud, _ in candidates]
     largest = max(inside for inside, cloud in shares if setting in ("auto", cloud))
     spans = (
-        f"the sampled times of {name}, [{times.min():.3f}, {times.max():.3f}] s, lie inside the "
+        f"the sampled times of {name}, [{times.min():.3f}, {times.max():.3f}] s, are inside the "
         f"trajectory [{span[0]:.3f}, {span[1]:.3f}] s"
     )
     share = f"Only {percent(largest)} of" if largest > 0 else "None of"
@@ -280,25 +279,25 @@ def _nothing_fits(name, times, span, setting):
     for constant, (later, system) in product(constants, systems):
         if _inside(times, span, constant + later) == 1.0:
             return (
-                f"{share} {spans}, but all would with {later:+.0f} s: one of both may be in "
-                f"{system}, or the trajectory covers a part of the cloud. Export both in GPS time "
-                f"and whole; if it is {system}, add {-later:.0f} to trajectory.time_constant (s) "
-                "in survey.toml instead."
+                f"{share} {spans}, but all would be with {later:+.0f} s: one may be in {system}, "
+                "or the trajectory covers only part of the cloud. Export both completely in GPS "
+                f"time; if one is in {system}, you can add {-later:.0f} to "
+                "trajectory.time_constant (s) in survey.toml instead."
             )
     if largest > 0:
         return (
-            f"{share} {spans}: the trajectory covers a part of the cloud. Export the whole "
+            f"{share} {spans}: the trajectory covers only part of the cloud. Export the whole "
             "trajectory, or clip the cloud to it."
         )
     if setting == "auto" or max(shares)[0] < SETTINGS.covered_share:
         return (
-            f"None of {spans}, neither as they are nor as seconds of week, adjusted standard GPS "
-            "time or plain GPS seconds: cloud and trajectory may be of different days, or one of "
-            "them may be in UTC, local time or milliseconds. Check that both are of one drive."
+            f"None of {spans}, neither unchanged nor as seconds of week, adjusted standard GPS "
+            "time or plain GPS seconds. Cloud and trajectory may be from different days, or one "
+            "in UTC, local time or milliseconds: check that both are from one drive."
         )
     return (
-        f'None of {spans}, taken as {NAMES[setting]}, which cloud.gps_time = "{setting}" in '
-        'survey.toml asks for. Try cloud.gps_time = "auto".'
+        f'None of {spans}, taken as {NAMES[setting]}, as set by cloud.gps_time = "{setting}" '
+        'in survey.toml. Try cloud.gps_time = "auto".'
     )
 
 

@@ -105,26 +105,26 @@ def read_trajectory_file(
     with open_file(path) as file:
         start = file.read(SETTINGS.longest_line)
     if not start:
-        raise ValueError(f"{path} is empty (0 bytes): its copying was interrupted. Copy it anew.")
+        raise ValueError(f"{path} is empty (0 bytes): copying was interrupted. Copy it again.")
     suffix = path.suffix.lower()
     if suffix == POF_SUFFIX or suffix in SBET_SUFFIXES or is_sbet(path):
         return _read_geographic(path, crs, accuracy, section, suffix == POF_SUFFIX)
     if accuracy is not None:
         raise ValueError(
-            f"{path} has its accuracy in its own sigma columns; an accuracy file ({accuracy}) "
-            "belongs to an SBET or a POF."
+            f"{path} has its own sigma columns; an accuracy file ({accuracy}) is only for an "
+            "SBET or a POF."
         )
     if suffix == ".pofx":
         raise ValueError(
-            f"{path} is a POFX of RIEGL, whose layout is not public: export it as POF, SBET or "
+            f"{path} is a POFX of RIEGL, whose layout is not public. Export it as POF, SBET or "
             "text."
         )
     is_text = not start.startswith(MARK)
     is_wide = start[:2] in (b"\xff\xfe", b"\xfe\xff")  # UTF-16
     if is_text and b"\0" in start and not is_wide and path.suffix.lower() != ".csv":
         raise ValueError(
-            f"{path} is of an unknown kind: no table of text, no SBET (whole records of 136 bytes, "
-            f"angles in radians) and no trajectory of TerraScan. Export it as text or SBET."
+            f"{path} has an unknown format: it is not a table of text, an SBET (whole records of "
+            "136 bytes, angles in radians) or a TerraScan trajectory. Export it as text or SBET."
         )
     if is_text:
         table, layout = read_table(path, section, crs)
@@ -141,8 +141,8 @@ def _read_geographic(path, crs, accuracy, section, is_pof):
     given = sorted(section.model_fields_set & set(TrajectorySection.model_fields) - NAMED)
     if given:
         raise ValueError(
-            f"{path} is {'a POF' if is_pof else 'an SBET'}, whose columns and conventions are "
-            f"known: remove {', '.join(given)} from [trajectory]."
+            f"{path} is {'a POF' if is_pof else 'an SBET'} with fixed columns and conventions: "
+            f"remove {', '.join(given)} from [trajectory]."
         )
     if is_pof:
         trajectory, layout = read_riegl(path, crs, accuracy)
@@ -236,5 +236,6 @@ def _check_values(path, table):
         if is_nothing or (name.startswith("sigma") and values.min() < 0):
             raise ValueError(
                 f"{(values <= 0).sum()} of {len(values)} epochs of {path} have a {name} of 0 or "
-                f"less (first: epoch {np.argmax(values <= 0) + 1}). Without it [pos] counts."
+                f"less (first: epoch {np.argmax(values <= 0) + 1}). Correct them, or remove the "
+                "column to use [pos]."
             )

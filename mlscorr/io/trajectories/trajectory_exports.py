@@ -86,8 +86,8 @@ def check_distinct(names: Sequence[str]) -> None:
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise ValueError(
-            f"{twice[0]} is asked for twice, and one file would replace the other. Give each "
-            "export a name of its own."
+            f"{twice[0]} is requested twice, so one file would replace the other. Give each "
+            "export its own name."
         )
 
 
@@ -97,7 +97,7 @@ def _suffix(name, option, known, others=""):
     if Path(name).name != name or suffix not in known or name.lower() == WEAK_STRETCHES:
         kinds = ", ".join(filter(None, [others, "or .gpkg (GeoPackage)"]))
         raise ValueError(
-            f"{option} {name}: give the name of a file without a folder, which ends with "
+            f"{option} {name}: give a file name without a folder that ends with "
             f"{kinds.removeprefix('or ')} or {GEOJSON} (GeoJSON), other than {WEAK_STRETCHES}."
         )
     return suffix

@@ -96,8 +96,8 @@ def read_sessions(
         notes = [_summary(names, parts, joined), *joints, *notes]
     notes += _week_ends(names, parts)
     notes += [
-        f"{file.section.time_constant:+g} s (trajectory.time_constant) were added to the times of "
-        f"{name}: trajectories that are written have them, too."
+        f"{file.section.time_constant:+g} s (trajectory.time_constant) were added to the times "
+        f"of {name}; written trajectories include this."
         for name, file in zip(names, files, strict=True)
         if file.section.time_constant
     ]
@@ -110,7 +110,7 @@ def _summary(names, parts, joined):
     order = np.argsort([part.gps_time[0] for part in parts])
     listed = ", ".join(f"{names[i]} {_span(parts[i])}" for i in order)
     return (
-        f"The trajectory was joined of {len(parts)} files in order of time ({listed}): "
+        f"The trajectory was joined from {len(parts)} files in time order ({listed}): "
         f"{len(joined)} epochs, gaps {len(joined.gaps)}."
     )
 
@@ -136,9 +136,9 @@ def check_systems(names: Sequence[str], parts: Sequence[Trajectory]) -> None:
     for name, part, system in zip(names, parts, systems, strict=True):
         if not set(system) & set(systems[0]):
             raise ValueError(
-                f"The times of {names[0]} {_span(parts[0])} are {NAMES[systems[0][0]]} by their "
-                f"size, those of {name} {_span(part)} {NAMES[system[0]]}: the trajectories of a "
-                "survey need one time system. Export them in the same one."
+                f"The times of {names[0]} {_span(parts[0])} seem to be {NAMES[systems[0][0]]}, "
+                f"those of {name} {_span(part)} {NAMES[system[0]]}. Export all trajectories of a "
+                "survey in one time system."
             )
 
 
@@ -185,8 +185,8 @@ def _week_ends(names, parts):
         first = part.file_time[np.argmax(part.weeks > 0)]
         yield (
             f"The GPS week ends before epoch {np.argmax(part.weeks > 0) + 1} of {name} "
-            f"({first:.3f} s): {WEEK:.0f} s are added from there on, so that times count on. "
-            "Trajectories are written with seconds of week as they came."
+            f"({first:.3f} s): {WEEK:.0f} s are added from there on, so that times increase. "
+            "Trajectories are written with the seconds of week of the input."
         )
 
 
@@ -218,14 +218,14 @@ def with_sigmas(
         without = ", ".join(names[i] for i in lacking)
         if pos is None:
             raise ValueError(
-                f"{len(lacking)} of the {len(parts)} trajectories state no sigma of {kind} "
-                f"({without}), the others do. Export them with it, name the accuracy of an SBET "
-                f"under its [[trajectory]], or say under [pos] in survey.toml what {key} they have."
+                f"{len(lacking)} of the {len(parts)} trajectories have no sigma of {kind} "
+                f"({without}), the others do. Export them with sigmas, give the accuracy file of "
+                f"an SBET under its [[trajectory]], or set {key} under [pos] in survey.toml."
             )
         for i in lacking:
             stated = np.tile(np.broadcast_to(getattr(pos, key), 3), (len(parts[i]), 1))
             parts[i] = replace(parts[i], **{key: stated})
-        notes.append(f"The sigma of {kind} that {without} does not state is that of [pos].")
+        notes.append(f"{without} has no sigma of {kind}: that of [pos] is used.")
     return parts, notes
 
 
@@ -275,12 +275,12 @@ def join_sessions(
                 continue
             if _are_one([names[j], names[i]], parts[j], parts[i], is_common, pos):
                 bases[i] = bases[j]
-                how = "the same, and join"
+                how = "and are identical: the two are joined"
             else:
-                how = "alike within their sigmas, and part"
+                how = "and are equal within their sigmas: the two stay separate"
             notes.append(
-                f"{is_common.sum()} epochs of {names[i]} lie within {names[j]}: they are {how} the "
-                f"two there; those of {names[j]} are taken."
+                f"{is_common.sum()} epochs of {names[i]} overlap {names[j]} {how}. Those of "
+                f"{names[j]} are used."
             )
             is_new &= ~is_common
         if is_new.any():
@@ -318,11 +318,11 @@ def _are_one(names, first, second, is_common, pos):
     if way > limits[0] or turn > limits[1]:
         common = second.gps_time[is_common]
         raise ValueError(
-            f"{names[0]} and {names[1]} overlap by {np.ptp(common):.1f} s (from {common[0]:.3f} s) "
-            f"and differ there by {way:.3f} m and {np.degrees(turn):.4f} deg (RMS), where "
-            f"their sigmas state {limits[0]:.3f} m and {np.degrees(limits[1]):.4f} deg. Two "
-            "vehicles are two surveys, each with its own survey.toml; of one vehicle give the "
-            "final trajectory alone, and times of different weeks as GPS seconds that go on."
+            f"{names[0]} and {names[1]} overlap by {np.ptp(common):.1f} s (from {common[0]:.3f} "
+            f"s) and differ by {way:.3f} m and {np.degrees(turn):.4f} deg (RMS); their sigmas "
+            f"are {limits[0]:.3f} m and {np.degrees(limits[1]):.4f} deg. For two vehicles, make "
+            "two surveys. For one vehicle, give only the final trajectory, and times of "
+            "different weeks as continuous GPS seconds."
         )
     return bool(apart.max() <= SETTINGS.same_export)
 

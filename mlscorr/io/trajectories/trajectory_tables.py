@@ -67,13 +67,13 @@ LATEST = 1e11  # s since 1970: 5138; 1000 times more, so that units do not overl
 TRUE_NORTH_USUAL = {"hell", "hdngsd", "eastsd"}  # columns only in Inertial Explorer and POSPac
 HINTS = {
     ("easting", "x"): (
-        " Say under [trajectory.columns] in survey.toml which of X and Y is easting, or longitude "
-        "where they are angles.",
+        " Set under [trajectory.columns] in survey.toml which of X and Y is easting, or "
+        "longitude if they are angles.",
         (),
     ),
     ("heading", "yaw"): (
-        " Its yaw is a heading by convention only: say under [trajectory] in survey.toml how "
-        f'it counts, as heading = "{FROM_EAST}" or "{GRID}".',
+        f' A yaw column may count in different directions: set heading = "{FROM_EAST}" or '
+        f'"{GRID}" under [trajectory] in survey.toml.',
         (
             OpenPlace(
                 ("trajectory", "heading"), (FROM_EAST, GRID), "direction in which the yaw counts"
@@ -221,9 +221,10 @@ def _check_order(layout, lacking, chosen):
         known = find_meanings(header, TRAJECTORY_NAMES)
         missing = lacking({*known, "qw"}) + ["qw"] * ("qw" not in known)
         raise ValueError(
-            f"{layout.path} names its columns {', '.join(map(shown, header))}, which leaves open "
-            f"{', '.join(missing)}: number all under [trajectory.columns] in survey.toml, as "
-            "gps_time = 1, easting = 2, northing = 3, height = 4, qx = 5, qy = 6, qz = 7, qw = 8."
+            f"{layout.path} names its columns {', '.join(map(shown, header))}, so "
+            f"{', '.join(missing)} can't be identified. Number all under [trajectory.columns] in "
+            "survey.toml, as gps_time = 1, easting = 2, northing = 3, height = 4, qx = 5, qy = "
+            "6, qz = 7, qw = 8."
         )
 
 
@@ -274,9 +275,9 @@ def _place_in_degrees(path, layout, values, angles):
         return table  # there is no land within 3.14 deg of 0, 0
     if angles != "rad":
         raise OpenQuestion(
-            f"{path} has latitudes and longitudes that seem to be radians: none exceeds pi. If so, "
-            'write angles = "rad" under [trajectory] in survey.toml, or the unit behind the names '
-            "of these columns alone, as Lat [rad].",
+            f"The latitudes and longitudes of {path} seem to be radians: none exceeds pi. If so, "
+            'set angles = "rad" under [trajectory] in survey.toml, or add the unit to the '
+            "names of these columns, as Lat [rad].",
             [OpenPlace(("trajectory", "angles"), ("rad",), "unit of the angles")],
         )
     return table | {name: np.degrees(radians) for name, radians in place.items()}
@@ -288,9 +289,9 @@ def _usual_heading(layout, section):
         return TRUE
     if not section.heading and set(map(plain, layout.header)) & TRUE_NORTH_USUAL:
         raise OpenQuestion(
-            f"{layout.path} was exported by Inertial Explorer, or by POSPac, whose headings count "
-            "from true north unless the export takes the convergence off. Say which under "
-            f'[trajectory] in survey.toml: heading = "{TRUE}" or "{GRID}".',
+            f"{layout.path} was exported by Inertial Explorer or POSPac. Their headings count "
+            "from true north unless the convergence was removed on export: set heading = "
+            f'"{TRUE}" or "{GRID}" under [trajectory] in survey.toml.',
             [OpenPlace(("trajectory", "heading"), (TRUE, GRID), "direction of headings")],
         )
     return GRID
@@ -309,7 +310,7 @@ def position_file(path: Path) -> str:
         if path.suffix.lower() != POSITION_SUFFIX:
             return ""
         return (
-            f"{path} is a position file without names of columns ({len(header)} numbers a row, as "
+            f"{path} is a position file without column names ({len(header)} numbers per row, as "
             "time, latitude, longitude, height and their sigmas), and without roll, pitch and "
             f"heading. {_EXPORTS}"
         )
@@ -337,7 +338,7 @@ def _check_projected(path, table):
     places = [table[name] for name in AXES]
     if _is_geocentric(places):
         raise ValueError(
-            f"{path} has geocentric coordinates (ECEF): its epochs lie "
+            f"{path} has geocentric coordinates (ECEF): its epochs are "
             f"{_radius(places) / 1e3:.0f} km from the Earth's center, with heights of "
             f"{np.median(table['height']) / 1e3:.0f} km. {_PROJECTED}"
         )

@@ -16,8 +16,8 @@ from mlscorr.pipeline.project.file_tasks import read_tile
 from mlscorr.survey import Survey
 
 NO_CONTROL = (
-    "Drive {} has no surveyed point near its clouds: it is corrected by what it saw together with "
-    "other drives, or not at all."
+    "Drive {} has no surveyed point near its clouds. It can only be corrected by overlap with "
+    "other drives."
 )
 
 
@@ -39,7 +39,7 @@ def check_project(path: str | Path) -> CheckedSurvey:
         stated = faults.of("survey.toml", stated_project, path)
         project = stated and faults.of("data", read_project, stated)
         if project is None:
-            reason = "Clouds and targets: the faults come first."
+            reason = "Clouds and targets: not checked until the faults are corrected."
             return CheckedSurvey(tuple(faults.faults), tuple(faults.warnings), unchecked=(reason,))
         checked = [_checked(survey) for survey in _surveys(project, faults)]
     _check_control(project, checked, faults)
@@ -47,7 +47,10 @@ def check_project(path: str | Path) -> CheckedSurvey:
         faults=(*faults.faults, *(fault for _, each in checked for fault in each.faults)),
         warnings=(*faults.warnings, *_all("warnings", checked)),
         notes=_notes(checked),
-        unchecked=(*_all("unchecked", checked), "Which drives ties join: their clouds tell."),
+        unchecked=(
+            *_all("unchecked", checked),
+            "Drives joined by ties: known only after reading their clouds.",
+        ),
         is_searched=any(each.is_searched for _, each in checked),
         read=_with_control(_sums([each.read for _, each in checked]), project),
         written=_sums([each.written for _, each in checked]),
@@ -98,8 +101,8 @@ def _check_control(project, checked, faults):
     faults.of("data", stages.check_control_near, project, [survey for survey, _ in checked])
     if held and (far := [name for name in names if name not in near]):
         faults.warn(
-            f"{len(far)} of the {len(names)} surveyed points of {project.path} lie near no cloud "
-            f"by the headers (first: {far[0]})."
+            f"{len(far)} of the {len(names)} surveyed points of {project.path} are not near any "
+            f"cloud, by the headers (first: {far[0]})."
         )
 
 

@@ -19,10 +19,10 @@ from mlscorr.pipeline.project.joint import FoundDrive, JointEstimate
 from mlscorr.survey import Survey
 
 STATES = {
-    "controlled": "held by control points of its own",
-    "tied": "held by control points of other drives, through ties",
-    "relative": "no control point holds it: ties bring its passes together, no more",
-    "uncorrected": "nothing corrects it: no control point was found, and no overlap that is tied",
+    "controlled": "constrained by its own control points",
+    "tied": "constrained by control points of other drives, through ties",
+    "relative": "not constrained by control points: ties only align its passes",
+    "uncorrected": "not corrected: no control point was found, and no overlap with ties",
 }
 
 
@@ -160,11 +160,11 @@ def tied_sentence(state: DriveState) -> str:
     if not state.tied_with:
         return ""
     listed = "; ".join(
-        f"{ties['n']} with {name}, {ties['before']:.3f} m apart before and {ties['after']:.3f} m "
-        "after (RMS)"
+        f"{ties['n']} with {name}, RMS misclosure {ties['before']:.3f} m before and "
+        f"{ties['after']:.3f} m after"
         for name, ties in state.tied_with.items()
     )
-    return f"Estimated together with other drives of the project, by ties: {listed}."
+    return f"Adjusted together with other drives of the project, by ties: {listed}."
 
 
 def bare_survey(survey: Survey) -> Survey:

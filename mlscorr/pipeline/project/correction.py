@@ -140,13 +140,13 @@ def check_project_output(project: ProjectParts, out: Path, options: Options) -> 
     is_ours = is_folder(store.folder)
     if is_ours and not store.is_begun():
         raise ValueError(
-            f"{store.folder} is not of a run: it has no {store.plan.name}. Results of tasks go "
-            "there, and what is there may be another's. Move it away, or choose another folder."
+            f"{store.folder} was not written by a run: it has no {store.plan.name}. Move it "
+            "away, or choose another folder."
         )
     if is_ours and not (options.resume or options.overwrite):
         raise ValueError(
-            f"{out} holds results of a project already. --resume does what is missing or changed "
-            "there, --overwrite does all again; or choose another folder."
+            f"{out} already contains results of a project. Process what is missing or changed "
+            "with --resume, everything with --overwrite, or choose another folder."
         )
     check = check_store_output if is_remote(out) else check_output
     folders = [*(drive.name for drive in project.drives), SHARED_TILES]
@@ -248,8 +248,9 @@ class _Work:
             near = sum(len(drive.survey.control) for drive in drives)
             raise ValueError(
                 f"None of the {len(self.project.control)} control points of {self.project.path} "
-                f"was found in the clouds of {len(drives)} drives; {near} times one lies within a "
-                "cloud's bounds. Are CRS, kind and size of the targets right? Or use --ties-only."
+                f"was found in the clouds of {len(drives)} drives, although points are within a "
+                f"cloud's bounds {near} times. Check CRS, kind and size of the targets, or use "
+                "--ties-only."
             )
         key = digest(sorted(keys.values()))
         results = project_drives(

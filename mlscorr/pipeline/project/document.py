@@ -197,7 +197,7 @@ def _statements(project, rows, drives, faults):
     yield StatementRow(
         "Drives",
         "green" if held == len(project.drives) else "red",
-        f"Held by control points: {held} of {counted(len(project.drives), 'drive')}, "
+        f"{held} of {counted(len(project.drives), 'drive')} are constrained by control points, "
         f"{len(count['tied'])} of them through ties with other drives.",
         tuple((", ".join(names), STATES[state]) for state, names in others),
     )
@@ -210,22 +210,22 @@ def _statements(project, rows, drives, faults):
     yield StatementRow(
         "Control points",
         "green" if len(used) == len(project.control) else "amber",
-        f"{len(used)} of {len(project.control)} surveyed control points are used.",
+        f"{len(used)} of {len(project.control)} surveyed control points were used.",
     )
     if noise := sum(report["coverage"]["points_noise"] for _, report in drives):
         yield StatementRow(
             "Noise",
             "green",
             f"{noise} of {sum(row['points'] for row in rows)} points are flagged as noise. They "
-            "take no part in any measurement, and are corrected like all others.",
+            "are not used for measurements but corrected like all others.",
         )
     yield from _minded(rows, [report for _, report in drives])
     if faults:
         yield StatementRow(
             "Failures",
             "red",
-            f"{counted(len(faults), 'failure')}: what is named was not corrected, and all else "
-            "was. When the cause is gone, --resume does what is missing.",
+            f"{counted(len(faults), 'failure')}: the items listed were not corrected, everything "
+            "else was. Remove the cause and run again with --resume.",
             tuple((fault["name"], fault["fault"]) for fault in faults),
         )
 
@@ -239,7 +239,7 @@ def _minded(rows, reports):
     ]
     if doubts:
         doubts.sort(key=lambda doubt: -ORDER.index(doubt[0]))
-        sentence = f"There is something to mind in {len(doubts)} of {counted(len(rows), 'drive')}."
+        sentence = f"{len(doubts)} of {counted(len(rows), 'drive')} have warnings."
         items = capped(doubt[1:] for doubt in doubts)
         yield StatementRow("Doubts", doubts[0][0], sentence, items)
 
@@ -269,7 +269,7 @@ def _reason(row, report):
 def _lost(number):
     """Statement on lost workers and schedulers, if there were any."""
     if number:
-        sentence = f"Lost workers or schedulers: {number}; what they were at was done again."
+        sentence = f"Lost workers or schedulers: {number}; their tasks were repeated."
         yield StatementRow("Workers", "amber", sentence)
 
 
@@ -277,9 +277,9 @@ def _left(older):
     """Statement on files of an earlier run, if there are any."""
     if older:
         sentence = (
-            f"{len(older)} file{'s are' if len(older) > 1 else ' is'} left of an earlier run: of "
-            "clouds or drives that are no more or failed now, or of reports that were not asked "
-            "for again. Delete what is old."
+            f"{len(older)} file{'s are' if len(older) > 1 else ' is'} from an earlier run: from "
+            "clouds or drives that were removed or have failed now, or from reports not "
+            "requested again. Delete what is outdated."
         )
-        items = capped((name, "not of this run") for name in older)
+        items = capped((name, "not from this run") for name in older)
         yield StatementRow("Older results", "amber", sentence, items)

@@ -137,7 +137,7 @@ class Cluster:
             self._client = Client(scheduler)
         except (OSError, ValueError) as error:
             raise ValueError(
-                f"No scheduler answers at {scheduler} ({error}). Start one with dask scheduler, "
+                f"No scheduler responds at {scheduler} ({error}). Start one with dask scheduler, "
                 "and give the address that it prints."
             ) from None
         try:  # a batch system may start the first worker later than the scheduler
@@ -148,8 +148,8 @@ class Cluster:
             self.close()
             raise ValueError(
                 f"The scheduler at {scheduler} has no worker after {patience} ({error}). Start "
-                f"some, as dask worker {scheduler} --nworkers 8 --nthreads 1, let its cluster "
-                f"scale, or wait for longer: {LONGER} in the environment."
+                f"some, as dask worker {scheduler} --nworkers 8 --nthreads 1, or wait longer: "
+                f"set {LONGER} in the environment."
             ) from None
         # repeated attempts failed
         self.lost = 0
@@ -252,8 +252,8 @@ def engine(
         yield chosen
     except CancelledError:  # of calls that no scheduler knows any more
         raise ConnectionError(
-            f"The scheduler at {scheduler} ended, and none answered there while dask waits "
-            f"({LONGER}). Start it and its workers again; --resume goes on where this ended."
+            f"The scheduler at {scheduler} ended and did not return in time ({LONGER}). Start it "
+            "and its workers again, and continue with --resume."
         ) from None
     finally:
         chosen.close()
@@ -276,6 +276,6 @@ def check_engine(workers: int, scheduler: str | None) -> None:
     """
     if scheduler is not None and workers > 1:
         raise ValueError(
-            f"--workers {workers} are of this machine and --scheduler {scheduler} is of a cluster, "
-            "which has workers of its own: give one."
+            f"--workers {workers} is for this machine, and --scheduler {scheduler} is for a "
+            "cluster with its own workers. Give only one of them."
         )

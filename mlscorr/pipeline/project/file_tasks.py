@@ -86,7 +86,7 @@ def read_tile(path: Path, owners: Sequence[TileOwner]) -> dict[str, Tile]:
         if len(other := np.setdiff1d(np.flatnonzero(counts), every)):
             raise ValueError(
                 f"{counts[other].sum()} of the {layout.points} points of {path} have a "
-                f"point_source_id that is of no drive (first: {other[0]}). Add it to the "
+                f"point_source_id that belongs to no drive (first: {other[0]}). Add it to the "
                 "point_source_ids of the [[drive]] that measured these points."
             )
     tiles = {}
@@ -121,8 +121,8 @@ def refuse(drive: str, ids: Sequence[int], files: Sequence[CloudFile]) -> None:
     own, others = (", ".join(map(str, numbers)) for numbers in (ids, there))
     raise ValueError(
         f"None of the {sum(file.points for file in files)} points in the files of drive {drive} "
-        f"has its point_source_id ({own}): they have {others}. Correct the point_source_ids of its "
-        "[[drive]], or leave it out."
+        f"has its point_source_id ({own}); they have {others}. Correct the point_source_ids of "
+        "its [[drive]], or remove them."
     )
 
 
@@ -169,8 +169,8 @@ def _check_same(path, identity):
     """Refuse a file that changed after its task was planned."""
     if FileIdentity.of(path) != identity:
         raise OSError(
-            f"{path} was replaced or changed while it was read: another program may still be "
-            "writing. Run again with --resume when it is whole."
+            f"{path} changed while it was read; another program may still be writing. Run again "
+            "with --resume when it is complete."
         )
 
 

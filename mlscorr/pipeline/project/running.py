@@ -13,10 +13,10 @@ from mlscorr.pipeline.project.tasks import Outcome, Task, Written, carry_out
 from mlscorr.survey import Statement
 
 LOSS = (
-    "its worker was lost {} times while nothing else was at work: the system may have ended it for "
-    "want of memory. Give workers more, or take fewer of them."
+    "its worker was lost {} times while no other task was running, probably for lack of memory. "
+    "Give workers more memory, or use fewer of them."
 )
-FAILED = "{} of {} parts needed together failed ({}): {.fault} --resume works on these alone."
+FAILED = "{} of {} required parts failed ({}): {.fault} --resume repeats only these."
 
 
 def present(store: TaskStore, kind: str, key: str) -> tuple[Any, tuple[str, ...]] | None:

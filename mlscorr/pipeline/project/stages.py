@@ -163,9 +163,9 @@ def check_control_near(project: ProjectParts, surveys: Sequence[Survey]) -> None
         check_control(project)
         raise ValueError(
             f"None of the {len(project.control)} control points of {project.path} (first: "
-            f"{project.control.name[0]}) lies near a cloud of its "
-            f"{counted(len(surveys), 'drive')} by the "
-            "headers. Is the list whole, and in the CRS of the clouds? --ties-only needs none."
+            f"{project.control.name[0]}) is near a cloud of its "
+            f"{counted(len(surveys), 'drive')}, by the headers. Check that the list is complete "
+            "and in the CRS of the clouds, or use --ties-only."
         )
 
 

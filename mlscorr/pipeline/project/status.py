@@ -34,8 +34,8 @@ def project_status(out: str | Path) -> dict:
     store = TaskStore(out / STORE)
     if not is_there(store.plan):
         raise ValueError(
-            f"{out} holds no results of a project, or its run has not begun with any file yet: "
-            "mlscorr correct project.toml -o OUT makes them."
+            f"{out} has no results of a project, or its run has not started any file yet. Start "
+            "it with mlscorr correct project.toml -o OUT."
         )
     stages = _planned(store)
     done = {kind: store.keys(kind) for kind in stages}
@@ -68,8 +68,8 @@ def _planned(store):
         return dict(json.loads(read_bytes(store.plan)))
     except (ValueError, TypeError) as error:
         raise ValueError(
-            f"{store.plan} is damaged ({error}), so that nothing tells how far the run has come: "
-            "mlscorr correct project.toml -o OUT --resume writes it anew and keeps what is done."
+            f"{store.plan} is damaged ({error}), so the progress is unknown. mlscorr correct "
+            "project.toml -o OUT --resume writes it again and keeps completed work."
         ) from error
 
 

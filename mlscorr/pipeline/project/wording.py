@@ -41,7 +41,7 @@ def _stage_progress(
         whole = f"{counted(tasks, 'file')} of {counted(drives, 'drive')}"
     time = ""
     if left is not None:
-        time = f"{duration(left)} left of this stage, "
+        time = f"{duration(left)} left in this stage, "
     return (
         f"{TITLES[stage]}: {done} of {whole}, {percent(share)}, {rate / 1e6:.3g} M points/s, {time}"
         f"{counted(failures, 'failure')} so far"
@@ -51,12 +51,12 @@ def _stage_progress(
 PROGRESS: dict[str, Wording] = {
     "task warning": "Warning: {task}: {text}",
     "task failed": "Failed: {task}: {text}",
-    "task lost with scheduler": "{task} was lost with the scheduler, and is done again.",
-    "task lost with worker": "{task} lost its worker, and is done again.",
-    "no worker yet": "The cluster has no worker yet: waiting at {scheduler}, {patience} at most.",
-    "scheduler lost": "The scheduler is lost, and may start again: waiting at {scheduler}, "
-    "{patience} at most.",
-    "scheduler back": "A scheduler answers again, and is given what the lost one was given.",
+    "task lost with scheduler": "{task} was lost with the scheduler and is repeated.",
+    "task lost with worker": "{task} lost its worker and is repeated.",
+    "no worker yet": "The cluster has no worker yet: waiting at {scheduler}, at most {patience}.",
+    "scheduler lost": "The scheduler is lost and may restart: waiting at {scheduler}, at most "
+    "{patience}.",
+    "scheduler back": "A scheduler responds again; the tasks of the lost one were submitted to it.",
     "drives estimated": "Estimating {drives} drives together.",
     "stage progress": _stage_progress,
 }

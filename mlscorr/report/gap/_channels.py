@@ -15,10 +15,10 @@ from mlscorr.report.style import BLUE, GREY, VERMILLION, legend_above, new_figur
 from mlscorr.wording import joined, known, plain
 
 WORDS = {  # of channels: meaning, figure, axis label
-    "intensity": ("Intensity", "real over simulated, beside the usual ratio", "Ratio"),
+    "intensity": ("Intensity", "real over simulated, relative to the usual ratio", "Ratio"),
     "density": ("Density", "real over simulated number", "Ratio"),
-    "dropout": ("Lost beams", "real less simulated share", "Share"),
-    "edge_width": ("Edge width", "real less simulated, mrad", "mrad"),
+    "dropout": ("Lost beams", "real minus simulated share", "Share"),
+    "edge_width": ("Edge width", "real minus simulated, mrad", "mrad"),
 }
 SPLITS = {
     "range": "range (m)",
@@ -81,7 +81,7 @@ def channel_statements(document: dict) -> Iterator[StatementRow]:
     rest = f" Not compared: {rest}." if silent else ""
     sentences = [text for each in compared for text in each["sentences"]]
     if not sentences:
-        yield StatementRow("Channels", "green", f"No difference beyond chance in {names}.{rest}")
+        yield StatementRow("Channels", "green", f"No significant difference in {names}.{rest}")
         return
     more = len(sentences) - 1
     rest = f" {more} more on the page." * bool(more) + rest
@@ -151,7 +151,7 @@ def channels_figure(document: dict) -> Figure:
         _draw(panel, each, table)
     for panel in panels[len(tables) :]:
         panel.set_visible(False)
-    marks = ((BLUE, "Within chance"), (VERMILLION, "Beyond chance"))
+    marks = ((BLUE, "Not significant"), (VERMILLION, "Significant"))
     handles = [Line2D([], [], color=c, marker="o", lw=1.2, ms=4, label=text) for c, text in marks]
     handles.append(Line2D([], [], color=GREY, linewidth=0.9, label="As simulated"))
     legend_above(figure, handles)

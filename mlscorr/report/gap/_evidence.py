@@ -22,7 +22,7 @@ from mlscorr.report.style import (
 from mlscorr.wording import known, percent
 
 FAMILIES = {  # color, hatch, words
-    "none": (GREY, "", "nothing wrong"),
+    "none": (GREY, "", "no error"),
     "unknown": (ORANGE, "////", "something unknown"),
     "noise": (GREEN, "....", "noise class"),
     "effect": (BLUE, "", "known effect"),
@@ -67,7 +67,7 @@ def ladder_figure(document: dict) -> Figure:
     panel.margins(x=0.12)
     panel.grid(axis="y", visible=False)
     panel.tick_params(axis="y", length=0)
-    panel.set_xlabel("Powers of ten by which it explains the data better than nothing wrong")
+    panel.set_xlabel("Evidence over no error (powers of ten)")
     legend_above(figure, _legend(rungs), columns=4)
     return figure
 
@@ -172,7 +172,7 @@ def heat_figure(separability: dict) -> Figure:
     panel.grid(visible=False)
     panel.tick_params(length=0)
     bar = figure.colorbar(cells, ax=panel, shrink=0.6, pad=0.02)
-    bar.set_label("Squared correlation: 0 = told apart, 1 = the same")
+    bar.set_label("Squared correlation: 0 = separable, 1 = not separable")
     bar.ax.axhline(INFERENCE.same, color=VERMILLION, linewidth=1.5)
     return figure
 

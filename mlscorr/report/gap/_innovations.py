@@ -39,7 +39,7 @@ class ChannelStyle(NamedTuple):
 CHANNELS = {
     "target": ChannelStyle(style.BLACK, "o", "Targets"),
     "surface": ChannelStyle(style.SKY, "s", "Surfaces against the reference"),
-    "shared": ChannelStyle(style.GREEN, "^", "Surfaces seen in two passes"),
+    "shared": ChannelStyle(style.GREEN, "^", "Surfaces scanned in two passes"),
     "roughness": ChannelStyle(style.ORANGE, "D", "Roughness"),
     "return_rate": ChannelStyle(style.VERMILLION, "v", "Return rate"),
 }
@@ -173,7 +173,7 @@ def _legend(styles, windows):
     handles = [style.mark_handle(s.mark, s.color, s.words, size=4) for s in styles.values()]
     handles.append(Patch(color=STRIPE, label=f"±{SETTINGS.stripe_sigmas:.0f} sigma"))
     if windows:
-        handles.append(Patch(color=WINDOW, label="When the effect acts"))
+        handles.append(Patch(color=WINDOW, label="Interval in which the effect acts"))
     return handles
 
 

@@ -29,10 +29,10 @@ def accuracy_sentence(accuracy: dict) -> str:
     """
     worst = int(np.argmax(accuracy["sigma"]))
     return (
-        f"By what is believed of the POS, {len(set(accuracy['control_times']))} looks at control "
-        f"points give the corrected position a 3D sigma of {length_in_words(accuracy['rms'])} "
-        f"(RMS along the drive), at worst {length_in_words(accuracy['largest'])} at "
-        f"{accuracy['gps_time'][worst]:.1f} s."
+        f"With the assumed accuracy of the POS, {len(set(accuracy['control_times']))} "
+        "observations of control points give a 3D sigma of the corrected position of "
+        f"{length_in_words(accuracy['rms'])} (RMS along the drive). The largest is "
+        f"{length_in_words(accuracy['largest'])} at {accuracy['gps_time'][worst]:.1f} s."
     )
 
 
@@ -60,8 +60,8 @@ def accuracy_figure(document: dict) -> Figure:
         inside = np.searchsorted(between, time) == number
         panel.plot(time[inside] - start, sigma[inside], color=BLUE, label="Corrected position, 3D")
         for times, color, mark, words in (
-            (control, GREY, "|", "A control point is seen"),
-            (places, VERMILLION, "*", "The next one would help most"),
+            (control, GREY, "|", "Control point observed"),
+            (places, VERMILLION, "*", "Best position for the next control point"),
         ):
             there = times[np.searchsorted(between, times) == number] - start
             panel.plot(there, np.zeros(len(there)), mark, color=color, markersize=8, label=words)
@@ -88,7 +88,10 @@ def detectable_figure(rows: list[DetectableRow]) -> Figure:
     low = min(0.5, ratio.min() / 1.6)
     high = max(2.0, ratio.max() * 1.6)
     panel.axvspan(low, 1.0, color="#e6f1f8", zorder=0)
-    marks = (("o", BLUE, "Shows at its usual size"), ("X", VERMILLION, "Must be larger to show"))
+    marks = (
+        ("o", BLUE, "Shows at its usual size"),
+        ("X", VERMILLION, "Only larger errors detectable"),
+    )
     for place, value in enumerate(ratio):
         mark, color, _ = marks[int(value > 1)]
         panel.plot([1.0, value], [place] * 2, color="#b8bfc5", linewidth=1.2, zorder=1)
@@ -101,6 +104,6 @@ def detectable_figure(rows: list[DetectableRow]) -> Figure:
     panel.set_ylim(len(rows) - 0.4, -0.6)
     panel.grid(axis="y", visible=False)
     panel.tick_params(axis="y", length=0)
-    panel.set_xlabel("Smallest size that shows, over the usual size (logarithmic)")
+    panel.set_xlabel("Smallest detectable size over the usual size (logarithmic)")
     legend_above(figure, [mark_handle(*mark) for mark in marks])
     return figure

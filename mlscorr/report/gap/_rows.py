@@ -24,7 +24,7 @@ def numbers(values: Iterable[float | None]) -> np.ndarray:
 
 COVARIATES = {
     "time": "Time since the start",
-    "location": "Way along the road",
+    "location": "Chainage",
     "range": "Distance from the scanner",
     "incidence": "Angle of incidence",
     "scan_angle": "Scan angle",
@@ -33,7 +33,7 @@ COVARIATES = {
     "turn_rate": "Turn rate, to the right",
     "pass": "Pass",
     "axis": "Axis",
-    "channel": "What was compared",
+    "channel": "Residuals compared",
 }
 
 
@@ -236,7 +236,7 @@ def _visibility(small, ratio):
     """Visibility of an effect in the survey, in words.
 
     >>> _visibility(0.02, 0.4), _visibility(0.02, 2.5)
-    ('yes', 'only if 2.5 times the usual')
+    ('yes', 'only from 2.5 times the usual size')
     """
     if ratio is None:
         if known(small):
@@ -244,7 +244,7 @@ def _visibility(small, ratio):
         return "no"
     if ratio <= 1:
         return "yes"
-    return f"only if {ratio:.{int(ratio < 10)}f} times the usual"
+    return f"only from {ratio:.{int(ratio < 10)}f} times the usual size"
 
 
 def worst_rows(rows: list[DetectableRow]) -> list[DetectableRow]:

@@ -42,7 +42,7 @@ def where_figure(document: dict) -> Figure:
         Line2D([], [], color=BEFORE, linewidth=2.2, label="Before"),
         Line2D([], [], color=AFTER, linewidth=2.2, linestyle="--", label="After"),
     )
-    acts = [Patch(color=WINDOW, label="Where the cause acts")]
+    acts = [Patch(color=WINDOW, label="Interval in which the cause acts")]
     legend_above(figure, _legend(*lines) + acts * any(split.get("extent") for split in splits))
     return figure
 
@@ -64,7 +64,7 @@ def _band(split):
 
 def _legend(*before_after):
     """Legend entries of before, after and the null band."""
-    return [*before_after, Patch(color=BAND, label="When nothing is wrong (95 %)")]
+    return [*before_after, Patch(color=BAND, label="Without any error (95 %)")]
 
 
 def _split(panel, split, is_explained):
@@ -194,9 +194,9 @@ def _folds(panel, folds):
     for key, color, shift in (("before", BEFORE, -0.2), ("after", AFTER, 0.2)):
         panel.bar(places + shift, numbers(f[key] for f in folds), width=0.36, color=color, zorder=2)
     panel.axhline(0.0, color=GREY, linewidth=0.7)
-    panel.set_xlabel("Block of data that was held out")
+    panel.set_xlabel("Block of held-out data")
     places = places[:: 1 + len(folds) // 10]
     panel.set_xticks(places, [str(place + 1) for place in places], fontsize=7.5)
-    panel.set_title("Each held-out block by itself")
+    panel.set_title("Each held-out block")
     panel.grid(axis="x", visible=False)
     panel.set_visible(bool(folds))

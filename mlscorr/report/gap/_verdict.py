@@ -9,11 +9,11 @@ from mlscorr.report.headline import has_assumed_sigma
 from mlscorr.wording import DASH, joined, known, percent, signed, size, thousands
 
 GAPS = {  # by kind of gap in a closure
-    "systematic": "Systematic part of the gap (a mean over all rows)",
+    "systematic": "Systematic part of the gap (mean over all residuals)",
     "scatter": "Scatter beyond the stated one",
-    "returns": "Returns beyond the expected ones",
+    "returns": "Returns beyond those expected",
 }
-NOTHING_TO_CLOSE = "Before, it was no larger than chance makes it: there is nothing to close."
+NOTHING_TO_CLOSE = "The gap was already within chance before, so it can't decrease."
 AXES = {"E": "easting", "N": "northing", "H": "height"}
 
 
@@ -70,7 +70,7 @@ def shrinking(document: dict) -> Fact:
     gap = document["gap"]
     if not is_closed(document):
         before = signed(gap["before"], gap["unit"])
-        more = f"When nothing is wrong: {span(gap)}."
+        more = f"Without any error: {span(gap)}."
         return Fact("The gap between survey and simulation", before, more)
     pair = " → ".join(signed(closure[when], closure["unit"]) for when in ("before", "after"))
     if document["verdict"]["label"] == "unknown":
@@ -81,16 +81,18 @@ def shrinking(document: dict) -> Fact:
     if not known(closure["shrink"]):
         more = ""
     elif is_within(*left, is_left=True):
-        chance = " What is left is what chance leaves when nothing is wrong."
+        chance = " The remaining gap is within chance."
         more = "" if _not_closed(closure) else chance
     elif is_within(*left):
-        more = " Less is left than chance leaves: too much was put in."
+        more = " The remaining gap is smaller than by chance: the correction was too large."
     if closure["is_held_out"]:
         data = "held-out data"
     else:
-        data = "the data in which it was found"
+        data = "the data from which it was estimated"
     part = f"{GAPS.get(closure.get('kind'), 'Gap')} on {data}"
-    return Fact(f"{part}, before → after the simulator has it", pair, shrunk(closure) + more)
+    return Fact(
+        f"{part}, before → after adding the cause to the simulator", pair, shrunk(closure) + more
+    )
 
 
 def shrunk(closure: dict) -> str:
@@ -109,11 +111,11 @@ def shrunk(closure: dict) -> str:
         return _not_closed(closure) + NOTHING_TO_CLOSE
     if known(low) and known(high):
         between = f" (95 %: {percent(low)} to {percent(high)})"
-    text = f"{percent(share)} of the squared gap is gone{between}."
+    text = f"The squared gap decreased by {percent(share)}{between}."
     if share >= 1:
-        text = f"All of the squared gap is gone{between}."
+        text = f"The squared gap was removed completely{between}."
     elif share < 0:
-        text = f"The squared gap did not shrink, it grew{between}."
+        text = f"The squared gap increased{between}."
     return _not_closed(closure) + text
 
 
@@ -130,10 +132,7 @@ def _not_closed(closure: dict) -> str:
         return ""
     ratio = dict(zip(errors["axes"], errors["after"], strict=True))
     sizes = [f"{ratio[axis]:.1f} times in {AXES[axis]}" for axis in errors["beyond"]]
-    return (
-        f"Not closed: errors are still {joined(sizes)} the sigma that the simulator gives them. "
-        "Of squares in mm: "
-    )
+    return f"Not closed: errors are still {joined(sizes)} the simulated sigma. Squares in mm: "
 
 
 def span(gap: dict) -> str:
@@ -154,18 +153,17 @@ CERTAINTY = (  # smallest probability for each phrase
     (0.9, "very likely"),
     (0.66, "likely"),
     (0.5, "more likely than not"),
-    (0.0, "only the likeliest of several"),
+    (0.0, "the most probable of several"),
 )
 DIFFERENCE = {  # by the threshold that residuals exceed, without a named cause
-    "": "The survey and its simulation differ by no more than chance makes them differ.",
-    "stated": "Errors are larger than what is stated makes them, but no error that is known "
-    "explains them well enough to be named.",
-    "chance": "All in all the two differ by more than 39 of 40 surveys do in which nothing is "
-    "wrong, but no error that is known explains this better than chance does.",
+    "": "Survey and simulation agree within chance.",
+    "stated": "The errors are larger than stated, but no known error explains them well enough.",
+    "chance": "Survey and simulation differ more than in 39 of 40 surveys without any error, "
+    "but no known error explains this better than chance.",
 }
 NUMBER_WORDS = ("none", "one", "two", "three", "four")
-SCATTER = "This is scatter: no correction takes it off, but accuracies must be stated larger."
-NEGATIVE = "It is what the two differ by beyond chance; below zero: less than by chance."
+SCATTER = "This is noise: no correction removes it, but larger sigmas must be stated."
+NEGATIVE = "Difference beyond chance; below zero: less than by chance."
 
 
 class VerdictBox(NamedTuple):
@@ -200,7 +198,7 @@ def verdict(document: dict) -> VerdictBox:
     kind = family(document["verdict"]["label"])
     if not is_judged(document):
         short = "Too little of this survey could be compared with the simulator."
-        return VerdictBox("open", "It can't be told yet", [answer["sentence"] or short])
+        return VerdictBox("open", "No verdict yet", [answer["sentence"] or short])
     box = {"none": _nothing, "unknown": _unknown}.get(kind, _cause)(document)
     others = _not_ruled_out(document)
     more = [f"Not ruled out: {others}."] if others else []
@@ -232,7 +230,7 @@ def is_named(document: dict) -> bool:
 
 def _nothing(document):
     excess = document["verdict"]["excess"]
-    small = "An error smaller than the sizes that would show here may be there all the same."
+    small = "Errors below the smallest detectable sizes remain possible."
     kicker = no_cause(document["verdict"]["set"], excess)
     tone = "open" if excess else "good"
     return VerdictBox(tone, kicker, [f"{DIFFERENCE[excess]} {small}"])
@@ -242,16 +240,16 @@ def _unknown(document):
     answer = document["verdict"]
     if answer.get("hidden"):
         return VerdictBox(
-            "open", "Nothing shows, but not everything was seen", [answer["sentence"]]
+            "open",
+            "No error was detected, but not everything could be compared",
+            [answer["sentence"]],
         )
     if answer["lead"]:
-        text = f"It looks like: {answer['lead']}."
+        text = f"Hint: {answer['lead']}."
     else:
-        text = "It can't be said what it looks like."
-    more = "This is a lead to follow, not a cause: whatever behaves like that may have made it."
-    return VerdictBox(
-        "open", "Something is wrong that no effect judged here explains", [text, more]
-    )
+        text = "Its pattern gives no hint."
+    more = "This is a hint, not a cause: any error with this pattern may have produced it."
+    return VerdictBox("open", "An error that no tested effect explains", [text, more])
 
 
 def _cause(document):
@@ -265,9 +263,9 @@ def _cause(document):
         either, *more = [lowered(" ".join(_sentences(document, name))) for name in (label, *others)]
         sentences = [f"Either {either}", *(f"Or {text}" for text in more)]
         large = len(sentences)
-        kicker = f"One of {_number_word(large)} is wrong; this survey can't tell which"
+        kicker = f"One of {_number_word(large)} errors, not separable in this survey"
     elif parts > 1:
-        kicker = f"{_number_word(parts).capitalize()} things are wrong"
+        kicker = f"{_number_word(parts).capitalize()} errors"
     elif family(label) == "noise":
         is_assumed = label == "position_noise" and has_assumed_sigma(document["assumed"])
         if is_assumed:
@@ -276,9 +274,9 @@ def _cause(document):
             kicker = "Noisier than stated"
         sentences = [*sentences, SCATTER]
     elif answer["probability"] >= 0.5:
-        kicker = "One thing is wrong"
+        kicker = "One error"
     else:
-        kicker = "Possibly wrong"
+        kicker = "Possible error"
     return VerdictBox("bad", kicker, sentences, large)
 
 
@@ -341,10 +339,10 @@ def facts(document: dict) -> list[Fact]:
         return [_certainty(document), whole]
     is_pattern = is_within(gap["before"], gap["null_band"])
     if is_pattern:
-        more = "What gives it away is its pattern, not its size."
+        more = "It was detected by its pattern, not by its size."
     else:
         more = ""
-    where = Fact("Where it shows most", headline, more, stop="")
+    where = Fact("Where it is largest", headline, more, stop="")
     return [_certainty(document), where, shrinking(document)]
 
 
@@ -361,9 +359,9 @@ def _certainty(document):
         )
         > share
     ):
-        words = "another is likelier, but would cost more if it were wrong"
-    more = [chance(answer["p_value"]), "± is one sigma." if is_named(document) else ""]
-    return Fact("How sure", f"{_in_hundred(share)}: {words}", " ".join(filter(None, more)))
+        words = "another is more probable, but a wrong verdict would cost more"
+    more = [chance(answer["p_value"]), "± is 1 sigma." if is_named(document) else ""]
+    return Fact("Confidence", f"{_in_hundred(share)}: {words}", " ".join(filter(None, more)))
 
 
 def _in_hundred(share: float | None) -> str:
@@ -393,8 +391,8 @@ def chance(p_value: float | None) -> str:
     p_value : float or None
 
     >>> chance(0.04976)
-    'Of 100 surveys with a POS as bad as fits this one, and nothing else wrong, 5 would look as
-    odd.'
+    'Of 100 surveys without any error and with an equally inaccurate POS, 5 would deviate as
+    much.'
     """
     if not known(p_value):
         return ""
@@ -408,8 +406,8 @@ def chance(p_value: float | None) -> str:
     else:
         words = number
     return (
-        f"Of {words} surveys with a POS as bad as fits this one, and nothing else wrong, {count} "
-        "would look as odd."
+        f"Of {words} surveys without any error and with an equally inaccurate POS, {count} would "
+        "deviate as much."
     )
 
 

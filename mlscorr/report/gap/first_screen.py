@@ -20,15 +20,15 @@ from mlscorr.wording import joined, length_in_words
 RATINGS = {"good": "green", "open": "amber", "bad": "red"}  # by tone of the verdict
 TIMES = [time for _, time, _ in POS.process_shapes]
 USES = {  # of defaults that are not estimated
-    "pos.attitude_sigma": "how much larger or smaller it is, is open",
-    "pos.correlation_time": f"{min(TIMES):g} to {max(TIMES):g} times as long is possible, too",
-    "scanner.range_noise": "how rough surfaces are is not compared with it",
-    "scanner.angle_noise": "how rough surfaces are is not compared with it",
+    "pos.attitude_sigma": "its scale is estimated",
+    "pos.correlation_time": f"{min(TIMES):g} to {max(TIMES):g} times as long is also possible",
+    "scanner.range_noise": "not compared with surface roughness",
+    "scanner.angle_noise": "not compared with surface roughness",
 }
 THINGS = {  # observed items of residuals, in words
     "target": "Surveyed targets",
     "surface": "Reference surface",
-    "shared": "Planes that two passes both saw",
+    "shared": "Planes scanned in two passes",
 }
 
 
@@ -46,10 +46,10 @@ def gap_screen(document: dict) -> dict[str, object]:
     items += [
         (fact.title, f"{fact.number}{fact.stop} {fact.more}".strip()) for fact in facts(document)
     ]
-    answer = StatementRow("Unmodelled", RATINGS[box.tone], f"{box.kicker}. {first}", tuple(items))
+    answer = StatementRow("Unmodeled", RATINGS[box.tone], f"{box.kicker}. {first}", tuple(items))
     warnings = warning_statements(document["warnings"])
     beside = (*channel_statements(document), *unjudged(document))
-    judged = ", and nothing is judged by that"
+    judged = ", and the accuracy is not tested against it"
     assumed = assumed_statement(document["assumed"], judged, "amber", USES)
     return statements_section([*accuracy(document), answer, *assumed, *beside, *warnings])
 
@@ -64,7 +64,7 @@ def accuracy(document: dict) -> Iterator[StatementRow]:
     """
     parts = document["agreement"]
     if document["simulator"]["effects"]:
-        less = ", less what the simulator has in it,"
+        less = ", after removing the errors in the simulator,"
     else:
         less = ""
     if not parts:
@@ -81,8 +81,8 @@ def accuracy(document: dict) -> Iterator[StatementRow]:
     for part in parts:
         lengths = part["rms_mm"], part["stated_mm"], SETTINGS.quantile * part["stated_mm"]
         residual, stated, limit = (length_in_words(length / 1e3) for length in lengths)
-        states = f"{stated} by what POS, survey and extraction state (worse from {limit} on)"
-        sizes.append((THINGS[part["channel"]], f"off by {residual} (RMS per axis), {states}"))
+        states = f"{stated} from the stated accuracy of POS, survey and extraction (limit {limit})"
+        sizes.append((THINGS[part["channel"]], f"RMS {residual} per axis, {states}"))
     rating = "amber" if any(is_worse) else "green"
     items = (*sizes, *_moved(document))
     yield StatementRow("Accuracy", rating, f"The recorded cloud{less} is {answer} stated.", items)
@@ -91,12 +91,12 @@ def accuracy(document: dict) -> Iterator[StatementRow]:
 def _unstated_accuracy(document, less):
     """Statement on errors of the recorded cloud without a stated POS accuracy."""
     sizes = [
-        (THINGS[part["channel"]], f"off by {length_in_words(part['rms_mm'] / 1e3)} (RMS per axis)")
+        (THINGS[part["channel"]], f"RMS {length_in_words(part['rms_mm'] / 1e3)} per axis")
         for part in document["agreement"]
     ]
     sentence = (
-        f"The recorded cloud{less} can't be compared with a stated accuracy: no sigma of the POS "
-        "is stated."
+        f"The recorded cloud{less} can't be compared with a stated accuracy, because no sigma of "
+        "the POS is given."
     )
     return StatementRow("Accuracy", "amber", sentence, (*sizes, *_moved(document)))
 
@@ -107,7 +107,7 @@ def _moved(document):
     if not is_named(document) or not causes or not causes[0]["rms_mm"]:
         return ()
     size = length_in_words(causes[0]["rms_mm"] / 1e3)
-    return ((title(causes[0]["effect"]), f"moves what was compared by {size} (RMS)"),)
+    return ((title(causes[0]["effect"]), f"effect on the residuals: {size} (RMS)"),)
 
 
 def unjudged(document: dict) -> Iterator[StatementRow]:
@@ -126,6 +126,6 @@ def unjudged(document: dict) -> Iterator[StatementRow]:
         )
         judged = [rung["label"] for rung in document["evidence"] if "+" not in rung["label"]]
         total = len(left) + len({*judged} - {"none", "unknown"})
-        sentence = f"{len(left)} of {total} kinds of error can be neither named nor ruled out here."
+        sentence = f"{len(left)} of {total} types of error can't be tested here."
         rating = "amber" if document["mendable"] else "green"
-        yield StatementRow("Not judged", rating, sentence, items)
+        yield StatementRow("Not tested", rating, sentence, items)

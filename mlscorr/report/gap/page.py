@@ -82,27 +82,27 @@ def _separability(document):
 
 
 SECTIONS = {  # in order; empty ones are omitted
-    "where": "Where it shows",
-    "innovations": "Over time",
-    "evidence": "Candidates",
+    "where": "Location",
+    "innovations": "Innovations",
+    "evidence": "Hypotheses",
     "causes": "Causes in numbers",
-    "separability": "What can be told apart",
-    "closure": "How far it shrinks",
-    "rounds": "Round by round",
+    "separability": "Separability",
+    "closure": "Decrease of the gap",
+    "rounds": "Rounds",
     "channels": "Other channels",
     "distances": "Other distances",
     "map": "Map",
     "next": "What to measure next",
-    "used": "What was compared",
+    "used": "Residuals compared",
     "method": "Method",
 }
 PLANNED = {
     "accuracy": "Accuracy along the drive",
-    "detectable": "How small an error would show",
+    "detectable": "Smallest detectable errors",
     "separability": SECTIONS["separability"],
     "map": SECTIONS["map"],
     "next": SECTIONS["next"],
-    "left": "What can't be judged",
+    "left": "Errors not tested",
     "method": SECTIONS["method"],
 }
 
@@ -139,7 +139,7 @@ def diagnosis_page(document: dict, name: str) -> Page:
         "smallest": smallest(detectable) if is_clean else [],
         "splits_in_words": joined(lowered(rows.split_title(split)) for split in document["where"]),
         "bin_rows": rows.bin_rows(document),
-        "shared": "what the cause moves" if is_named(document) else "the squared gap",
+        "shared": "the effect of the cause" if is_named(document) else "the squared gap",
         "open_causes": _open_causes(answer),
         "in_set": joined(lowered(title(label)) for label in answer["set"]),
         "cause_rows": probable,
@@ -156,7 +156,7 @@ def diagnosis_page(document: dict, name: str) -> Page:
         "already": titles(e["name"] for e in document["simulator"]["effects"]) or "none",
     }
     sections = {key: text for key, text in SECTIONS.items() if not is_empty.get(key)}
-    headline = f"{name}: what its simulator does not describe"
+    headline = f"{name}: errors that its simulator does not include"
     return _page(document, name, headline, "gap-summary.html", sections, separability, content)
 
 
@@ -189,7 +189,7 @@ def plan_page(document: dict, name: str) -> Page:
     if document["advice"]:
         content["advice_title"] = "What to add"
     sections = {key: text for key, text in PLANNED.items() if not is_empty.get(key)}
-    headline = f"{name}: what this survey could show"
+    headline = f"{name}: errors that this survey can detect"
     return _page(document, name, headline, "gap-plan-summary.html", sections, document, content)
 
 
@@ -220,7 +220,7 @@ def _channels(document):
         "channels_silent": silent,
         "channel_rows": channel_rows(document),
         "distance_rows": distance_rows(document),
-        "gap_words": f"{' before, '.join(sides)} after ({span(gap)} when nothing is wrong)",
+        "gap_words": f"{' before, '.join(sides)} after ({span(gap)} without any error)",
     }
 
 
@@ -246,13 +246,15 @@ def _plan_verdict(worst, document):
     visible = [row.title for row in worst if row.visible == "yes"]
     hidden = [row.title for row in worst if row.visible not in ("yes", DASH)]
     if len(visible) == 1:
-        errors = "kind of error"
+        errors = "type of error"
     else:
-        errors = "kinds of error"
-    sentences = [f"{len(visible)} {errors} would show at the usual size, {len(hidden)} would not."]
+        errors = "types of error"
+    sentences = [
+        f"{len(visible)} {errors} would be detectable at the usual size, {len(hidden)} would not."
+    ]
     if hidden:
-        sentences.append(f"Must be larger to show: {joined(map(lowered, hidden))}.")
+        sentences.append(f"Only detectable if larger: {joined(map(lowered, hidden))}.")
     classes = [titles(members) for members in document["classes"]]
-    sentences += [f"Not told apart: {lowered(members)}." for members in classes]
+    sentences += [f"Not separable: {lowered(members)}." for members in classes]
     tone = "open" if hidden or classes else "good"
-    return VerdictBox(tone, "What this survey could show", sentences)
+    return VerdictBox(tone, "Errors that this survey can detect", sentences)

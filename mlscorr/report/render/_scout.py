@@ -54,7 +54,7 @@ def scout(
         for k in np.flatnonzero(apart <= radii):  # not every target in every chunk
             near[k].append(_around(cloud, centres[k], radii[k]))
     if not sample.count:
-        raise ValueError("The cloud has no points: there is nothing to draw.")
+        raise ValueError("The cloud has no points to draw.")
     before = PointCloud.concatenate(sample.parts)
     normals = np.array([_normal(np.concatenate(parts)) for parts in near]).reshape(-1, 3)
     return Scouted(before, correction.apply(before), normals)

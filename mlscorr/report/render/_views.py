@@ -73,7 +73,7 @@ def _overview_title(rows):
         role = "control"
     rows = [row for row in rows if row.role == role]
     if not rows:
-        return "The whole survey; no target was seen"
+        return "The whole survey; no target was found"
     left_out = [row for row in rows if np.isfinite(row.left_out).all()]
     if role == "control" and left_out:
         rows = left_out
@@ -81,16 +81,16 @@ def _overview_title(rows):
     if points == len(rows):
         often = ""
     else:
-        often = f", seen {len(rows)} times"
-    start = f"{counted(points, f'{role} point')}{often}: {_rmse(rows, 'before')} off before"
+        often = f", {len(rows)} observations"
+    start = f"3D RMSE at {counted(points, f'{role} point')}{often}: {_rmse(rows, 'before')} before"
     if role == "check":
-        return f"{start}, {_rmse(rows, 'after')} after (3D RMSE)"
+        return f"{start}, {_rmse(rows, 'after')} after the correction"
     if left_out:
-        return f"{start}, {_rmse(rows, 'left_out')} when left out in turn (3D RMSE)"
-    them = "them"
+        return f"{start}, {_rmse(rows, 'left_out')} leave-one-out"
+    them = "they were"
     if points == 1:
-        them = "it"
-    return f"{start} (3D RMSE); the correction was made with {them}"
+        them = "it was"
+    return f"{start}; {them} used for the correction"
 
 
 def _rmse(rows, state):
@@ -138,17 +138,20 @@ def section(
         number = len(place.splits) + 1
         often = "twice" if number == 2 else f"{number} times"
         before, after = (length_in_words(value) for value in (place.before, place.after))
-        title = f"Cross-section of a wall scanned {often}: {before} apart before, {after} after"
+        title = (
+            f"Cross-section of a wall scanned {often}: {before} apart before, {after} after the "
+            "correction"
+        )
     else:
         moved = length_in_words(place.moved)
-        title = f"Cross-section of a wall: the correction moves it by {moved}"
+        title = f"Cross-section of a wall: moved {moved} by the correction"
     half_slab = float(np.clip(half / 5, 0.25, 0.5))  # m: enough points, and little of a curve
     east, north = place.focus[:2]
     return View(
         "section",
         title,
-        f"At {east:.0f} E, {north:.0f} N. The same points on both sides: {2 * half_slab:.1f} m of "
-        "the wall, end on.",
+        f"At {east:.0f} E, {north:.0f} N. The same points on both sides: {2 * half_slab:.1f} m "
+        "of the wall, seen end-on.",
         options.camera(focus, azimuth, 0.0, scale),
         options.colour or ("visit" if place.splits else "state"),
         half_depth=half_slab,
@@ -161,10 +164,10 @@ def section(
 def _visits(place):
     """Names of the visits of a position: their passes, or their order."""
     if place.passes:
-        return tuple(f"scanned by pass {number}" for number in place.passes)
+        return tuple(f"scanned in pass {number}" for number in place.passes)
     if len(place.splits) < 2:
         return View.visits
-    return tuple(f"scanned at visit {k + 1}" for k in range(len(place.splits) + 1))
+    return tuple(f"scan {k + 1} of this place" for k in range(len(place.splits) + 1))
 
 
 def target_view(
@@ -227,13 +230,13 @@ def _target_title(rows):
     role = "not used" if group == "unused" else f"{group} point"
     often = f" in {len(rows)} passes" if len(rows) > 1 else ""
     if group == "control":
-        made = " (the correction was made with it)"
+        made = " (used for the correction)"
     else:
         made = ""
     at_most = " at most" if len(rows) > 1 else ""
     were = length_in_words(before)
     are = length_in_words(after)
-    return f"{rows[0].name}, {role}{often}:{at_most} {were} off before, {are} after{made}"
+    return f"{rows[0].name}, {role}{often}: misclosure{at_most} {were} before, {are} after{made}"
 
 
 def _facing(normal, to_vehicle):

@@ -71,7 +71,7 @@ def draw(
     check_pictures(options, views, engine)
     stream = _stream(survey, chunks, progress)
     rows = recomputed([row for row in targets if row.is_observed], correction)
-    to_draw = _views(survey, correction, rows, views, options, stream("Looking at the cloud"), ties)
+    to_draw = _views(survey, correction, rows, views, options, stream("Sampling the cloud"), ties)
     sigmas = point_sigma(survey.trajectory), point_sigma(getattr(correction, "corrected", None))
     largest = max((np.prod(view.camera.size) for view in to_draw), default=1)
     bytes_of_view = 2 * largest * np.dtype(np.uint64).itemsize  # before and after
@@ -87,7 +87,9 @@ def draw(
                     continue
                 except RuntimeError as error:
                     engine = "zbuffer"  # also for the following views
-                    warnings.warn(f"{error}: the z-buffer draws the pictures.", stacklevel=2)
+                    warnings.warn(
+                        f"{error}: the pictures are drawn with the z-buffer.", stacklevel=2
+                    )
             yield sheet.finished()
 
 
@@ -114,12 +116,12 @@ def check_pictures(
     for what, names, known in choices:
         for name in names:
             if name not in known:
-                raise ValueError(f"There is no {what} '{name}'; choose of {', '.join(known)}.")
+                raise ValueError(f"There is no {what} '{name}'; available are {', '.join(known)}.")
     least, largest = SETTINGS.picture_sizes
     if not all(least <= pixels <= largest for pixels in options.size):
         raise ValueError(
-            f"Each picture would have {options.size[0]} x {options.size[1]} pixels; it needs "
-            f"{least} to {largest} each way."
+            f"Each picture would have {options.size[0]} x {options.size[1]} pixels; each side "
+            f"must have {least} to {largest}."
         )
 
 

@@ -21,8 +21,8 @@ MAPS = {  # all darker than paper at both ends, and readable in gray
 LABELS = {
     "intensity": ("Intensity, as recorded", ""),
     "height": ("Height", "m"),
-    "correction": ("How far off each point is: before, by its correction; after, one sigma", "m"),
-    "sigma": ("One sigma of each point, as the trajectory states it", "m"),
+    "correction": ("Expected error of each point: its correction before, 1 sigma after", "m"),
+    "sigma": ("1 sigma of each point, as stated by the trajectory", "m"),
 }
 GHOST = "#c9c9c9"  # the other state, in the background
 PAIRS = {"visit": (BLUE, VERMILLION, GREEN, ORANGE, SKY, BLACK), "state": (BEFORE, AFTER)}

@@ -234,13 +234,13 @@ def _handles(view) -> Iterator[Line2D]:
     kinds = {mark.kind for mark in marks}
     arrow = r"$\rightarrow$"
     if "surveyed" in kinds:
-        yield Line2D([], [], color=MARK, linewidth=2.2, label="Where the target was surveyed")
+        yield Line2D([], [], color=MARK, linewidth=2.2, label="Surveyed position of a target")
     if "offset" in kinds:
-        yield mark_handle(arrow, MARK, "From the scanned centre to the surveyed one", size=9)
+        yield mark_handle(arrow, MARK, "From scanned to surveyed center", size=9)
     for kind, text in WORDS.items():
         if kind in kinds:
             yield Line2D([], [], linestyle="none", markersize=6, label=text, **SYMBOLS[kind])
     for number in {mark.text for mark in marks if mark.kind == "residual"}:
-        yield mark_handle(arrow, MARK, f"To its surveyed place, {number} times enlarged", size=9)
+        yield mark_handle(arrow, MARK, f"To the surveyed position, enlarged {number} times", size=9)
     for colour, text in swatches(view.colour, view.visits):
         yield mark_handle("s", colour, text.capitalize(), size=9)

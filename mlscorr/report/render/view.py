@@ -132,7 +132,7 @@ class View:
     half_depth: float = np.inf
     is_cut: bool = False
     splits: tuple[float, ...] = ()
-    visits: tuple[str, ...] = ("scanned at the first visit", "scanned at the second visit")
+    visits: tuple[str, ...] = ("scanned in the first pass", "scanned in the second pass")
     marks: tuple[tuple[Mark, ...], tuple[Mark, ...]] = ((), ())
 
 

@@ -139,16 +139,14 @@ def read_path(scenario: Scenario) -> list[tuple]:
     """
     drive = scenario.drive
     if drive.stops or drive.u_turn or drive.passes != type(drive)().passes:
-        raise ValueError(
-            "drive.file sets path, stops and passes: leave out stops, u_turn and passes."
-        )
+        raise ValueError("drive.file sets path, stops and passes: remove stops, u_turn and passes.")
     poses = read_poses(drive.file)
     steps = np.diff(poses.gps_time)
     ends = np.flatnonzero(steps > GAP_FACTOR * np.median(steps))
     pieces = np.split(np.arange(len(poses)), ends + 1)
     pieces = [piece for piece in pieces if len(piece) >= 5]
     if not pieces:
-        raise ValueError(f"{drive.file} has {len(poses)} epochs: too few for a path.")
+        raise ValueError(f"{drive.file} has only {len(poses)} epochs, too few for a path.")
     start = poses.gps_time[pieces[0][0]], poses.position[pieces[0][0]]
     return [_piece(poses, piece, *start, drive.pose_rate) for piece in pieces]
 
@@ -213,7 +211,7 @@ def course(elapsed: np.ndarray, position: np.ndarray) -> list[np.ndarray]:
     speed = np.hypot(east, north)
     moving = speed > SETTINGS.course_speed
     if not moving.any():
-        raise ValueError("The path of drive.file stands still: it has no course to look along.")
+        raise ValueError("The path of drive.file does not move, so it has no direction.")
     heading = np.unwrap(np.arctan2(east[moving], north[moving]))
     pitch = np.arctan2(up[moving], speed[moving])
     columns = [np.interp(elapsed, elapsed[moving], column) for column in (heading, pitch)]

@@ -64,25 +64,25 @@ def _check(drive):
     """Refuse inconsistent settings."""
     if len(_epochs(drive)) < 3:
         raise ValueError(
-            f"A drive of {drive.duration} s has less than 3 epochs at {drive.pose_rate} Hz."
+            f"A drive of {drive.duration} s has fewer than 3 epochs at {drive.pose_rate} Hz."
         )
     for start, duration in drive.stops:
         if start + duration > drive.duration:
             raise ValueError(
-                f"A stop of {duration} s from {start} s lies outside the first pass of "
+                f"A stop of {duration} s from {start} s is outside the first pass of "
                 f"{drive.duration} s."
             )
     for leg in drive.passes:
         if abs(leg.lateral) > SETTINGS.lateral_limit:
             raise ValueError(
-                f"A pass {leg.lateral} m beside the centre line leaves the scene: give a lateral "
-                f"of up to {SETTINGS.lateral_limit:.0f} m."
+                f"A pass {leg.lateral} m from the center line is outside the scene. Give a "
+                f"lateral of up to {SETTINGS.lateral_limit:.0f} m."
             )
     for leg in drive.passes[1:]:
         if leg.pause <= GAP_FACTOR / drive.pose_rate:
             raise ValueError(
-                f"A pause of {leg.pause} s between passes is no gap of a trajectory at "
-                f"{drive.pose_rate} Hz: give more than {GAP_FACTOR / drive.pose_rate} s."
+                f"A pause of {leg.pause} s between passes is not a gap of a trajectory at "
+                f"{drive.pose_rate} Hz. Give more than {GAP_FACTOR / drive.pose_rate} s."
             )
 
 
@@ -132,8 +132,8 @@ def _length(scenario, line, pace, phase):
         if drive.u_turn:
             purpose = " for a U-turn"
         raise ValueError(
-            f"A drive of {distance:.1f} m in {drive.duration} s is too short: {least.length:.0f} m "
-            f"are needed{purpose}. Drive longer or faster, or stop less."
+            f"A drive of {distance:.1f} m in {drive.duration} s is too short: {least.length:.0f} "
+            f"m are needed{purpose}. Drive longer or faster, or stop less."
         )
     longest = line.curve.x[-1] - 2 * SETTINGS.margin
     return brentq(

@@ -44,12 +44,13 @@ def pos_error(
     if len(trajectory.gaps):
         raise ValueError(
             f"The true trajectory has {len(trajectory.gaps)} gaps (first at "
-            f"{trajectory.gaps[0, 0]:.3f} s); the error of the POS is made for one pass at a time."
+            f"{trajectory.gaps[0, 0]:.3f} s), but the error of the POS is simulated for one pass "
+            "at a time."
         )
     if scenario.error_file is not None:
         return given_error(trajectory, read_pos_error_series(scenario.error_file), rng)
     if scenario.sky_view and sky is None:
-        raise ValueError("sky_view needs the elevation of the walls beside the way.")
+        raise ValueError("sky_view needs the elevation of the walls along the road.")
     sky = sky if scenario.sky_view else None
     navigation = navigate(trajectory, scenario, GRADES[scenario.grade], rng, sky, start)
     return navigation.at(trajectory.gps_time, smoothed=scenario.processing == "smoothed")
@@ -76,7 +77,7 @@ def given_error(trajectory: Trajectory, series: PosErrorSeries, rng: Generator) 
     if spare < 0:
         raise ValueError(
             f"The error series lasts {series.gps_time[-1] - series.gps_time[0]:.1f} s, the pass "
-            f"{duration:.1f} s: take a longer series or a shorter pass."
+            f"{duration:.1f} s. Use a longer series or a shorter pass."
         )
     begin = series.gps_time[0] + rng.uniform(0.0, spare)
     gps_time = np.minimum(begin + trajectory.gps_time - trajectory.gps_time[0], series.gps_time[-1])

@@ -183,8 +183,8 @@ def line_along(position: np.ndarray, smoothing: float = 3.0) -> tuple[CentreLine
     s = plan_lengths(path)
     if s[-1] < 2 * smoothing:
         raise ValueError(
-            f"The path is {s[-1]:.1f} m long: a scene needs a drive of {2 * smoothing:.0f} m at "
-            "least."
+            f"The path is {s[-1]:.1f} m long; a scene needs a drive of at least "
+            f"{2 * smoothing:.0f} m."
         )
     lengths = np.linspace(0.0, s[-1], round(s[-1]) + 1)
     path = np.column_stack([np.interp(lengths, s, column) for column in path.T])

@@ -46,11 +46,11 @@ def read_mesh(scene: SceneScenario, origin: ArrayLike) -> Mesh:
     vertices, corners = readers[path.suffix.lower()](path)
     if not len(corners):
         raise ValueError(
-            f"{path} has {len(vertices)} vertices but no triangles: a surface is needed, no points."
+            f"{path} has {len(vertices)} vertices but no triangles; a surface is needed."
         )
     if corners.min() < 0 or corners.max() >= len(vertices):
         raise ValueError(
-            f"{path} has triangles that name vertices it does not have ({len(vertices)} there)."
+            f"{path} has triangles with vertices that do not exist (it has {len(vertices)})."
         )
     bad = ~np.isfinite(vertices).all(axis=1)
     if bad.any():
@@ -63,7 +63,7 @@ def read_mesh(scene: SceneScenario, origin: ArrayLike) -> Mesh:
     flat = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1) < 1e-12
     triangles = triangles[~flat]
     if not len(triangles):
-        raise ValueError(f"All {len(corners)} triangles of {path} are without area.")
+        raise ValueError(f"All {len(corners)} triangles of {path} have zero area.")
     return Mesh(triangles, np.full(len(triangles), scene.reflectance))
 
 
@@ -77,8 +77,8 @@ def _read_ply(path):
     triangles = np.asarray(mesh.triangles, np.int64)
     if 0 < len(triangles) < (faces := announced_faces(path)):
         raise ValueError(
-            f"{path} is cut off: {len(triangles)} of the {faces} faces that its header announces "
-            "are in it. Copy the file anew."
+            f"{path} is truncated: it has {len(triangles)} of the {faces} faces stated in its "
+            "header. Copy the file again."
         )
     return vertices, triangles
 
@@ -101,7 +101,7 @@ def _read_obj(path):
                 face = [int(word.split("/")[0]) for word in words[1:]]
             except ValueError:
                 raise ValueError(
-                    f"Line {number} of {path} is no vertex or face: '{text.strip()[:60]}'."
+                    f"Line {number} of {path} is not a vertex or face: '{text.strip()[:60]}'."
                 ) from None
             face = [i - 1 if i > 0 else len(vertices) + i for i in face]
             corners += [[face[0], *pair] for pair in pairwise(face[1:])]
@@ -197,9 +197,9 @@ def _check_ground(scenario, mesh, s, place, height, length, hole=5.0):
     low, high = (f(mesh.triangles, axis=(0, 1)) + origin for f in (np.min, np.max))
     first = place[np.argmax(far)] + origin
     raise ValueError(
-        f"The drive leaves the mesh: {lost.sum()} of {inside.sum()} m have no ground below (first "
-        f"{s[np.argmax(far)]:.0f} m after the start, E {first[0]:.1f}, N {first[1]:.1f}); "
-        f"{scenario.scene.file} reaches from E {low[0]:.1f}, N {low[1]:.1f} to E {high[0]:.1f}, "
+        f"The drive leaves the mesh: {lost.sum()} of {inside.sum()} m have no ground below "
+        f"(first {s[np.argmax(far)]:.0f} m after the start, E {first[0]:.1f}, N {first[1]:.1f}); "
+        f"{scenario.scene.file} extends from E {low[0]:.1f}, N {low[1]:.1f} to E {high[0]:.1f}, "
         f"N {high[1]:.1f}. Set origin to a place on the mesh, or shorten the drive."
     )
 

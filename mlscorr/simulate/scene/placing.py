@@ -161,9 +161,9 @@ def _along(scenario, count, length, rng):
     """Even positions (count,) along the way, each moved slightly at random. Units: m."""
     if scenario.size > SETTINGS.largest_target:
         raise ValueError(
-            f"Targets of {scenario.size} m are too large: boards of {SETTINGS.board_edge} times "
-            "that must fit a lane and a wall's ground floor. "
-            f"Give a size up to {SETTINGS.largest_target} m."
+            f"Targets of {scenario.size} m are too large: their boards, {SETTINGS.board_edge} "
+            "times as large, must fit a lane and the ground floor of a wall. Give a size of up "
+            f"to {SETTINGS.largest_target} m."
         )
     lead = min(SETTINGS.run_in, length / 4)
     nearest = 2 - 2 * SETTINGS.jitter
@@ -175,7 +175,7 @@ def _along(scenario, count, length, rng):
         room = int((length - 2 * lead) * nearest / across)
         raise ValueError(
             f"{count} targets of {scenario.size} m do not fit along {length:.0f} m without "
-            f"touching: there is room for {room}. Give fewer, or a longer drive."
+            f"touching; there is room for {room}. Use fewer targets or a longer drive."
         )
     return lead + spacing * (np.arange(count) + 0.5 + rng.uniform(-jitter, jitter, count))
 
@@ -201,11 +201,12 @@ def _tell_unplaced(places, count):
     if not places:
         return
     sentence = (
-        f"{len(places)} of {count} targets find no free place beside the drive (first: at "
-        f"{places[0]:.0f} m): too little room between drive and walls, no ground, or no free sight."
+        f"{len(places)} of {count} targets find no free place along the drive (first: at "
+        f"{places[0]:.0f} m): there is too little room between drive and walls, no ground, or no "
+        "line of sight."
     )
     if len(places) == count:
-        raise ValueError(f"{sentence} Give smaller targets, other supports, or another way.")
+        raise ValueError(f"{sentence} Use smaller targets, other supports or another route.")
     warnings.warn(f"{sentence} The survey is made without them.", stacklevel=2)
 
 

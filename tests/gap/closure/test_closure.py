@@ -24,7 +24,7 @@ def test_a_cause_closes_its_gap_where_its_size_was_not_looked_for(late):
     assert 1 - (closure.after / closure.before) ** 2 == pytest.approx(closure.shrink)
     assert closure.gap.after < closure.gap.before
     assert closure.probability == 1.0
-    assert "looks at check points were never used" in closure.held_out
+    assert "observations of check points were never used" in closure.held_out
 
 
 def test_nothing_added_closes_nothing(late):

@@ -148,7 +148,7 @@ def test_some_rows_give_what_all_give(case, without):
 def test_rows_of_other_beams_are_refused(case):
     "Items with other times: one sentence says what to do"
     rows = case[2]
-    with pytest.raises(ValueError, match=r"rows have another time .* collect the beams anew"):
+    with pytest.raises(ValueError, match=r"residuals have other times .* Collect the beams again"):
         run(case, rows=replace(rows, gps_time=rows.gps_time + 1.0))
 
 

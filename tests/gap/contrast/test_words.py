@@ -57,7 +57,7 @@ def said(channel, factors):
         (
             "intensity",
             [1, 1, 1, 2],
-            "beyond 40 m, beside the usual ratio of the two: the simulator's",
+            "beyond 40 m, relative to their usual ratio: the simulator's",
         ),
         (
             "density",
@@ -65,7 +65,7 @@ def said(channel, factors):
             r"49\.\d+ ± 0\.\d+ % fewer points than the simulated one between 10 and 20 m",
         ),
         ("density", [1.5, 1, 1, 1], "more points than the simulated one within 10 m"),
-        ("dropout", [1.1, 1.1, 1.1, 1.1], "bring no return everywhere"),
+        ("dropout", [1.1, 1.1, 1.1, 1.1], "give no return everywhere"),
         ("edge_width", [1, 1, 1, 3], r"[12]\.\d+ ± 0\.\d+ mrad more than simulated beyond 40 m"),
         ("edge_width", [1, 1, 1, 0.5], "beam is too wide"),
     ],

@@ -61,7 +61,7 @@ def test_rows_without_a_metre_are_refused(with_surface):
     "Roughness alone can't say where anything is"
     g, _ = with_surface
     rough = g.rows.select(g.rows.channel == "roughness")
-    with pytest.raises(ValueError, match="rows has a residual in m"):
+    with pytest.raises(ValueError, match="residuals is in m"):
         Observations.of(rough, background(rough, g.survey))
 
 
@@ -72,5 +72,5 @@ def test_a_sigma_of_zero_is_refused(with_surface):
     none = replace(
         g.background, position=0 * g.background.position, attitude=0 * g.background.attitude
     )
-    with pytest.raises(ValueError, match="sigma of zero"):
+    with pytest.raises(ValueError, match="a sigma is zero"):
         Observations.of(exact, none).whitener()

@@ -36,7 +36,7 @@ def test_targets_are_seen_when_the_drive_saw_them(survey):
 
 def test_without_a_mounting_nothing_can_be_planned(survey):
     "The sentence says what to give"
-    with pytest.raises(ValueError, match="Give lever_arm and boresight"):
+    with pytest.raises(ValueError, match="Set lever_arm and boresight"):
         planned_rows(replace(survey, mounting=None))
 
 
@@ -50,5 +50,5 @@ def test_targets_out_of_sight_are_refused(survey):
 def test_without_a_target_none_is_said_to_be_out_of_sight(survey):
     "Neither control nor a reference surface is named: the sentence asks for them, not for a CRS"
     none = survey.control[[]]
-    with pytest.raises(ValueError, match=r"names no target and .* Give \[control\]"):
+    with pytest.raises(ValueError, match=r"has neither targets nor .* Add \[control\]"):
         planned_rows(replace(survey, control=none, check=none))

@@ -103,5 +103,5 @@ def test_there_must_be_something_to_compare(survey, targets):
     "A cloud without planes and targets is refused, with the way out"
     empty = PointCloud(np.empty((0, 3)), np.empty(0), np.empty(0, np.uint16))
     assert find_patches(survey, chunks=lambda file: [empty]) is None
-    with pytest.raises(ValueError, match="Survey targets, or give a"):
+    with pytest.raises(ValueError, match="Survey targets, or set"):
         build_rows(survey, *no_targets(targets), None)

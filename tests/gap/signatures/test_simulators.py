@@ -34,7 +34,7 @@ def test_a_pos_believed_twice_as_bad_has_twice_the_sigmas_of_its_file(clean):
 def test_a_mounting_that_the_survey_lacks_is_refused(clean):
     "A simulator with a mounting and a survey without: the sentence says where to give it"
     survey = clean[0]
-    with pytest.raises(ValueError, match="give it there"):
+    with pytest.raises(ValueError, match="Add it there"):
         as_believed(replace(survey, mounting=None), beliefs_of(survey))
 
 

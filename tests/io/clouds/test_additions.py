@@ -95,5 +95,5 @@ def test_displacements_are_not_added_twice(tmp_path):
     path = write_street(tmp_path / "in.laz", 6, points=100)
     displaced = Additions(displacement=True)
     written(path, tmp_path / "once.laz", displaced)
-    with pytest.raises(ValueError, match=r"have the field displacement_easting already.*without"):
+    with pytest.raises(ValueError, match="have the field displacement_easting"):
         written(tmp_path / "once.laz", tmp_path / "twice.laz", displaced)

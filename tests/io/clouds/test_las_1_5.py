@@ -64,7 +64,7 @@ def test_the_time_offset_is_taken_off(street, offset, tmp_path):
     (file,) = survey.clouds
     read = PointCloud.concatenate(list(read_chunks(file)))
     assert np.abs(read.gps_time - week).max() < (1e-6 if offset < 2_000 else 1e-4)
-    said = any(f"written less {1e6 * offset:.0f} s" in note for note in survey.notes)
+    said = any(f"stored minus {1e6 * offset:.0f} s" in note for note in survey.notes)
     assert said == (offset != 1000), survey.notes
     (folder / FILE_NAME).unlink()
     assert "pass-1.laz" in mlscorr.init(folder).text
@@ -93,11 +93,11 @@ def test_week_time_and_wkt_2_of_las_1_5(street, tmp_path):
             "<B",
             6,
             OFFSET_FLAG,
-            "states a time offset, and times in seconds",
+            "states a time offset together with times in seconds",
         ),
         ("a format of old", "<B", 104, 1, "LAS 1.5 has point formats 6 to 10, not 1"),
         ("the header of 1.4", "<H", 94, 375, "its header has 375 bytes .* LAS 1.5 needs 393"),
-        ("LAS 1.6", "<B", 25, 6, r"LAS 1\.6; LAS 1\.0 to 1\.5 can be read"),
+        ("LAS 1.6", "<B", 25, 6, r"LAS 1\.6; only LAS 1\.0 to 1\.5 can be read"),
     ],
 )
 def test_a_wrong_las_1_5_is_refused(name, form, position, value, words, tmp_path):

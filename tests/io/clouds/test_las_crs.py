@@ -47,10 +47,10 @@ def test_wkt_and_codes_state_the_same(tmp_path):
 @pytest.mark.parametrize(
     ("stated", "crs", "words"),
     [
-        ("EPSG:32650", "EPSG:32649", "in places .* km apart"),
-        ("EPSG:32650+5773", "EPSG:32650+3855", "heights are of two systems"),
-        ("EPSG:2263", "EPSG:32618", "in US survey foot, and a correction needs metres"),
-        ("EPSG:4326", "EPSG:32650", "in degree, and a correction needs metres"),
+        ("EPSG:32650", "EPSG:32649", "of the cloud .* km apart"),
+        ("EPSG:32650+5773", "EPSG:32650+3855", "the height systems differ"),
+        ("EPSG:2263", "EPSG:32618", "in US survey foot, and mlscorr needs meters"),
+        ("EPSG:4326", "EPSG:32650", "in degree, and mlscorr needs meters"),
         ("EPSG:32650", "EPSG:32650+5773", None),
         ("EPSG:25832", "EPSG:32632", None),  # one place by both, as far as PROJ knows
     ],

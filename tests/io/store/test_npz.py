@@ -28,7 +28,7 @@ def test_blocks_become_one_array(tmp_path):
 def test_rows_of_another_shape_or_type_are_refused(tmp_path, rows):
     "Both are named, and no file is left, not even a part"
     with (
-        pytest.raises(ValueError, match=r"don't fit those of float64 \(3,\)"),
+        pytest.raises(ValueError, match=r"do not match the rows of float64 \(3,\)"),
         NpzWriter(tmp_path / "truth.npz") as writer,
     ):
         writer.append("xyz", np.zeros((5, 3)))

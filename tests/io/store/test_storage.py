@@ -87,7 +87,7 @@ def test_a_web_server_is_read_too(store, street):
     there = read_survey(f"{address}/survey.toml")
     assert digest(there.trajectory) == digest(read_survey(street).trajectory)
     assert FileIdentity.of(there.cloud_paths[0]).size == (street / "pass-1.laz").stat().st_size
-    with pytest.raises(ValueError, match=r"pass-\*\.laz is a pattern of a web server"):
+    with pytest.raises(ValueError, match=r"pass-\*\.laz is a pattern on a web server"):
         files_like(there.path.parent, "pass-*.laz")
 
 
@@ -157,10 +157,10 @@ def test_a_file_in_a_store_is_told_by_its_content(store):
     assert store.read("some.bin") == (0, 0)
     store.files.pipe_file("streets/some.bin", b"b" * 9)
     assert FileIdentity.of(path) != first
-    with pytest.raises(OSError, match=r"1 of 1 input files were replaced.*cloud s3://streets/some"):
+    with pytest.raises(OSError, match=r"1 of 1 input files changed.*cloud s3://streets/some"):
         check_unchanged([named])
     store.files.rm("streets/some.bin")
-    with pytest.raises(OSError, match="it is gone"):
+    with pytest.raises(OSError, match="it was removed"):
         check_unchanged([named])
 
 
@@ -193,7 +193,7 @@ def test_a_lost_connection_is_no_damaged_file(store):
     store.lost = "long.laz"
     store.lost_after = 3
     try:
-        with pytest.raises(OSError, match=r"long\.laz can't be reached .* when tried again"):
+        with pytest.raises(OSError, match=r"long\.laz can't be reached"):
             list(read_chunks(CloudFile(layout.path, layout.points, 0.0, "week")))
     finally:
         store.lost = ""
@@ -202,7 +202,7 @@ def test_a_lost_connection_is_no_damaged_file(store):
 @pytest.mark.parametrize(
     ("name", "sentence"),
     [
-        ("s3://streets/tuesday", "streets/tuesday does not exist; a survey is a folder"),
+        ("s3://streets/tuesday", "streets/tuesday does not exist.*survey is a folder"),
         ("s3://avenues/monday", "there is no bucket avenues at this endpoint"),
     ],
 )
@@ -217,7 +217,7 @@ def test_a_pattern_needs_a_match(store, street, tmp_path):
     text = (street / "survey.toml").read_text()
     target = shutil.copytree(street, tmp_path / "street") / "survey.toml"
     target.write_text(text.replace('"pass-1.laz"', '"s3://streets/tuesday/*.laz"'))
-    with pytest.raises(FileNotFoundError, match=r"no file is like s3://streets/tuesday/\*\.laz"):
+    with pytest.raises(FileNotFoundError, match=r"no file matches s3://streets/tuesday/\*\.laz"):
         read_survey(target)
 
 
@@ -232,7 +232,7 @@ def test_schemes_are_known_or_named():
         "except ImportError as error: print(error)"
     )
     said = subprocess.check_output([sys.executable, "-c", code], text=True)
-    assert "needs fsspec and universal_pathlib: pip install 'mlscorr[remote]'" in said
+    assert "requires fsspec and universal_pathlib: pip install 'mlscorr[remote]'" in said
 
 
 def test_a_dead_endpoint_is_named(store, monkeypatch):
@@ -254,7 +254,9 @@ def test_a_command_without_credentials_ends_with_a_sentence(store, monkeypatch):
     command = [sys.executable, "-m", "mlscorr", "check", "s3://streets/monday"]
     process = subprocess.run(command, capture_output=True, text=True)
     assert process.returncode == 5
-    assert "streets/monday may not be reached (Unable to locate credentials)" in process.stderr
+    assert (
+        "Access to s3://streets/monday was denied (Unable to locate credentials)"
+    ) in process.stderr
     assert "Traceback" not in process.stderr
 
 

@@ -66,7 +66,7 @@ def test_a_second_run_is_kept_out(tmp_path):
     "Two at a time are refused; what a killed one left half made goes when the next begins"
     store = TaskStore(tmp_path / "tasks")
     with store.locked():
-        with pytest.raises(ValueError, match="Another run is at work"), store.locked():
+        with pytest.raises(ValueError, match="Another run is active"), store.locked():
             pass
         (store.folder / "part.0").mkdir()
         (store.folder / "part.0" / "part").mkdir()

@@ -86,15 +86,15 @@ def test_a_project_may_have_any_name(city):
 
 
 WRONG = [
-    ([DRIVE.format("a"), DRIVE.format("a")], r": 1 in use twice or more \(first: a\)"),
-    ([DRIVE.format("a"), DRIVE.format("b").replace("b/*", "a/*")], "of two drives"),
+    ([DRIVE.format("a"), DRIVE.format("a")], r": 1 names are repeated \(first: a\)"),
+    ([DRIVE.format("a"), DRIVE.format("b").replace("b/*", "a/*")], "belong to two drives"),
     ([DRIVE.format("a").replace('name = "a"', 'name = "tiles"')], "can't be a folder"),
-    ([IDS.format("a", "[1, 2]"), IDS.format("b", "[2]")], "point_source_id 2 of .* of one"),
-    ([IDS.format("a", "[1]") + SCANNER, IDS.format("b", "[2]")], "can't tell both"),
-    (['[cloud]\nfiles = ["*/*.laz"]\n', DRIVE.format("a")], "are of no drive"),
+    ([IDS.format("a", "[1, 2]"), IDS.format("b", "[2]")], "point_source_id 2 of"),
+    ([IDS.format("a", "[1]") + SCANNER, IDS.format("b", "[2]")], "one id can't do both"),
+    (['[cloud]\nfiles = ["*/*.laz"]\n', DRIVE.format("a")], "belong to no drive"),
     ([DRIVE.format("a").replace("a/*.laz", "s4://bucket/a.laz")], "unknown scheme s4://"),
-    (['[[drive]]\nname = "a"\n'], "give a drive its survey"),
-    (["name = 1\n", DRIVE.format("a")], "name = 1 can't be used"),
+    (['[[drive]]\nname = "a"\n'], "a drive needs survey"),
+    (["name = 1", DRIVE.format("a")], "name = 1 can't be used"),
     (['nmae = "x"\n', DRIVE.format("a")], "the nearest known one is name"),
 ]
 
@@ -153,7 +153,7 @@ def test_what_a_control_list_lacks_is_wanted_in_project_toml(city, head, row, wo
 
 def test_the_key_of_a_drives_clouds_is_named(city):
     "`files` of the [[drive]], which is what stands in project.toml, for none and for one twice"
-    for files, words in (('"a/b*.laz"', "no file is like .*b"), ('"a/*.laz", "a/t*"', "2 times")):
+    for files, words in (('"a/b*.laz"', "no file matches .*b"), ('"a/*.laz", "a/t*"', "2 times")):
         drive = DRIVE.format("a").replace('"a/*.laz"', files)
         with pytest.raises((ValueError, OSError), match=rf"^files of \[\[drive\]\] a of .*{words}"):
             read_project(write(city, drive))
@@ -163,7 +163,7 @@ def test_a_copy_of_another_drives_cloud_is_refused(city):
     "Both files and drives are named; by point_source_ids of their own two drives may share copies"
     for name in ("a", "b"):
         write_cloud(city / name / f"tile-{name}.laz", points=9)
-    words = r"tile-b.laz, of drive b, is a copy of .*tile-a.laz, of drive a: all .* twice"
+    words = r"tile-b\.laz, of drive b, is a copy of.*tile-a\.laz, of drive a"
     for parts in (
         [DRIVE.format("a"), DRIVE.format("b")],
         [IDS.format("a", "[1]"), DRIVE.format("b")],
@@ -192,7 +192,7 @@ def test_drives_of_two_systems_are_refused(city):
     for name, sigma in (("a", 0.1), ("b", 0.2)):
         belief = f"\n[pos]\nposition_sigma = {sigma}\n"
         (city / name / "survey.toml").write_text(SURVEY.format("") + belief)
-    with pytest.raises(ValueError, match="share it: say under"):
+    with pytest.raises(ValueError, match=r"share it. Set"):
         read_project(write(city, *both))
     assert read_project(write(city, "[pos]\nposition_sigma = 0.3\n", *both)).drives
     (city / "b" / "survey.toml").write_text(SURVEY.format("") + '\n[control]\nfile = "c.csv"\n')

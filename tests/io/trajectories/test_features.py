@@ -150,12 +150,12 @@ def test_a_compound_crs_is_kept_whole(tmp_path):
 def test_layers_that_can_not_be_written_are_refused_before_the_work():
     "Folders, unknown suffixes, a survey without a CRS, one file twice, a result's own name"
     for name in ("a/t.gpkg", "t.shp", "weak.geojson"):
-        with pytest.raises(ValueError, match=rf"^--targets {name}: give the name of a file"):
+        with pytest.raises(ValueError, match=f"^--targets {name}: give a file name"):
             check_target_exports([name])
     check_target_exports(["t.gpkg", "t.geojson"], CRS, is_read=True)
     check_exports(["d.gpkg", "d.geojson"], CRS, is_read=True)
     for check in (check_exports, check_target_exports):
         with pytest.raises(ValueError, match=r"needs the CRS of a\.gpkg: set crs in survey\.toml"):
             check(["a.gpkg"], None, is_read=True)
-    with pytest.raises(ValueError, match=r"a\.gpkg is asked for twice"):
+    with pytest.raises(ValueError, match=r"a\.gpkg is requested twice"):
         check_distinct(["a.gpkg", "b.gpkg", "a.gpkg"])

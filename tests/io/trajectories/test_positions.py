@@ -64,7 +64,7 @@ def test_a_position_file_of_rtklib_is_named(frame, clock, tmp_path):
 def test_a_real_position_file_without_a_header_is_named(tmp_path):
     "GNSS_RTK.pos of a drive in Wuhan: init and check say what it is, and write nothing"
     real = shared("data/real_pos_error/GNSS_RTK.pos")
-    with pytest.raises(ValueError, match=r"position file without names of columns \(7 numbers a"):
+    with pytest.raises(ValueError, match=r"position file without column names \(7 numbers per"):
         read_trajectory(real)
     shutil.copy(real, tmp_path)
     write_las(tmp_path / "pass-1.las", np.linspace(357_480.0, 357_490.0, 100))
@@ -73,7 +73,7 @@ def test_a_real_position_file_without_a_header_is_named(tmp_path):
     (tmp_path / "survey.toml").write_text(TOML.replace("trajectory.csv", "GNSS_RTK.pos"))
     (tmp_path / "control.csv").write_text(CONTROL)
     faults = mlscorr.check(tmp_path).faults
-    assert any("is a position file without names of columns" in fault.sentence for fault in faults)
+    assert any("is a position file without column names" in fault.sentence for fault in faults)
 
 
 def test_a_table_of_positions_alone_is_named(tmp_path):

@@ -58,7 +58,7 @@ def test_a_header_that_lies_is_overruled_and_warned_of(is_standard, trajectory_s
 
 def test_week_seconds_under_a_standard_flag_are_found():
     "Equal times need no constant, but their size tells that the header is wrong"
-    with pytest.warns(UserWarning, match="header of a.laz says adjusted standard"):
+    with pytest.warns(UserWarning, match=r"header of a\.laz.*adjusted standard"):
         match = match_times("a.laz", OF_WEEK, True, trajectory())
     assert (match.constant, match.cloud_system) == (0.0, "week")
 
@@ -145,7 +145,7 @@ def test_a_week_that_ends_within_a_cloud_counts_on(rows):
         assert np.abs(match.placed(times) - start - running).max() < 1e-6
         assert match.inside == 1.0
         assert match.trajectory_system == system
-        assert "604800 s are added where its times start again" in str(match)
+        assert "604800 s are added after the rollover" in str(match)
     with pytest.raises(ValueError, match="None of"):
         match_times("a.laz", times, False, trajectory(100_000.0, 100_100.0))
 
@@ -163,8 +163,8 @@ def test_a_trajectory_in_utc_that_starts_before_the_cloud_is_named():
     for early in (18.0, -18.0):
         covering = trajectory(OF_WEEK[0] - early - 0.5, OF_WEEK[25] - early + 0.5)
         sentence = (
-            rf"Only 42 % of.*with \{-early:+.0f} s: one of both may be in UTC, or the trajectory "
-            rf"covers a part.*add {early:.0f} to trajectory.time_constant"
+            rf"Only 42 % of.*with \{-early:+.0f} s: one may be in UTC, or the trajectory covers "
+            f"only part.*add {early:.0f} to trajectory.time_constant"
         )
         with pytest.raises(ValueError, match=sentence):
             match_times("a.laz", OF_WEEK[:26], False, covering)
@@ -181,7 +181,7 @@ def test_a_trajectory_in_utc_that_starts_before_the_cloud_is_named():
 )
 def test_seconds_of_the_day_and_unix_time_are_named(cloud, goal, system):
     "What the sentence says to add to the trajectory's times brings both together"
-    with pytest.raises(ValueError, match=f"all would with .* may be in {system}") as refusal:
+    with pytest.raises(ValueError, match=f"all would be with .* may be in {system}") as refusal:
         match_times("a.laz", cloud, False, trajectory(goal[0] - 5, goal[-1] + 5))
     added = float(re.search(r"add (-?\d+) to trajectory.time_constant", str(refusal.value))[1])
     with warnings.catch_warnings(action="ignore"):  # Unix time contradicts either flag
@@ -211,7 +211,7 @@ def test_times_in_other_units_are_refused(factor):
 
 def test_a_trajectory_that_covers_a_part_is_refused():
     "With a third of the cloud covered, the file is said to be short, not the system wrong"
-    with pytest.raises(ValueError, match="covers a part of the cloud"):
+    with pytest.raises(ValueError, match="covers only part of the cloud"):
         match_times("a.laz", OF_WEEK, False, trajectory(OF_WEEK[0], OF_WEEK[170]))
 
 
@@ -226,7 +226,7 @@ def test_points_without_a_time_beside_others_are_counted(share):
     "However many there are, gps_time 0 is said as such, and the others tell the system"
     times = SYSTEMS["standard"].copy()
     times[: int(share * len(times))] = 0.0
-    words = rf"^{share * 500:.0f} of 500 points sampled from a\.laz have gps_time 0: "
+    words = rf"^{share * 500:.0f} of 500 points sampled from a\.laz have gps_time 0,"
     with pytest.warns(UserWarning, match=words):
         match = match_times("a.laz", times, True, trajectory())
     assert match.constant == SYSTEMS["week"][0] - SYSTEMS["standard"][0]
@@ -266,7 +266,7 @@ def test_points_without_a_time_do_not_judge_the_time_system(value, system):
     with pytest.warns(UserWarning) as caught:
         match = match_times("a.laz", times, system != "week", goal, setting="auto")
     told = [str(warning.message) for warning in caught]
-    assert told[0].startswith(f"3 of 500 points sampled from a.laz have gps_time {value:.15g}:")
+    assert told[0].startswith(f"3 of 500 points sampled from a.laz have gps_time {value:.15g},")
     assert len(told) == (2 if system == "gps" else 1)  # of the header, which can't state it
     assert match.constant == 0.0
     assert match.cloud_system == system
@@ -278,9 +278,9 @@ def test_both_placeholders_are_counted():
     times = SYSTEMS["week"].copy()
     times[:3] = -1.0
     times[3:5] = 0.0
-    with pytest.warns(UserWarning, match=r"5 of 500 points .* gps_time -1 \(3\) and 0 \(2\):"):
+    with pytest.warns(UserWarning, match=r"5 of 500 points.*gps_time -1 \(3\) and 0 \(2\)"):
         match_times("a.laz", times, False, trajectory())
-    with pytest.raises(ValueError, match=r"have gps_time -1 \(3\) and 0 \(2\) throughout"):
+    with pytest.raises(ValueError, match=r"have gps_time -1 \(3\) and 0 \(2\)"):
         match_times("a.laz", times[:5], False, trajectory())
 
 
@@ -298,6 +298,6 @@ def test_an_offset_of_the_header_hides_no_placeholder():
     offset = 1e6 * 1300 - 1e9  # s
     times[[3, 4]] = offset - 1.0
     goal = trajectory(times[0] - 5, times[-1] + 5)
-    with pytest.warns(UserWarning, match="2 of 500 points sampled from a.laz have gps_time -1:"):
+    with pytest.warns(UserWarning, match=r"2 of 500 points sampled from a\.laz have gps_time -1"):
         match = match_times("a.laz", times, True, goal, time_offset=offset)
     assert match.inside == 1.0

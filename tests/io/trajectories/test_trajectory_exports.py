@@ -119,7 +119,7 @@ def test_tum_comes_back(tmp_path):
 def test_what_can_not_be_written_is_refused_before_the_work():
     "Folders, unknown suffixes, an SBET without a CRS"
     for name in ("a/b.sbet", "drive.csv", "drive"):
-        with pytest.raises(ValueError, match=r"give the name of a file without a folder"):
+        with pytest.raises(ValueError, match="give a file name without a folder"):
             check_exports([name])
     check_exports(["drive.sbet", "drive.tum"])
     check_exports(["drive.tum"], None, is_read=True)

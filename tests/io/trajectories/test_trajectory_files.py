@@ -62,7 +62,7 @@ def test_an_export_of_inertial_explorer_is_read(tmp_path):
     names = f"GPSTime  Easting  Northing  H-Ell  Roll  Pitch  Heading  {SIGMAS}"
     units = "(sec)  (m)  (m)  (m)  (deg)  (deg)  (deg)  (m)  (m)  (m)  (deg)  (deg)  (deg)"
     path = explorer(tmp_path / "ie.txt", names, units, np.hstack([table, sigmas]))
-    with pytest.raises(ValueError, match=f'Inertial Explorer, .* heading = "{TRUE}" or "{GRID}"'):
+    with pytest.raises(ValueError, match=f'Inertial Explorer or .* heading = "{TRUE}" or "{GRID}"'):
         read(path)
     file = read(path, heading=TRUE)
     assert_same(file.trajectory, expected)
@@ -89,7 +89,7 @@ def test_an_export_of_pospac_is_read(tmp_path):
     )
     units = "(time in Sec, distance in Meters, orientation angles and SD in Degrees)"
     path = explorer(tmp_path / "export.txt", names, f"\n {units} \n", np.hstack(rows))
-    with pytest.raises(ValueError, match=f'POSPac, .* heading = "{TRUE}" or "{GRID}"'):
+    with pytest.raises(ValueError, match=f'POSPac.* heading = "{TRUE}" or "{GRID}"'):
         read(path)
     file = read(path, heading=TRUE)
     assert_same(file.trajectory, expected)
@@ -114,7 +114,7 @@ def test_units_below_the_names_are_heeded(tmp_path):
     found = read(path, heading=GRID).trajectory.attitude_sigma
     assert np.abs(found - expected.attitude_sigma).max() < 1e-9
     explorer(path, names, units.format("turns"), table)
-    with pytest.raises(ValueError, match="sigma_roll in 'turns', where m, mm, deg"):
+    with pytest.raises(ValueError, match="sigma_roll in 'turns'; supported units are m, mm, deg"):
         read(path, heading=GRID)
     parts = np.hstack([table[:, :1], np.ones((100, 6)), table[:, 3:7]])
     names = names.replace("Easting  Northing", "Latitude  Longitude").replace(SIGMAS, "")
@@ -135,7 +135,7 @@ def test_latitude_and_longitude_in_radians_are_not_taken_for_degrees(tmp_path):
     table[:, 4:] = np.radians(table[:, 4:])
     header = "Time,Lat,Lon,Height,Roll,Pitch,Heading"
     np.savetxt(tmp_path / "t.txt", table, "%.12f", ",", header=header, comments="")
-    with pytest.raises(ValueError, match=r'longitudes that seem to be radians.* angles = "rad"'):
+    with pytest.raises(ValueError, match=r"longitudes of .* seem to be radians.* angles = \"rad\""):
         read(tmp_path / "t.txt")
     assert_same(read(tmp_path / "t.txt", angles="rad").trajectory, expected, metres=2e-4)
 
@@ -167,7 +167,11 @@ def test_another_convention_is_named_in_survey_toml(tmp_path):
     lines += [";".join(f"{value:.10f}" for value in row).replace(".", ",") for row in rows]
     (tmp_path / "t.txt").write_text("\n".join([*lines, ""]))
     columns = {"gps_time": "Stempel", "easting": "Y", "northing": "X"}
-    with pytest.raises(ValueError, match=r"no column heading; .* yaw is a heading by convention"):
+    with pytest.raises(
+        ValueError,
+        match=r"no column heading; .* yaw column may count in "
+        "different directions",
+    ):
         read(tmp_path / "t.txt", columns=columns)
     with pytest.raises(ValueError, match=r"\[trajectory\.columns\] .* which of X and Y is easting"):
         read(tmp_path / "t.txt", heading=GRID)
@@ -182,7 +186,7 @@ def test_our_own_columns_may_be_in_radians(tmp_path):
     "What is refused without angles = 'rad' is read with it, and said"
     expected = drive(100, sigmas=False)
     path = csv_of(tmp_path / "t.csv", table_of(expected, degrees=False))
-    with pytest.raises(ValueError, match=r'radians where degrees belong.* angles = "rad"'):
+    with pytest.raises(ValueError, match=r"seem to be in radians"):
         read(path)
     file = read(path, angles="rad")
     assert_same(file.trajectory, expected)
@@ -207,7 +211,7 @@ def test_what_a_table_in_other_letters_lacks_is_named(tmp_path):
     table = table_of(drive(100, sigmas=False))
     lines = ["Zeit;Ost;Nord;Höhe;Roll;Nick;Gier", *(";".join(map(str, row)) for row in table)]
     (tmp_path / "t.txt").write_bytes("\n".join([*lines, ""]).encode("cp1252"))
-    with pytest.raises(ValueError, match=r"no column heading; it has .* Höhe, .*Its yaw is a hea"):
+    with pytest.raises(ValueError, match=r"no column heading; it has .* Höhe, .*A yaw column"):
         read(tmp_path / "t.txt")
     assert len(read(tmp_path / "t.txt", heading=GRID).trajectory) == 100
 
@@ -218,9 +222,9 @@ def test_a_column_in_utc_is_named_with_the_seconds_that_it_needs(tmp_path):
     for name, is_utc in (("UTC", True), ("Stempel", False)):
         path = tmp_path / f"{name}.csv"
         path.write_text(text.replace("gps_time", name))
-        with pytest.raises(ValueError, match=f"as columns.gps_time = '{name}'") as error:
+        with pytest.raises(ValueError, match=f"columns.gps_time = '{name}'") as error:
             read(path)
-        assert ("UTC need trajectory.time_constant, too: 18 s" in str(error.value)) is is_utc
+        assert ("UTC also need trajectory.time_constant: 18 s" in str(error.value)) is is_utc
 
 
 AXES = {  # theirs from ours
@@ -242,7 +246,9 @@ def test_quaternions_of_tum_are_read_by_the_course(axes, tmp_path):
     assert file.layout.endswith(f"body axes {axes}.")
     table[:, 1:3] = table[0, 1:3]  # at rest there is no course
     np.savetxt(tmp_path / "t.tum", table, fmt="%.9f")
-    with pytest.raises(ValueError, match="the course over ground does not tell: name"):
+    with pytest.raises(
+        ValueError, match="the course over ground does not identify their body axes"
+    ):
         read(tmp_path / "t.tum")
     still = Trajectory(
         expected.gps_time,
@@ -270,9 +276,9 @@ def test_terrascan_trajectories_are_read(tmp_path):
     assert_same(file.trajectory, expected)
     assert f"TerraScan trajectory; heading {GRID}, pitch nose up" in file.layout
     for content, message in (
-        (terrascan(expected)[:-1], "7775 bytes where its header announces 7776: it was cut off"),
-        (terrascan(expected, 20990101), r"no TerraScan trajectory of version 20010715"),
-        (b"TSCANTRJ", "no TerraScan trajectory"),
+        (terrascan(expected)[:-1], "is truncated: it has 7775 bytes where its header states 7776"),
+        (terrascan(expected, 20990101), "not a TerraScan trajectory of version 20010715"),
+        (b"TSCANTRJ", "not a TerraScan trajectory"),
     ):
         path.write_bytes(content)
         with pytest.raises(ValueError, match=message):
@@ -286,7 +292,7 @@ def test_an_sbet_is_known_under_any_name(tmp_path):
         file = read(written(tmp_path / name, sbet_records()), "EPSG:32611")
         assert file.is_sbet and file.layout is None
         assert_same(file.trajectory, expected)
-    with pytest.raises(ValueError, match=r"is an SBET, .* remove angles from \[trajectory\]"):
+    with pytest.raises(ValueError, match=r"is an SBET.*remove angles from \[trajectory\]"):
         read(tmp_path / "export.bin", angles="rad")
 
 
@@ -295,5 +301,5 @@ def test_a_date_in_place_of_seconds_is_named(tmp_path):
     for cell in ("2026-05-01", "12:30:01.5", "01.05.2026"):
         text = "Time;Easting;Northing;Height;Roll;Pitch;Heading\n"
         (tmp_path / "t.txt").write_text(f"{text}{cell};532000;3374000;40;0;0;0\n")
-        with pytest.raises(ValueError, match=f"'{cell}' where .* a date or a time of day: give"):
+        with pytest.raises(ValueError, match=f"'{cell}' where .* a date or time of day: give"):
             read(tmp_path / "t.txt")

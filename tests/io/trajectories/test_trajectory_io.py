@@ -146,16 +146,19 @@ def test_bad_epochs_are_refused(tmp_path, change, message):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", r"is empty \(0 bytes\): .* interrupted. Copy it anew"),
+        ("", r"is empty \(0 bytes\): .* interrupted. Copy it again"),
         ("\n\n", "is empty"),
         (HEADER + "\n", "header but no epochs"),
         (HEADER.replace("heading", "yaw") + "\n1,2,3,4,5,6,7\n", "no column heading; it has"),
-        (HEADER.replace(",", ";") + "\n1;2;3\n", "Line 2 .* 3 columns where 7 belong"),
+        (HEADER.replace(",", ";") + "\n1;2;3\n", "Line 2.*3 columns where 7"),
         (HEADER + ",height\n1,2,3,4,5,6,7,8\n", "column height 2 times"),
-        (HEADER + "\n1,2,3,4,5,6,7\n2,2,3,4\n", "Line 3 .* 4 columns .* cut off"),
-        (HEADER + "\n1,2,3,4,5,6,7\n2,2,x,4,5,6,7\n", "Line 3 .*'x' where a number belongs"),
-        (HEADER + "\n1,2,3,4,5,6,7\n2,2,,4,5,6,7\n", "Line 3 .*'' where a number belongs"),
-        (HEADER + "\n1,2,3,4,5,6,7\n2,2,1_0,4,5,6,7\n", "Line 3 .*'1_0' where a number belongs"),
+        (HEADER + "\n1,2,3,4,5,6,7\n2,2,3,4\n", "Line 3.*4 columns"),
+        (HEADER + "\n1,2,3,4,5,6,7\n2,2,x,4,5,6,7\n", "Line 3 .*'x' where a number is expected"),
+        (HEADER + "\n1,2,3,4,5,6,7\n2,2,,4,5,6,7\n", "Line 3 .*'' where a number is expected"),
+        (
+            HEADER + "\n1,2,3,4,5,6,7\n2,2,1_0,4,5,6,7\n",
+            "Line 3 .*'1_0' where a number is expected",
+        ),
     ],
 )
 def test_bad_csv_text_is_refused(tmp_path, text, message):
@@ -175,7 +178,7 @@ def test_binary_under_a_csv_name_is_refused(tmp_path):
 def test_radians_where_degrees_belong_are_refused(tmp_path):
     "A heading that fits the course as radians, and not as degrees, is in radians"
     path = csv_of(tmp_path / "t.csv", table_of(drive(), degrees=False))
-    with pytest.raises(ValueError, match="radians where degrees belong"):
+    with pytest.raises(ValueError, match=r"seem to be in radians"):
         read_trajectory(path)
 
 
@@ -200,7 +203,7 @@ def test_milliseconds_are_no_seconds(tmp_path):
     table = table_of(drive(1000, sigmas=False))
     table[:, 0] *= 1e3
     table[500:, 0] += 1e6  # as of a drive of 18 minutes
-    with pytest.raises(ValueError, match=r"lasts 12\.2 days, .* 0\.009 m/s: .*milli.*Give seconds"):
+    with pytest.raises(ValueError, match=r"lasts 12\.2 days.*0\.009 m/s:.*Give seconds"):
         read_trajectory(csv_of(tmp_path / "t.csv", table))
 
 
@@ -215,7 +218,7 @@ def test_a_vehicle_at_rest_has_no_course(tmp_path):
 def test_unknown_kinds_and_needless_accuracy_are_refused(tmp_path):
     "What can't be used is said, not ignored"
     (tmp_path / "t.nav").write_bytes(bytes(1000))
-    with pytest.raises(ValueError, match=r"t\.nav is of an unknown kind: .* as text or SBET"):
+    with pytest.raises(ValueError, match=r"t\.nav has an unknown format: .* as text or SBET"):
         read_trajectory(tmp_path / "t.nav")
     csv_of(tmp_path / "t.csv", table_of(drive(50)))
     with pytest.raises(ValueError, match="its own sigma columns"):
@@ -323,9 +326,9 @@ def test_sbet_datum_is_the_one_of_the_crs(tmp_path):
         (None, "set crs in survey.toml"),
         ("EPSG:99999", "'EPSG:99999' is unknown"),
         ("EPSG:4326", "projected CRS is needed"),
-        ("EPSG:2227", "US survey foot, not in metres"),
+        ("EPSG:2227", "US survey foot, not in"),
         ("EPSG:2048", "axes must point east and north"),
-        ("EPSG:32733+5715", "counts east, north, down; axes must .* up where there is a height"),
+        ("EPSG:32733+5715", "has the axes east, north, down; axes must .* up if there is a height"),
     ],
 )
 def test_sbet_needs_a_projected_crs_in_metres(tmp_path, crs, message):
@@ -359,7 +362,7 @@ def test_bad_sbet_is_refused(tmp_path, change, message):
 def test_an_empty_trajectory_is_no_kind_at_all(tmp_path, name):
     "Neither a CRS nor a version is asked of 0 bytes, whose copying was interrupted"
     (tmp_path / name).touch()
-    with pytest.raises(ValueError, match=rf"{name} is empty \(0 bytes\): .* Copy it anew"):
+    with pytest.raises(ValueError, match=rf"{name} is empty \(0 bytes\): .* Copy it again"):
         read_trajectory(tmp_path / name)
 
 

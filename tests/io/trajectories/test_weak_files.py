@@ -15,7 +15,7 @@ STRETCH = {
     "length_m": 60.0,
     "chainage": 60.0,
     "sigma": 0.4,
-    "why": "its pass has no control point",
+    "why": "pass without control point",
 }
 
 

@@ -144,7 +144,7 @@ def test_a_cloud_counts_on_with_its_trajectory(tmp_path):
     assert (second.time_constant, second.new_week) == (WEEK, -np.inf)
     said = " ".join(survey.notes)
     assert "The GPS week ends before epoch 301 of trajectory.csv (0.000 s)" in said
-    assert "pass-1.las" in said and "604800 s are added where its times start again" in said
+    assert "pass-1.las" in said and "604800 s are added after the rollover" in said
 
 
 def test_a_heading_keeps_its_epoch(tmp_path):

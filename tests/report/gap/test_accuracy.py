@@ -10,8 +10,8 @@ from tests.beds.gap_documents import plan_document
 def test_the_sentence_says_how_accurate_the_corrected_cloud_will_be():
     "RMS, the worst place, and on how many looks it rests"
     sentence = accuracy_sentence(plan_document()["accuracy"])
-    assert "2 looks at control points" in sentence
-    assert "3.2 cm (RMS along the drive), at worst 6.0 cm at 414005.0 s" in sentence
+    assert "2 observations of control points" in sentence
+    assert "3.2 cm (RMS along the drive). The largest is 6.0 cm at 414005.0 s" in sentence
 
 
 def test_sigma_and_looks_stand_at_their_times():

@@ -16,7 +16,7 @@ def test_the_first_sentence_stands_first():
     (statement,) = channel_statements(document)
     assert (statement.rating, statement.sentence) == (
         "green",
-        "No difference beyond chance in intensity. Not compared: edge width.",
+        "No significant difference in intensity. Not compared: edge width.",
     )
     assert not list(channel_statements(gap_document(contrasts=[])))
 

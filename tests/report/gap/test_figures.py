@@ -18,7 +18,7 @@ def test_each_figure_has_a_name():
 
 def test_a_name_without_a_figure_is_answered_with_those_that_are():
     "As where a document has nothing to show"
-    with pytest.raises(ValueError, match="no figure 'wher' here: where, innovations"):
+    with pytest.raises(ValueError, match=r"no figure 'wher' here; .* where, innovations"):
         draw(diagnosis_figures(gap_document()), "wher")
     assert draw(plan_figures(plan_document()), "map").axes
 

@@ -15,39 +15,41 @@ def facts(document):
 def test_two_answers_stand_apart():
     "Whether the cloud is accurate is one question, whether something is unmodelled another"
     rating, rows = facts(gap_document("time_offset"))
-    assert list(rows)[:2] == ["Accuracy", "Unmodelled"] and rating == "red"
+    assert list(rows)[:2] == ["Accuracy", "Unmodeled"] and rating == "red"
     assert "less accurate than stated" in rows["Accuracy"]["sentence"]
     items = {item["name"]: item["text"] for item in rows["Accuracy"]["items"]}
-    assert items["Surveyed targets"].startswith("off by 4.1 cm (RMS per axis), 1.2 cm")
-    assert items["Surveyed targets"].endswith("(worse from 2.4 cm on)")
-    assert items["Scanner clock offset"] == "moves what was compared by 1.2 cm (RMS)"
+    assert items["Surveyed targets"].startswith("RMS 4.1 cm per axis, 1.2 cm")
+    assert items["Surveyed targets"].endswith("(limit 2.4 cm)")
+    assert items["Scanner clock offset"] == "effect on the residuals: 1.2 cm (RMS)"
 
 
 def test_a_good_survey_is_good_in_both():
     "Nothing unmodelled, and no channel farther off than 1.96 stated sigmas"
     good = [{"channel": "target", "things": 16, "rms_mm": 19.0, "stated_mm": 10.0}]
     _, rows = facts(gap_document("none", agreement=good))
-    assert rows["Accuracy"]["rating"] == rows["Unmodelled"]["rating"] == "green"
+    assert rows["Accuracy"]["rating"] == rows["Unmodeled"]["rating"] == "green"
     assert "as accurate as stated" in rows["Accuracy"]["sentence"]
 
 
 def test_what_the_simulator_has_already_is_off_the_residuals():
     "A second round says so, for the cloud itself is still as it was"
     _, rows = facts(gap_document("none", simulator={"effects": [{"name": "time_offset"}]}))
-    assert rows["Accuracy"]["sentence"].startswith("The recorded cloud, less what the simulator")
+    assert rows["Accuracy"]["sentence"].startswith(
+        "The recorded cloud, after removing the errors in the simulator"
+    )
 
 
 @pytest.mark.parametrize(
     ("left_out", "mendable", "rating"),
     [
         ({"range_bias": "It acts on the range, and the survey has no [mounting]."}, True, "amber"),
-        ({"dropout": "No row of this survey depends on it."}, False, "green"),
+        ({"dropout": "No residual of this survey depends on it."}, False, "green"),
     ],
 )
 def test_what_could_not_be_judged_is_said_first(left_out, mendable, rating):
     "With the reason, and amber where the user could give what is missing"
     _, rows = facts(gap_document("none", left_out=left_out, mendable=[*left_out] * mendable))
-    row = rows["Not judged"]
+    row = rows["Not tested"]
     assert row["rating"] == rating and row["sentence"].startswith("1 of ")
     assert row["items"][0]["text"] in left_out.values()
 
@@ -64,11 +66,11 @@ def test_a_default_is_called_assumed_and_judges_nothing():
     accuracy = rows["Accuracy"]
     assumed = rows["Assumed"]
     assert accuracy["rating"] == assumed["rating"] == "amber"
-    assert "no sigma of the POS is stated" in accuracy["sentence"]
-    assert accuracy["items"][0]["text"] == "off by 1.4 cm (RMS per axis)"
-    assert assumed["sentence"].startswith("2 accuracies that nobody stated are assumed")
+    assert "no sigma of the POS is given" in accuracy["sentence"]
+    assert accuracy["items"][0]["text"] == "RMS 1.4 cm per axis"
+    assert assumed["sentence"].startswith("2 accuracies were not given and are assumed")
     items = {item["name"]: item["text"] for item in assumed["items"]}
-    assert items["Position of the POS"] == "2.0 cm assumed; about 20.0 cm by this survey"
+    assert items["Position of the POS"] == "2.0 cm assumed; estimated from this survey: 20.0 cm"
     assert items["Correlation time of the POS"].startswith("30 s assumed; 0.1 to 3 times")
     assert "Assumed" not in facts(gap_document("none"))[1]
 
@@ -84,6 +86,6 @@ def test_a_time_that_is_assumed_leaves_the_accuracy_to_be_judged():
 def test_a_noisy_pos_is_not_noisier_than_what_nobody_stated():
     "The verdict on positions compares them with what is assumed, and says that"
     document = gap_document("position_noise", 0.97, assumed=ASSUMED)
-    assert "Noisier than assumed" in facts(document)[1]["Unmodelled"]["sentence"]
+    assert "Noisier than assumed" in facts(document)[1]["Unmodeled"]["sentence"]
     document = gap_document("position_noise", 0.97)
-    assert "Noisier than stated" in facts(document)[1]["Unmodelled"]["sentence"]
+    assert "Noisier than stated" in facts(document)[1]["Unmodeled"]["sentence"]

@@ -38,7 +38,7 @@ def test_windows_of_a_worse_pos_are_told_with_their_times():
     found = parameters_of("time_offset+position_noise", several)
     assert list(found["time_offset"]) == ["magnitude"] and len(found["position_noise"]) == 9
     assert effect_class("position_noise").describe(found["position_noise"]) == (
-        "The positions of the POS are worse than the simulator assumes: up to 12 times as large "
-        "between gps_time 413205 s and 413225 s, between gps_time 413300 s and 413340 s and once "
-        "more."
+        "The positions of the POS are less accurate than the simulator assumes: errors up to 12 "
+        "times as large between gps_time 413205 s and 413225 s, between gps_time 413300 s and "
+        "413340 s and once more."
     )

@@ -14,8 +14,8 @@ def part(name, detectable, typical):
     ("detectable", "typical", "visible"),
     [
         (0.004, 0.01, "yes"),
-        (0.025, 0.01, "only if 2.5 times the usual"),
-        (0.25, 0.01, "only if 25 times the usual"),
+        (0.025, 0.01, "only from 2.5 times the usual size"),
+        (0.25, 0.01, "only from 25 times the usual size"),
         (0.025, None, "–"),
         (None, 0.01, "no"),
     ],

@@ -12,10 +12,10 @@ from tests.report.gap.test_verdict import summary
 @pytest.mark.parametrize(
     ("shrink", "interval", "said"),
     [
-        (0.42, [0.1, 0.7], "42 % of the squared gap is gone (95 %: 10 % to 70 %)."),
-        (1.0, [0.97, 1.0], "All of the squared gap is gone (95 %: 97 % to 100 %)."),
-        (-0.2, [-0.5, 0.1], "The squared gap did not shrink, it grew (95 %: −50 % to 10 %)."),
-        (0.9, [None, None], "90 % of the squared gap is gone."),
+        (0.42, [0.1, 0.7], "The squared gap decreased by 42 % (95 %: 10 % to 70 %)."),
+        (1.0, [0.97, 1.0], "The squared gap was removed completely (95 %: 97 % to 100 %)."),
+        (-0.2, [-0.5, 0.1], "The squared gap increased (95 %: −50 % to 10 %)."),
+        (0.9, [None, None], "The squared gap decreased by 90 %."),
     ],
 )
 def test_a_gap_that_shrinks_or_grows_is_said_in_words(shrink, interval, said):
@@ -30,10 +30,10 @@ def test_heights_of_eight_sigma_are_not_closed():
     errors = {"axes": ["E", "N", "H"], "before": [30.0, 31.0, 9.0], "after": [1.1, 0.9, 8.0]}
     closure = gap_document()["closure"] | {"shrink": 0.92, "interval": [0.8, 0.97]}
     closed = closure | {"over_sigma": errors | {"beyond": []}}
-    assert shrunk(closed).startswith("92 % of the squared gap is gone")
+    assert shrunk(closed).startswith("The squared gap decreased by 92 %")
     left = closure | {"over_sigma": errors | {"beyond": ["H"]}}
     assert shrunk(left).startswith(
-        "Not closed: errors are still 8.0 times in height the sigma that the simulator gives them."
+        "Not closed: errors are still 8.0 times in height the simulated sigma."
     )
 
 
@@ -64,7 +64,7 @@ def test_what_was_not_held_out_is_not_called_so():
     document = gap_document("position_bump", 0.96)
     assert "on held-out data" in shrinking(document).title
     document["closure"]["is_held_out"] = False
-    assert "on the data in which it was found" in shrinking(document).title
+    assert "on the data from which it was estimated" in shrinking(document).title
     whole, each = closure_figure(document).axes
     assert whole.get_title(loc="left") == "All data" and not each.get_visible()
 
@@ -75,8 +75,8 @@ def test_the_page_calls_nothing_held_out_that_was_not():
     document = gap_document("position_bump", 0.96)
     document["closure"]["is_held_out"] = False
     page = diagnosis_page(document, "street").html()
-    assert "measured on the data in which it was found" in page
-    assert "had no part in finding" not in page
+    assert "measured on the data from which it was estimated" in page
+    assert "not used to estimate" not in page
 
 
 def test_less_than_chance_leaves_is_too_much_put_in():
@@ -86,6 +86,8 @@ def test_less_than_chance_leaves_is_too_much_put_in():
     assert is_within(-53.9, band, "scatter") and not is_within(-53.9, band, "scatter", is_left=True)
     over = {"before": 18.7, "after": -53.9, "null_band": band, "kind": "scatter", "shrink": -0.88}
     document["closure"] |= over
-    assert shrinking(document).more.endswith("than chance leaves: too much was put in.")
+    assert shrinking(document).more.endswith(
+        "smaller than by chance: the correction was too large."
+    )
     document["closure"] |= {"after": 0.3, "shrink": 0.99}
-    assert shrinking(document).more.endswith("chance leaves when nothing is wrong.")
+    assert shrinking(document).more.endswith("The remaining gap is within chance.")

@@ -27,7 +27,7 @@ def test_there_is_an_overview_and_a_picture_of_each_target(drawn):
     names = [picture.name for picture in drawn]
     assert names[0] == "overview" and {f"target-T0{k}" for k in range(1, 6)} <= set(names)
     titles = {picture.name: picture.view.title for picture in drawn}
-    assert "m off before, " in titles["target-T01"]
+    assert "m before, " in titles["target-T01"]
 
 
 @pytest.mark.parametrize(

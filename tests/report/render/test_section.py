@@ -66,7 +66,7 @@ def test_a_tie_chooses_the_wall_and_names_the_passes():
     assert place.passes == (3, 5)
     np.testing.assert_allclose([place.before, place.after], [0.12, 0.0], atol=0.005)
     view = section(scouted, PictureOptions((640, 480)), tie_at(scouted, normal))
-    assert view.visits == ("scanned by pass 3", "scanned by pass 5")
+    assert view.visits == ("scanned in pass 3", "scanned in pass 5")
     assert "scanned twice: 12.0 cm apart before" in view.title
 
 

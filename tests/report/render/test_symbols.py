@@ -54,7 +54,7 @@ def test_the_legend_names_what_the_view_shows():
     "A colour bar and the marks of a target; swatches where two visits are told apart"
     camera = Camera.towards(ORIGIN, 0.0, 90.0, 7.0, SIZE)
     outline = Mark("surveyed", ORIGIN + np.zeros((5, 3)))
-    for colour, words in (("height", "Where the target"), ("visit", "Scanned at the first")):
+    for colour, words in (("height", "Surveyed position"), ("visit", "Scanned in the first")):
         figure = Figure(figsize=(9, 5), dpi=100)
         view = View("a", "", "", camera, colour, marks=((outline,), (outline,)))
         legend(figure, view, ColourScale(0.0, 1.0), (0.012, 0.11))

@@ -45,7 +45,7 @@ def test_a_street_lies_across_its_picture_and_an_area_is_seen_from_above():
     np.testing.assert_allclose(along.camera.axes[0], [1.0, 0.0, 0.0], atol=0.02)
     assert along.camera.size == (480, 180) and area.camera.size == SIZE
     np.testing.assert_allclose(area.camera.axes[2], [0.0, 0.0, -1.0], atol=1e-9)
-    assert "no target was seen" in along.title
+    assert "no target was found" in along.title
 
 
 def test_the_title_counts_check_points_alone_where_there_are_some():
@@ -53,7 +53,9 @@ def test_the_title_counts_check_points_alone_where_there_are_some():
     check = replace(target("T2", (0, 0, 0)), role="check", after=np.array([0.1, 0.0, 0.0]))
     rows = [target("T1", (0, 0, 0), (5.0, 0.0, 0.0)), check, replace(check, gps_time=START)]
     title = overview(scouted([1, 1, 1]), rows, PictureOptions(SIZE)).title
-    assert title.startswith("1 check point, seen 2 times: 30.0 cm off before, 10.0 cm after")
+    assert title.startswith(
+        "3D RMSE at 1 check point, 2 observations: 30.0 cm before, 10.0 cm after"
+    )
 
 
 def test_the_title_does_not_boast_of_the_fit_of_control_points():
@@ -65,6 +67,6 @@ def test_the_title_does_not_boast_of_the_fit_of_control_points():
         for some in (left_out, rows[:1])
     ]
     assert titles == [
-        "2 control points: 30.0 cm off before, 5.0 cm when left out in turn (3D RMSE)",
-        "1 control point: 30.0 cm off before (3D RMSE); the correction was made with it",
+        "3D RMSE at 2 control points: 30.0 cm before, 5.0 cm leave-one-out",
+        "3D RMSE at 1 control point: 30.0 cm before; it was used for the correction",
     ]
