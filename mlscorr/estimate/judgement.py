@@ -267,9 +267,9 @@ def _courses_of(burst, time):
     inside = (time > burst.first) & (time < burst.last)
     walk = burst.course(time)
     order = np.argsort(time, kind="stable")
-    apart = np.diff(time[order], prepend=-np.inf) > POS_SETTINGS.sigma_interval
+    is_new = np.diff(time[order], prepend=-np.inf) > POS_SETTINGS.sigma_interval
     moment = np.empty(len(time), int)
-    moment[order] = np.cumsum(apart)
+    moment[order] = np.cumsum(is_new)
     free = (moment[:, None] == np.unique(moment[inside])) & inside[:, None]
     return walk / walk.max(), inside, free
 

@@ -170,8 +170,8 @@ class TiedSurvey(KnownResult):
         kinds = ("planes", "poles", "lines", "dashes")
         rows = [("passes", *kinds, "misclosure across, along, up (m, RMS)")]
         for pair in self.pairs:
-            apart = (pair["misfit"][axis]["rms"] for axis in AXES)
-            numbers = ", ".join("-" if rms is None else f"{rms:.3f}" for rms in apart)
+            rms_values = (pair["misfit"][axis]["rms"] for axis in AXES)
+            numbers = ", ".join("-" if rms is None else f"{rms:.3f}" for rms in rms_values)
             rows.append((pair["passes"], *(pair[kind] for kind in kinds), numbers))
         return [(self.survey.name,), *rows, *((sentence,) for sentence in self.warnings)]
 

@@ -106,9 +106,9 @@ def _votes(features, inside, before, tree, radius):
     row = row[parallel]
     normal = (first + second)[parallel]
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    apart = tree.data[near] - features.centre[row]
-    misclosure = np.einsum("ni,ni->n", normal, apart)
-    is_near = np.linalg.norm(apart - misclosure[:, None] * normal, axis=1) <= SURFACES.cell
+    difference = tree.data[near] - features.centre[row]
+    misclosure = np.einsum("ni,ni->n", normal, difference)
+    is_near = np.linalg.norm(difference - misclosure[:, None] * normal, axis=1) <= SURFACES.cell
     arm = features.centre[row] - features.centre[inside].mean(axis=0)
     return Votes(arm[is_near], normal[is_near], misclosure[is_near])
 

@@ -63,10 +63,10 @@ def pair_features(
     pairs = pairs[_is_unique(present, features.centre + correction, sigma)[pairs].all(axis=1)]
     direction = np.add(*_directions(present, pairs))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    apart = np.diff((features.centre + correction)[pairs], axis=1)[:, 0]
-    along = np.einsum("ni,ni->n", apart, direction)
+    difference = np.diff((features.centre + correction)[pairs], axis=1)[:, 0]
+    along = np.einsum("ni,ni->n", difference, direction)
     is_pole = features.kind[pairs[:, 0]] == "pole"
-    across = np.maximum((apart**2).sum(axis=1) - along**2, 0.0)
+    across = np.maximum((difference**2).sum(axis=1) - along**2, 0.0)
     lever = np.where(is_pole, along**2, across)
     # each direction is transferred to the middle between both centers
     variance = features.variance[pairs].sum(axis=1) + lever * features.tilt[pairs].sum(axis=1) / 4
@@ -128,10 +128,10 @@ def _is_unique(features, place, sigma):
     points = np.column_stack([place, 2 * edge * visit_number(features)])[painted]
     pairs = painted[cKDTree(points).query_pairs(edge, output_type="ndarray")]
     pairs = np.concatenate([pairs, pairs[:, ::-1]])
-    apart = np.diff(place[pairs], axis=1)[:, 0]
+    difference = np.diff(place[pairs], axis=1)[:, 0]
     first, second = _directions(features, pairs)
-    along = np.abs(np.einsum("ni,ni->n", apart, first))
-    lateral_distance = np.sqrt(np.maximum((apart**2).sum(axis=1) - along**2, 0.0))
+    along = np.abs(np.einsum("ni,ni->n", difference, first))
+    lateral_distance = np.sqrt(np.maximum((difference**2).sum(axis=1) - along**2, 0.0))
     like = (along > SURFACES.widest_paint) & (along <= width[pairs[:, 0]])
     like &= (lateral_distance <= SURFACES.cell) & (
         features.kind[pairs[:, 0]] == features.kind[pairs[:, 1]]

@@ -57,8 +57,8 @@ def test_a_time_is_that_of_the_survey():
 
 def test_an_unknown_error_is_located_by_what_it_looks_like():
     "Where it grows with speed, speed; where nobody knows, the bins that exceed their null band"
-    lead = "height error that grows with speed squared"
-    assert "at speeds of 8.0" in headline(where(BRIGHT, FAST), "unknown", lead, START)
+    hint = "height error that grows with speed squared"
+    assert "at speeds of 8.0" in headline(where(BRIGHT, FAST), "unknown", hint, START)
     said = headline(where(BRIGHT, FAST), "an_effect_of_mine", "", START)
     assert said.startswith("No part of the survey is conspicuous.")
     loud = replace(FAST, before=np.full(8, 9.0), share=np.array([0.65, *[0.05] * 7]))

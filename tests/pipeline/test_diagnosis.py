@@ -15,7 +15,7 @@ from mlscorr.cli import app
 from mlscorr.effects import make_effect
 from mlscorr.gap.evidence import Cause, Costs, ErrorModel
 from mlscorr.gap.evidence.labels import kind_of
-from mlscorr.gap.signatures import Signature, as_believed, with_cause
+from mlscorr.gap.signatures import Signature, as_assumed, with_cause
 from mlscorr.io.clouds import read_chunks
 from mlscorr.pipeline import read_effects
 from mlscorr.simulate import Scenario, beliefs_of, read_simulator, simulate, write_simulator
@@ -132,8 +132,8 @@ def test_a_mounting_that_differs_in_the_simulator_is_an_effect(late):
     survey = mlscorr.read_survey(late)
     simulator = beliefs_of(survey)
     arm = simulator.mounting.lever_arm + np.array([0.09, 0.0, 0.0])
-    believed = replace(simulator, mounting=replace(simulator.mounting, lever_arm=arm))
-    _, (effect,) = as_believed(survey, believed)
+    assumed = replace(simulator, mounting=replace(simulator.mounting, lever_arm=arm))
+    _, (effect,) = as_assumed(survey, assumed)
     assert effect.name == "lever_arm"
     assert np.allclose(effect.magnitude, [0.09, 0.0, 0.0], atol=1e-9)
 
@@ -159,7 +159,7 @@ def test_a_cause_that_the_simulator_has_already_is_joined_with_it(late, tmp_path
     assert improved.pos.windows == (window,)
     write_simulator(improved, tmp_path / "simulator.toml")
     assert read_simulator(tmp_path / "simulator.toml").pos.windows == (window,)
-    assert as_believed(survey, improved)[0].pos.windows == (window,)
+    assert as_assumed(survey, improved)[0].pos.windows == (window,)
     bare = replace(simulator, pos=replace(simulator.pos, assumed=("position_sigma",)))
     assert with_cause(bare, survey, worse).pos.assumed == ()  # twice the default was found
     assert with_cause(bare, survey, outage).pos.assumed == ("position_sigma",)

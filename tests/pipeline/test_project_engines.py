@@ -238,7 +238,7 @@ def test_a_scheduler_that_is_started_again_is_given_the_rest(tmp_path, cluster, 
                 process.kill()
             processes.extend(start_cluster(address))
 
-    with engine(scheduler=address, tell=said.append) as chosen:
+    with engine(scheduler=address, notify=said.append) as chosen:
         run = Run(TaskStore(tmp_path), chosen, kill_once, said.append)
         assert len(run.results([task(n, span) for n in range(8)])) == 8
         assert chosen.lost == 1 and not run.faults

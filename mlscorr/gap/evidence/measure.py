@@ -181,8 +181,8 @@ def scatter_terms(rows: Rows, predicted: Predicted, residual: np.ndarray) -> np.
         Units: m^2.
     """
     rough = (rows.channel == "roughness")[:, None]
-    believed = np.where(rough, rows.believed[:, None], 0.0)
-    return believed * (np.exp(np.where(rough, residual, 0.0)) - 1 - predicted.growth[:, None])
+    assumed = np.where(rough, rows.assumed[:, None], 0.0)
+    return assumed * (np.exp(np.where(rough, residual, 0.0)) - 1 - predicted.growth[:, None])
 
 
 def simulated_variance(

@@ -96,7 +96,7 @@ def test_what_is_not_given_is_nothing(survey, looks):
     "No second time, no survey error, no belief"
     rows = rows_at(survey, looks)
     assert not rows.two_times.any() and (rows.survey_item == -1).all()
-    assert not rows.survey.any() and np.isnan(rows.believed).all()
+    assert not rows.survey.any() and np.isnan(rows.assumed).all()
     assert rows.channel.dtype.kind == "U" and (rows.channel == "surface").all()
 
 
