@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.cli.correct import tell
+from mlscorr.cli.correct import report_result
 from mlscorr.estimate import DRIFT, REASONS, Support, WeakInterval
 from mlscorr.estimate.support import NO_CONTROL
 from mlscorr.evaluate import DatumDifference, TargetRow
@@ -151,7 +151,7 @@ def test_page_report_and_terminal_begin_with_the_same_statements(tmp_path, capsy
     report = replace(report, targets=[*rows, lost("C7")])
     content = {**first_screen(report), **report.document()}
     html = page(tmp_path, survey, correction, report)
-    tell(content, tmp_path, as_json=False)
+    report_result(content, tmp_path, as_json=False)
     terminal = " ".join(capsys.readouterr().err.split())
     text = words(html)
     for row in content["statements"]:
