@@ -81,9 +81,7 @@ def tie_passes(survey: Survey, estimate: Estimate, features: TieFeatures) -> Est
 
 
 def _untied(estimate: Estimate, features: TieFeatures, radius: float) -> Estimate:
-    """Return the estimate with the reason why nothing is tied, a warning if there should be
-    ties.
-    """
+    """Return the estimate with the reason why nothing is tied, a warning if ties were expected."""
     cells = np.floor(features.centre / radius)
     cell = np.unique(cells, axis=0, return_inverse=True)[1].ravel()
     first, last = time_spans(cell, features.gps_time)

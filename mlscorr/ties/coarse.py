@@ -90,7 +90,7 @@ def _edges(place, margin=0.0):
 
 
 def _votes(features, inside, before, tree, radius):
-    """The Votes of planes (k,) with those before, whose places the tree holds."""
+    """Votes of planes (k,) with those before, whose positions the tree contains."""
     limit = np.hypot(radius, SURFACES.cell)
     count = min(4 * SETTINGS.neighbours, len(before))
     if count == 0 or len(inside) == 0:

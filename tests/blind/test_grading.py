@@ -1,4 +1,4 @@
-"""What grades the diagnosis is opened by nothing that sets it."""
+"""Nothing that sets the diagnosis opens the data that grade it."""
 
 import ast
 import re

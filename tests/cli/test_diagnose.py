@@ -1,4 +1,4 @@
-"""What a diagnosis says in the terminal."""
+"""Output of a diagnosis in the terminal."""
 
 from mlscorr.cli.diagnose import _print
 from mlscorr.report.gap import gap_screen

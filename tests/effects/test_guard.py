@@ -1,4 +1,4 @@
-"""What the code of a user's own effect does wrong is said with its file and line."""
+"""Errors in the code of a user's own effect are reported with its file and line."""
 
 import sys
 from dataclasses import dataclass, replace

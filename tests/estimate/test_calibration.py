@@ -1,4 +1,4 @@
-"What a calibrated mounting says of itself."
+"Statements of a calibrated mounting"
 
 from dataclasses import replace
 

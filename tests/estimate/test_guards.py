@@ -1,4 +1,4 @@
-"""What control points can't tell is said, with times and numbers."""
+"""Statements on parameters that control points do not determine, with times and numbers."""
 
 from types import SimpleNamespace
 

@@ -1,4 +1,4 @@
-"What recorded mountings lack, together and each by itself."
+"Corrections of recorded mountings, together and each by itself"
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Which part of a drive control points hold."""
+"""Parts of a drive that control points constrain."""
 
 from dataclasses import replace
 

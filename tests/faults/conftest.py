@@ -1,4 +1,4 @@
-"""What the tests of faults share: their tally, and a process in which calls fail."""
+"""Common parts of the tests of faults: their count, and a process in which calls fail."""
 
 import shutil
 import subprocess

@@ -1,4 +1,4 @@
-"""What is said of a verdict, and what to do about it."""
+"""Advice that follows from a verdict."""
 
 from dataclasses import replace
 

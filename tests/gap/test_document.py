@@ -1,4 +1,4 @@
-"""What gap.json says of a survey, its effects and their separability."""
+"""Contents of gap.json on a survey, its effects and their separability."""
 
 import json
 from dataclasses import replace

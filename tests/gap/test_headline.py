@@ -1,4 +1,4 @@
-"""Where most of the gap lies, in a sentence."""
+"""Location of most of the gap, in a sentence."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""How far a POS errs whose sigma nobody stated."""
+"""Estimated scale of a POS without stated sigmas."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What stays without a name has a sentence with numbers."""
+"""Unmatched observations have a sentence with numbers."""
 
 import numpy as np
 import pytest

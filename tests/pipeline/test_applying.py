@@ -1,4 +1,4 @@
-"""What was found wrong, taken out of clouds, trajectory and survey.toml."""
+"""Removal of a found error from clouds, trajectory and survey.toml."""
 
 import json
 import shutil

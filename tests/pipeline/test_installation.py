@@ -1,4 +1,4 @@
-"""What doctor finds on this machine, whatever that is, and the lines that install the rest."""
+"""Findings of doctor on any machine, and the commands that install missing parts."""
 
 import json
 import platform

@@ -1,4 +1,4 @@
-"""Who works on tasks: workers that end in the middle, and a cluster of other processes."""
+"""Workers of tasks: some that end in the middle, and a cluster of other processes."""
 
 import os
 import signal
@@ -296,7 +296,7 @@ def test_a_cluster_works_on_tasks(tmp_path):
 
 def test_what_can_not_work_is_said(tmp_path):
     "Workers of two kinds, and a scheduler that is not there"
-    with pytest.raises(ValueError, match="give one"):
+    with pytest.raises(ValueError, match="Give only one"):
         check_engine(2, "tcp://127.0.0.1:1")
 
 

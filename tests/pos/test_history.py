@@ -1,4 +1,4 @@
-"""When drift starts anew, and when it is said to grow."""
+"""Restarts of drift, and the times at which its growth is stated."""
 
 import numpy as np
 import pytest

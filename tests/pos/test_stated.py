@@ -1,4 +1,4 @@
-"""What is believed of the POS: stated where it states it, from survey.toml where it doesn't."""
+"""Prior sigmas of the POS: stated ones, and those of survey.toml where none are stated."""
 
 import numpy as np
 import pytest

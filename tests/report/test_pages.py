@@ -1,4 +1,4 @@
-"""What all pages share."""
+"""Frame common to all pages."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""What a correction was made of."""
+"""Inputs and outputs of a correction."""
 
 from dataclasses import replace
 

@@ -136,7 +136,7 @@ def test_effects_act_in_their_order_however_they_are_listed(tmp_path):
             r"mounting\.lever_arm_sigma is an unknown key",
         ),
         ("[mounting]\nlever_arm = [0, 0, 0]", r"mounting\.boresight is missing\."),
-        ("[pos]\ncorrelation_time = 0", r"pos\.correlation_time = 0 can't be used"),
+        ("[pos]\ncorrelation_time = 0", r"pos\.correlation_time = 0 is invalid"),
         (
             "[[effects]]\nname = 'boresite'\nmagnitude = 1",
             r"effects\.0: 'boresite' is an unknown effect; the nearest known one is boresight\.",

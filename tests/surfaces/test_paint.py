@@ -1,4 +1,4 @@
-"""Where scan lines cross paint."""
+"""Crossings of scan lines with paint."""
 
 from dataclasses import replace
 

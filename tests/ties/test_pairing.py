@@ -1,4 +1,4 @@
-"""Which features are the same thing."""
+"""Pairing of features that are the same object."""
 
 from dataclasses import replace
 

@@ -238,7 +238,7 @@ class _Work:
         return keys
 
     def _estimate(self, planned, tasks, findings, keys, origin):
-        """Store each drive's results."""
+        """Store the results of each drive."""
         self.progress.say(Statement("drives estimated", values={"drives": len(planned)}))
         drives = []
         for drive in planned:
@@ -301,7 +301,7 @@ def _path(task):
 
 
 def _points(survey):
-    """Surveyed points by their use; those that are excluded or included where there are any."""
+    """Surveyed points by their use, with excluded or included ones if there are any."""
     points = survey.control, survey.check
     chosen = survey.excluded, survey.included
     if any(map(len, chosen)):

@@ -104,7 +104,7 @@ def scale_bar(pen: Pen, camera: Camera, size: float) -> None:
 
 
 def _paper(pen, left, top, right, bottom):
-    """A white patch, on which symbols can be read before any points."""
+    """White patch on which symbols are readable over any points."""
     corners = np.array([[left, top], [right, top], [right, bottom], [left, bottom]])
     pen.tint(corners, "white", 0.92)
 

@@ -1,4 +1,4 @@
-"""How large a gap is, in the unit in which its kind of cause shows."""
+"""Size of a gap, in the unit of its kind of cause."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What the targets tell that have no residual."""
+"""Evidence from targets that have no residual."""
 
 from pathlib import Path
 

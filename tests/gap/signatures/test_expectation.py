@@ -1,4 +1,4 @@
-"""What a simulator has already is taken from the rows."""
+"""Effects that a simulator already has are removed from the rows."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What is written into a store: whole objects or none, one run at a time."""
+"""Writing into a store: whole objects or none, one run at a time."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""What a diagnosis says first."""
+"""First screen of a diagnosis."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""How far the gap shrinks, in words."""
+"""Shrinking of the gap, in words."""
 
 import pytest
 

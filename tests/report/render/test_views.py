@@ -1,4 +1,4 @@
-"""What each picture shows, and from where."""
+"""Contents and viewpoint of each picture."""
 
 from dataclasses import replace
 
