@@ -31,7 +31,7 @@ ALL_FAMILIES = (*FAMILIES, INTEGRATED)
 
 @dataclass(frozen=True)
 class Solver:
-    "How close a solver comes to the dense formula, in units of signals of 1 m"
+    "Solver with its tolerance against the dense formula, for signals of 1 m"
 
     solve: callable
     mean: float  # m

@@ -153,7 +153,7 @@ def test_a_mounting_moves_targets_as_its_columns_say():
 
 
 def test_a_mounting_is_weakly_known():
-    "What was corrected already is believed to be needed back, with the sigmas of no measurement"
+    "Without measurements, an earlier correction is assumed to be reversed, with weak sigmas"
     case, position = mounting_case()
     corrected = np.array([0.1, -0.2, 0.3, 0.01, 0.02, -0.03])
     adjustment = mounting_adjustment(position, case.matched, [MOUNTING], corrected, WEAK)
@@ -165,7 +165,7 @@ def test_a_mounting_is_weakly_known():
 
 
 def test_a_site_without_targets_leaves_the_mounting_as_it_was():
-    "Where targets say next to nothing the estimate is minus what was corrected, with weak sigmas"
+    "With few targets the estimate is minus the earlier correction, with weak sigmas"
     case, position = mounting_case()
     vague = np.tile(1e6 * np.eye(3), (6, 1, 1))
     matched = replace(case.matched, observations=replace(case.observations, covariance=vague))

@@ -52,7 +52,7 @@ def alone(sites):
 
 
 def test_sentences_of_two_mountings_are_those_that_both_share(joint):
-    "What this geometry can't tell of a mounting stands with the calibration of that scanner"
+    "Undetermined parameters of one mounting are stated in the calibration of that scanner"
     for calibration in joint:
         assert calibration.warnings == calibration.shared_warnings
         assert not calibration.determined.all()

@@ -388,7 +388,7 @@ def test_sigmas_without_a_correlation_were_measured():
 
 @pytest.mark.parametrize("correlation", [False, True])
 def test_a_changed_part_leaves_no_sigma_of_the_one_before(correlation, tmp_path):
-    "What a tape measured of the other part holds; a calibration's sigmas go with either"
+    "The other part keeps a measured sigma; sigmas of a calibration are dropped with either part"
     old = tmp_path / "survey.toml"
     new = tmp_path / "new.toml"
     lines = "lever_arm_sigma = [0.01, 0.01, 0.01]\nboresight_sigma = [0.1, 0.1, 0.1]\n"

@@ -24,7 +24,7 @@ def support_of(seed, outage, times):
 
 
 def weak_times(support):
-    "Whether each epoch (2400,) is extrapolated"
+    "Flags (2400,) of extrapolated epochs"
     return support.contains(START + TIME)
 
 

@@ -55,7 +55,7 @@ def test_ties_help_the_pass_that_has_control(clean):
 
 
 def test_residuals_are_those_of_the_noise(clean):
-    "What is left of ties is their noise of 4 mm, and none is refused but by chance"
+    "Residuals of ties are their noise of 4 mm, and ties are refused only by chance"
     _, _, tied = clean
     assert tied.ties.used.mean() > 0.98
     assert np.sqrt(np.mean(tied.ties.after[tied.ties.used] ** 2)) == pytest.approx(0.004, rel=0.2)
@@ -114,7 +114,7 @@ def test_a_wrong_control_point_among_three_is_named_and_used():
 
 @pytest.mark.long
 def test_ties_that_contradict_each_other_are_not_used():
-    "Where more than half are wrong by up to metres, control alone decides, and it is said"
+    "If more than half are wrong by up to meters, control alone decides, with a statement"
     survey = tied_passes(4, wrong=0.8, apart=3.0)
     alone, tied = corrected(survey)
     moved = tied.correction.corrected.position - alone.correction.corrected.position

@@ -81,7 +81,7 @@ def test_nothing_needs_to_be_done_where_all_is_as_stated(whole, before, over, rm
 
 
 def test_nothing_is_larger_than_a_default():
-    "Where nobody stated the sigma of the POS, 9 cm and 7 sigmas are no excess, but drift"
+    "With a default sigma of the POS, 9 cm and 7 sigma are drift, and no excess"
     found = inference()
     closed = closure(over=7.3)
     far = [Agreement("target", 9, 91.6, 20.6)]

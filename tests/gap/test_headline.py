@@ -56,7 +56,7 @@ def test_a_time_is_that_of_the_survey():
 
 
 def test_an_unknown_error_is_located_by_what_it_looks_like():
-    "Where it grows with speed, speed; where nobody knows, the bins that exceed their null band"
+    "By speed if it grows with speed; otherwise by the bins that exceed their null band"
     hint = "height error that grows with speed squared"
     assert "at speeds of 8.0" in headline(where(BRIGHT, FAST), "unknown", hint, START)
     said = headline(where(BRIGHT, FAST), "an_effect_of_mine", "", START)

@@ -39,7 +39,7 @@ def made(folder, offset=0.0, seed=3, **scanner):
 
 @pytest.fixture(scope="module")
 def folders(tmp_path_factory):
-    "What was recorded with a late clock, its simulation, and that of 18 of 20 ms"
+    "Survey with a late clock, its simulation, and a simulation with 18 of 20 ms"
     path = tmp_path_factory.mktemp("own")
     real = made(path / "real", OFFSET)
     first = made(path / "first")

@@ -48,7 +48,7 @@ def decoded():
 
 @pytest.fixture(scope="module")
 def diagnosed(late, decoded, tmp_path_factory):
-    "What the command writes for it"
+    "Output of the command for it"
     out = tmp_path_factory.mktemp("diagnosed") / "out"
 
     def counted(file):
@@ -269,7 +269,7 @@ def test_a_moved_control_point_is_named_with_its_size(sound, tmp_path):
 
 @pytest.mark.long
 def test_nothing_wrong_is_not_said_of_what_was_not_seen(sound, tmp_path):
-    "Where two stretches lie 3 m from their surveyed targets the verdict isn't none, and says where"
+    "With two intervals 3 m from their surveyed targets the verdict is not none, and gives them"
     away = ("T04", "T05", "T06", "T10", "T11")
     survey = _with_control_moved(sound, tmp_path / "outages", away, 3.0)
     diagnosed = mlscorr.diagnose(survey)
@@ -295,7 +295,7 @@ def test_costs_that_are_none_are_refused_before_anything_is_read(late, tmp_path,
 
 @pytest.mark.long
 def test_costs_choose_the_label(late, tmp_path):
-    "Where a false alarm costs more than any odds, no cause is named for a clock that is surely off"
+    "If a false alarm costs more than any odds, no cause is named even for a clock surely off"
     command = ["diagnose", str(late), "-o", str(tmp_path / "out"), "--costs", "1e30,1,0.9"]
     assert CliRunner().invoke(app, command).exit_code == 0
     told = json.loads((tmp_path / "out" / "gap.json").read_text())

@@ -66,7 +66,7 @@ def elsewhere(drive, seconds=0.0, way=bed.SHIFT * 0):
 
 
 def added(corrected):
-    "What the correction adds to the position (n, 3). Units: m"
+    "Increment of the correction to the position (n, 3). Units: m"
     return corrected.trajectory.position - corrected.survey.trajectory.position
 
 

@@ -48,7 +48,7 @@ def end_at_first(path, number):
 
 
 def span(number):
-    "When a call of half a second begins and ends. Units: s"
+    "Start and end of a call of half a second. Units: s"
     start = time.time()
     time.sleep(0.5)
     return start, time.time()
@@ -161,7 +161,7 @@ def test_parts_that_are_needed_together_fail_by_name(tmp_path):
 
 
 def test_long_tasks_are_begun_first(tmp_path):
-    "What has most points, or most near targets, begins first; alike ones keep their order"
+    "Tasks with most points, or most near targets, start first; equal ones keep their order"
     begun = []
     points = {1: (5, 0.0), 2: (7, 0.0), 3: (5, 3.5), 4: (5, 0.0)}
 

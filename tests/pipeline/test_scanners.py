@@ -46,7 +46,7 @@ def site(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def survey(site):
-    "That street as it is read"
+    "The street as it is read"
     return mlscorr.read_survey(site)
 
 

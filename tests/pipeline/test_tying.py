@@ -200,7 +200,7 @@ def test_a_tunnel_names_the_direction_that_nobody_holds():
 
 
 def apart_on_road(features, shift):
-    "What is left (3,) of a shift between both passes of the painted road. Units: m"
+    "Residual shift (3,) between both passes of the painted road. Units: m"
     recorded = replace(road_bed.survey(), pos=Pos(position_sigma=0.1))
     start = prior_correction(recorded.trajectory, recorded.pos)
     correction = tie_passes(recorded, start, features).correction

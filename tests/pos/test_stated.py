@@ -44,7 +44,7 @@ def test_sigma_that_grows_is_split_into_what_stays_and_what_grows():
 
 
 def test_constant_sigma_tells_nothing_of_when_drift_grows():
-    "Where sigma(t) never doubles no part of it is taken for what GNSS holds"
+    "If sigma(t) never doubles, no part of it is attributed to GNSS"
     assert not stated_sigma(drive(lambda t: 0.02 + 0.0001 * t), POS).known_gnss.any()
 
 

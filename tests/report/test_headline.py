@@ -192,7 +192,7 @@ def test_a_weak_stretch_is_named_by_time_and_way_and_is_amber_where_it_exceeds_w
 
 
 def test_a_correction_that_is_extrapolated_everywhere_is_never_green():
-    "Where ties alone make it, a sigma below the misclosures says nothing of where the cloud lies"
+    "A correction by ties alone has no known position, even with a sigma below the misclosures"
     report = fabricate(drive())[2]
     everywhere = replace(report.coverage, points_extrapolated=report.coverage.points_corrected)
     weak = Support((WeakInterval(0.0, 60.0, 300.0, 0.0001, "a"),))
@@ -227,7 +227,7 @@ def test_a_sigma_that_nobody_stated_is_called_assumed():
 
 
 def test_a_drive_without_control_of_its_own_is_not_held_by_it():
-    "What other drives carry to it through ties is said as that"
+    "Constraints through ties with other drives are reported as such"
     report = fabricate(drive())[2]
     rows = [row for row in report.targets if row.role == "check"]
     report = replace(report, targets=rows, support=Support())

@@ -64,7 +64,7 @@ def scan(mesh, trajectory, mounting, scanner, seed=1, **options):
 
 
 def same(one, other, but=()):
-    "That two Pulses are equal bit for bit, but for some fields, which aren't"
+    "Check that two Pulses are bit-equal except in some fields, which differ"
     for field in fields(MeasuredPulses):
         a = getattr(one, field.name)
         b = getattr(other, field.name)

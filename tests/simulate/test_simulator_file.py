@@ -75,7 +75,7 @@ def test_a_boresight_of_any_digits_comes_back(tmp_path):
 
 
 def test_the_beliefs_of_a_survey_are_its_file(street, tmp_path):
-    "What survey.toml says of mounting, scanner and POS, in the same words, and no effect"
+    "Mounting, scanner and POS as in survey.toml, in the same words, without effects"
     survey = read_survey(street)
     beliefs = beliefs_of(survey)
     assert beliefs.effects == ()

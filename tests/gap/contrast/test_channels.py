@@ -69,7 +69,7 @@ def test_returns_that_are_lost_far_away_are_measured_and_named(pair):
 
 
 def test_a_simulation_of_half_of_the_drive_says_nothing_of_the_rest(pair):
-    "Where the simulated cloud ends after half of the time, the other half is no missing density"
+    "A simulated cloud that ends after half of the time shows no missing density in the other half"
     survey, real, simulated = pair
     half = np.median(simulated.cells.begin)
     cells = simulated.cells[simulated.cells.begin < half]

@@ -55,7 +55,7 @@ def rows_at(survey, looks, **more):
 
 
 def moved_by(survey, time, place, direction, shift, turn):
-    "How places move along directions when every pose is shifted (m) and turned (rad, map axes)"
+    "Shift of places along directions when every pose is shifted (m) and turned (rad, map axes)"
     trajectory = survey.trajectory
     wrong = replace(
         trajectory,

@@ -24,7 +24,7 @@ def test_roughness_is_what_the_scanner_is_believed_to_make(survey, targets, patc
 
 
 def test_no_roughness_is_compared_with_a_default(survey, targets, patches):
-    "Where nobody stated the scanner's noise no surface is rough beside it"
+    "With a default scanner noise no surface counts as rough"
     scanner = replace(survey.scanner, assumed=("range_noise",))
     bare = replace(survey, scanner=scanner, reference=None)
     assert "roughness" not in build_rows(bare, *no_targets(targets), patches).rows.channel

@@ -218,7 +218,7 @@ def test_levels_are_samples_of_the_cloud(pair, tmp_path, monkeypatch):
 
 
 def test_a_box_and_a_level_are_read_by_others(pair, tmp_path, monkeypatch):
-    "What laspy finds in a box by the hierarchy is all that lies there"
+    "laspy finds by the hierarchy exactly the points inside a box"
     monkeypatch.setattr("mlscorr.io.clouds._copc_writer.SETTINGS", SMALL)
     with CopcReader.open(str(moved(pair[1], tmp_path / "out.copc.laz"))) as reader:
         whole = xyz_of(reader.query())
@@ -245,14 +245,14 @@ def test_points_at_one_place_end_in_one_node(pair, tmp_path, monkeypatch):
 
 
 def test_a_copc_becomes_a_plain_las(pair, tmp_path):
-    "Where the output is no LAZ, nothing in it claims to be an octree"
+    "An output other than LAZ has no octree records"
     plain = moved(pair[1], tmp_path / "out.las")
     assert np.array_equal(rows_of(laspy.read(plain).points), rows_of(laspy.read(pair[0]).points))
     assert read_layout(plain).owner(read_layout(plain).vlrs[0][0])[0] != b"copc"
 
 
 def test_an_interrupted_copc_leaves_nothing(pair, tmp_path):
-    "What stops a correction half way leaves neither a file nor a temporary one beside it"
+    "An interrupted correction leaves neither a file nor a temporary one next to it"
 
     class Stopped:
         def apply(self, cloud):

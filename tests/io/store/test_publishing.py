@@ -76,7 +76,7 @@ def test_an_exception_publishes_nothing(store):
 
 
 def test_results_of_tasks_are_kept_in_a_store(store):
-    "What is put is got, by its key; what is damaged or missing is as if it was never there"
+    "A stored result is found by its key; a damaged or missing one counts as never stored"
     results = TaskStore(as_path("s3://results/tasks"))
     results.put("tiles", "key", {"points": 5})
     assert results.get("tiles", "key") == {"points": 5}

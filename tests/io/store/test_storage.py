@@ -194,7 +194,7 @@ def test_other_stores_have_the_same_interface():
 
 
 def test_a_lost_connection_is_no_damaged_file(store):
-    "What the network did is said, and not that the file should be copied anew"
+    "A network error is reported as such, without advice to copy the file again"
     layout = read_layout(as_path("s3://streets/long.laz"))
     store.lost = "long.laz"
     store.lost_after = 3
@@ -242,7 +242,7 @@ def test_schemes_are_known_or_named():
 
 
 def test_a_dead_endpoint_is_named(store, monkeypatch):
-    "Where nothing answers, that is said, and not that the file does not exist"
+    "A dead endpoint is reported as such, not as a missing file"
     monkeypatch.setenv("AWS_ENDPOINT_URL", "http://127.0.0.1:1")
     s3fs.S3FileSystem.clear_instance_cache()
     try:
@@ -267,7 +267,7 @@ def test_a_command_without_credentials_ends_with_a_sentence(store, monkeypatch):
 
 
 def test_a_disk_needs_no_fsspec():
-    "Where all is on a disk neither fsspec nor what it needs is imported"
+    "With all files on a disk neither fsspec nor its dependencies are imported"
     code = (
         "import sys, mlscorr, mlscorr.cli\n"
         "from mlscorr.io.store.storage import as_path, is_there\n"

@@ -107,7 +107,7 @@ def test_what_is_wrong_is_said(city, parts, words):
 
 
 def exit_codes(project):
-    "Those of `check` and `correct`, by a set: they are the same"
+    "Set of exit codes of `check` and `correct`, which are the same"
     commands = (["check", str(project)], ["correct", str(project), "-o", f"{project}.out"])
     return {CliRunner().invoke(app, command).exit_code for command in commands}
 
