@@ -90,7 +90,10 @@ def test_doubt_about_parameters_widens_the_sigma(adjustment, parameters):
 
 
 def test_the_last_epoch_of_an_outage_has_its_own_sigma():
-    """If sigma(t) falls at once and the path has no step, the epoch before has the average"""
+    """If sigma(t) falls at once and the path has no step, the epoch before has the average.
+
+    It is taken over all parameters, and is not half of the value after re-acquisition.
+    """
     rng = np.random.default_rng(3)
     sigma = filtered_outage(rng)[1]
     case = Case(EPOCHS, waves(rng, 0.01), even(8), rng, sigma)

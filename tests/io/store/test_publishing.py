@@ -162,7 +162,7 @@ def test_a_folder_with_other_things_is_refused(store):
         check_store_output(out, [], overwrite=False)
     with pytest.raises(ValueError, match=r"the input a\.laz, which must"):
         check_store_output(out, [out / "a.laz"], overwrite=True)
-    with pytest.raises(ValueError, match=r"holds the input first/a\.laz, which must stay"):
+    with pytest.raises(ValueError, match=r"contains the input first/a\.laz, which must not"):
         check_store_output(out, [out / "first" / "a.laz"], True, ["first"])
     with pytest.raises(ValueError, match="on a web server, which can't store results"):
         check_store_output(as_path("https://example.org/out"), [], overwrite=True)

@@ -94,7 +94,7 @@ WRONG = [
     (['[cloud]\nfiles = ["*/*.laz"]\n', DRIVE.format("a")], "belong to no drive"),
     ([DRIVE.format("a").replace("a/*.laz", "s4://bucket/a.laz")], "unknown scheme s4://"),
     (['[[drive]]\nname = "a"\n'], "a drive needs survey"),
-    (["name = 1", DRIVE.format("a")], "name = 1 can't be used"),
+    (["name = 1", DRIVE.format("a")], "name = 1 is invalid"),
     (['nmae = "x"\n', DRIVE.format("a")], "the nearest known one is name"),
 ]
 
