@@ -128,7 +128,7 @@ def stage_costs(project, out, points):
     Progress.begin = watched
     try:
         correct_project(
-            project, out, tell=lambda text: text.startswith("Estim") and count("estimate")
+            project, out, notify=lambda text: text.startswith("Estim") and count("estimate")
         )
     finally:
         Progress.begin = begin

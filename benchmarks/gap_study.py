@@ -104,7 +104,7 @@ def case(bed, rng, kind, effects=(), m=3.0, withheld=None, outside=None, noise=N
         "probability": probability,
         "set": answer.set,
         "p": answer.p_value,
-        "lead": evidence.lead()[0],
+        "lead": evidence.hint()[0],
         "score": {k: float(v[0]) for k, v in evidence.score.items()},
         "off": off,
         "rho": _rho(bed, told, answer.label),

@@ -35,7 +35,7 @@ PRIVATE = re.compile(  # words that earlier pages used with a meaning of their o
 
 @dataclass(frozen=True)
 class Reading:
-    """How a page reads.
+    """Readability of a page.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def syllables(word):
 
 
 def reading(text):
-    """How a page of Markdown reads."""
+    """Readability of a page of Markdown."""
     plain = prose(text)
     all_sentences = list(sentences(plain))
     words = [word for sentence in all_sentences for word in words_of(sentence)]

@@ -155,5 +155,7 @@ def _stationary(trajectory, matched):
     def negative(x):
         return -adjustment.solve(parameters(x)).log_likelihood
 
-    best = minimize(negative, [0.0, np.log(60.0)], method="Nelder-Mead").x
+    start = np.array([0.0, np.log(60.0)])
+    bounds = np.column_stack([start - 7.0, start + 7.0])  # a factor of a thousand
+    best = minimize(negative, start, method="Nelder-Mead", bounds=bounds).x
     return predict_under(adjustment, parameters(best))[0][:, :3]

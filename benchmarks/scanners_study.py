@@ -72,7 +72,7 @@ def study(seed, control):
         end = time.process_time()
     alone = np.array([part.lsc.sigma for part in parts])
     sigma = {
-        "together": [*both.lsc.sigma.reshape(2, 6), both.lsc.beside_first(1)[1]],
+        "together": [*both.lsc.sigma.reshape(2, 6), both.lsc.relative_to_first(1)[1]],
         "alone": [*alone, np.sqrt(np.sum(alone**2, axis=0))],
     }
     estimates = {

@@ -16,7 +16,7 @@ from mlscorr.pipeline.project.settings import SETTINGS
 
 def seconds_each(scheduler: str, number: int) -> float:
     """Time of one call, on average over this number of calls."""
-    with engine(scheduler=scheduler, tell=print) as cluster:
+    with engine(scheduler=scheduler, notify=print) as cluster:
         start = time.perf_counter()
         running = set()
         for _ in range(number):

@@ -19,7 +19,7 @@ from feature_surveys import EXTRACTION, FeatureSurvey
 from real_windows import EVERY, stated_sigma
 from ties_study import feature_ties, measure
 
-from mlscorr.estimate import believed_correction, estimate_correction, with_ties
+from mlscorr.estimate import estimate_correction, prior_correction, with_ties
 from mlscorr.frames import attitude_from_angles
 from mlscorr.io.trajectories import read_pos_error_series
 from mlscorr.survey import ControlPoints, Pos, TargetObservations, Trajectory
@@ -117,7 +117,7 @@ def main():
                 if number:
                     estimate = estimate_correction(recorded, survey.matched)
                 else:
-                    estimate = believed_correction(recorded, Pos())
+                    estimate = prior_correction(recorded, Pos())
                 ties = feature_ties(survey, seed, STREET, arguments.wrong)
                 tied = with_ties(estimate, ties).correction
             alone = measure(survey, estimate.correction)

@@ -25,7 +25,7 @@ import numpy as np
 from feature_surveys import FOLDER
 
 import mlscorr
-from mlscorr.estimate import believed_correction, estimate_correction, tie_factor
+from mlscorr.estimate import estimate_correction, prior_correction, tie_factor
 from mlscorr.io.clouds import read_chunks
 from mlscorr.pipeline.finding import find_control
 from mlscorr.simulate import read_scenario, simulate
@@ -216,7 +216,7 @@ def main():
                 start = estimate_correction(recorded, control, survey.pos)
                 alone = measure(true, start)
             else:
-                start = believed_correction(recorded, survey.pos)
+                start = prior_correction(recorded, survey.pos)
                 alone = (np.nan, np.nan)
             tied = measure(true, tie_passes(survey, start, features))
             ratios[number].append(tied[0] / alone[0])

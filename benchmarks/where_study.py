@@ -94,7 +94,7 @@ def case(bed, rng, kind, name, m):
         "time": "gps_time",
         "location": "chainage",
     }
-    said = headline(inference.where, verdict.label, verdict.lead, rows.reference.start)
+    said = headline(inference.where, verdict.label, verdict.hint, rows.reference.start)
     return {
         "label": verdict.label,
         "iou": overlap(split.extent, truth),

@@ -62,8 +62,8 @@ def from_polar(distance: np.ndarray, angle: np.ndarray, elevation: np.ndarray) -
     angle, elevation : (n,) array
         From X toward Y, and from their plane toward Z. Units: rad.
     """
-    level = distance * np.cos(elevation)
-    axes = level * np.cos(angle), level * np.sin(angle), distance * np.sin(elevation)
+    horizontal = distance * np.cos(elevation)
+    axes = horizontal * np.cos(angle), horizontal * np.sin(angle), distance * np.sin(elevation)
     return np.column_stack(axes)
 
 

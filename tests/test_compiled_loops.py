@@ -47,7 +47,7 @@ def write_package(folder, module):
 
 
 def hits(package, home, module, **environment):
-    "How many loops a run of the package finds compiled"
+    "Number of compiled loops that a run of the package finds"
     words = {"PATH": os.environ["PATH"], "HOME": str(home), "PYTHONPATH": str(package)}
     command = [sys.executable, "-c", RUN.format(module=module)]
     return int(subprocess.check_output(command, env={**words, **environment}, cwd=package))
@@ -62,7 +62,7 @@ def test_two_environments_share_what_was_compiled(tmp_path):
 
 
 def test_a_module_that_moved_is_compiled_anew(tmp_path):
-    "Where what a loop takes stands in another module, loops of before are not read"
+    "Loops are compiled again if a function they use is in another module"
     write_package(tmp_path / "package", "counts")
     assert hits(tmp_path / "package", tmp_path, "counts") == 0
     (tmp_path / "package" / "mlscorr" / "counts.py").unlink()
@@ -102,7 +102,7 @@ def test_loops_are_kept_without_a_home(temporary):
 
 
 def test_a_folder_that_leads_elsewhere_is_not_trusted(temporary):
-    "What lies in the folder is run, so a link in its place gives way to a folder made anew"
+    "Code in the folder is run, so a link in its place is replaced by a new folder"
     (temporary / "elsewhere").mkdir()
     (temporary / f"mlscorr-{os.getuid()}").symlink_to(temporary / "elsewhere")
     folder = writable_folder(Path("/proc/nowhere")).resolve()

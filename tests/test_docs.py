@@ -140,7 +140,7 @@ def test_the_readme_is_short_and_leads_to_every_page():
 
 
 def test_names_of_the_package_are_there(page):
-    "What a page names as mlscorr.room.function can be imported, every one"
+    "Every mlscorr.room.function on a page can be imported"
     for name in re.findall(r"`(mlscorr\.[a-z_.]+)`", page.read_text()):
         resolve_name(name)
 

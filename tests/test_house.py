@@ -58,7 +58,7 @@ def code_lines(path):
 
 
 def holds_number(value):
-    "Whether an expression has a number in it"
+    "True if an expression contains a number"
     return value is not None and any(
         isinstance(node, ast.Constant) and type(node.value) in (int, float)
         for node in ast.walk(value)
@@ -95,7 +95,7 @@ def is_documented(node):
 
 
 def is_annotated(function):
-    "Whether a function states the types of its parameters and of its result"
+    "True if a function annotates its parameters and its result"
     a = function.args
     parameters = [*a.posonlyargs, *a.args, *a.kwonlyargs, a.vararg, a.kwarg]
     named = [p for p in parameters if p is not None and p.arg not in ("self", "cls")]
@@ -112,7 +112,7 @@ def unannotated(path):
 
 
 def is_packed(node):
-    "Whether a statement binds several names to several expressions: a, b = x, y"
+    "True if a statement binds several names to several expressions: a, b = x, y"
     return (
         isinstance(node, ast.Assign)
         and isinstance(node.value, ast.Tuple)
@@ -121,14 +121,14 @@ def is_packed(node):
 
 
 def is_dataclass(node):
-    "Whether a class is decorated as a dataclass"
+    "True if a class is decorated as a dataclass"
     return isinstance(node, ast.ClassDef) and any(
         "dataclass" in ast.unparse(decorator) for decorator in node.decorator_list
     )
 
 
 def is_past_face(node, path):
-    "Whether an import takes a name from a module of another room instead of from its face"
+    "True if an import takes a name from a module of another room instead of from its face"
     if not isinstance(node, ast.ImportFrom) or not node.module.startswith("mlscorr."):
         return False
     module = ROOT / node.module.replace(".", "/")

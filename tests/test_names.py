@@ -40,7 +40,7 @@ def bound_names(tree):
 
 
 def is_banned(name):
-    "Whether a name says nothing, or is a verb in capitals"
+    "True if a name has no meaning, or is a verb in capitals"
     plain = name.strip("_").rstrip("0123456789_")
     return plain.lower() in BANNED or (plain.isupper() and plain.lower() in VERBS)
 

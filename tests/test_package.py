@@ -1,4 +1,4 @@
-"""What ``import mlscorr`` offers: functions that are loaded when they are used."""
+"""Contents of ``import mlscorr``: functions that are loaded when they are used."""
 
 import ast
 import inspect

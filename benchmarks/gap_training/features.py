@@ -239,11 +239,11 @@ def _patch_parts(survey, place, normal, counts, which, time, pass_number, rough,
     if rough:
         away = np.linalg.norm(pulses.scanner_xyz, axis=1)
         slant = pulses.incidence
-        believed = (survey.scanner.range_noise * slant) ** 2 + 1e-7
-        believed += (survey.scanner.angle_noise * away) ** 2 * (1 - slant**2) / 2
+        assumed = (survey.scanner.range_noise * slant) ** 2 + 1e-7
+        assumed += (survey.scanner.angle_noise * away) ** 2 * (1 - slant**2) / 2
         none = np.zeros((len(p), 3))
         lost = SETTINGS.least_loss
-        channels.append(("roughness", none, 2 / 77, believed))
+        channels.append(("roughness", none, 2 / 77, assumed))
         channels.append(("return_rate", none, lost * (1 - lost) / 80, np.ones(len(p))))
     return parts + [
         assemble(
@@ -258,7 +258,7 @@ def _patch_parts(survey, place, normal, counts, which, time, pass_number, rough,
             np.full(len(p), 80),
             pulses,
             pass_number[p],
-            believed=expected,
+            assumed=expected,
         )
         for name, direction, spread, expected in channels
     ]

@@ -30,7 +30,7 @@ GREEN = "#009e73"
 
 
 def stated(time):
-    """What the POS states (m): an outage that a smoother bridged."""
+    """Sigma stated by the POS in m, for an outage bridged by a smoother."""
     start, end = OUTAGE
     inside = np.clip((time - start) / (end - start), 0.0, 1.0)
     return 0.02 + 0.38 * np.sin(np.pi * inside) ** 2

@@ -19,7 +19,7 @@ from page import ROOT, SHARED, needed, picture, words
 from scipy.spatial.transform import Rotation, Slerp
 from two_pass_page import draw_slice, turns, write
 
-from mlscorr.estimate import believed_mounting, calibration_with_ties
+from mlscorr.estimate import calibration_with_ties, prior_mounting
 from mlscorr.frames import georeference, to_scanner
 from mlscorr.gap.evidence import infer_causes
 from mlscorr.gap.residuals import background, find_patches
@@ -153,7 +153,7 @@ def study(scene, rng, folds=FOLDS, chance=CHANCE):
     survey = scene.survey
     collector = FeatureCollector(survey)
     collector.add(survey.clouds[0], scene.cloud)
-    start = believed_mounting(survey.trajectory, survey.mountings, Matched.none(), survey.pos)
+    start = prior_mounting(survey.trajectory, survey.mountings, Matched.none(), survey.pos)
     calibration = tie_mounting(survey, start, Matched.none(), collector.features())
     if calibration.ties is None:
         return None

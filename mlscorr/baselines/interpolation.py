@@ -70,9 +70,9 @@ def _fit(trajectory, matched, curve: Curve, cut):
     of_epoch = np.searchsorted(restarts, epochs)
     of_time = np.searchsorted(restarts, trajectory.gps_time)
     error = curve(epochs, misclosure, trajectory.gps_time)  # for segments without control
-    for stretch in np.unique(of_epoch):
-        inside = of_epoch == stretch
-        rows = of_time == stretch
+    for segment in np.unique(of_epoch):
+        inside = of_epoch == segment
+        rows = of_time == segment
         error[rows] = curve(epochs[inside], misclosure[inside], trajectory.gps_time[rows])
     return _correction(trajectory, error)
 

@@ -179,9 +179,9 @@ def _axes(normal):
     up = [0.0, 0.0, 1.0]
     if abs(normal[2]) >= 0.9:
         up = [0.0, 1.0, 0.0]
-    level = np.cross(up, normal)
-    level /= np.linalg.norm(level)
-    return np.array([level, np.cross(normal, level), normal])
+    horizontal = np.cross(up, normal)
+    horizontal /= np.linalg.norm(horizontal)
+    return np.array([horizontal, np.cross(normal, horizontal), normal])
 
 
 def _points_on(observations, i, axes, tree, cloud, pass_number):

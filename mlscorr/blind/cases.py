@@ -94,7 +94,7 @@ def _drawn(name, case, entropy, find_targets, mechanisms):
         if moved is None:
             return None, None
         mechanism, _, like = moved
-        _, (unit, _), lead = outside[mechanism.name]
+        _, (unit, _), hint = outside[mechanism.name]
         label |= {
             "mdb": [case.mdb],
             "likeness": {mechanism.name: like},
@@ -102,7 +102,7 @@ def _drawn(name, case, entropy, find_targets, mechanisms):
                 "name": mechanism.name,
                 "size": mechanism.size,
                 "unit": unit,
-                "lead": list(lead),
+                "lead": list(hint),
             },
         }
         return label, DisplacedSurvey.of(survey, mechanism)

@@ -103,11 +103,11 @@ class AnsweredCase:
         return self.names(self.named, by_class=True)
 
     @property
-    def leads(self) -> bool:
+    def is_hint_right(self) -> bool:
         """True if the hint has one of the words of each entry."""
-        lead = self.verdict["lead"]
+        hint = self.verdict["lead"]
         entries = self.label["mechanism"]["lead"]
-        return all(any(word in lead for word in entry.split("|")) for entry in entries)
+        return all(any(word in hint for word in entry.split("|")) for entry in entries)
 
     def names(self, label: str, by_class: bool = False) -> bool:
         """Return True if a label is the truth.
@@ -172,11 +172,11 @@ def _rates(answered):
         strict, by_class = ([case.names(case.named, c) for case in some] for c in (False, True))
         yield _share(f"right at {where}", strict, goal)
         yield _share(f"right at {where}, by class", by_class, wider)
-    held = [
+    covered = [
         any(case.names(label, by_class=True) for label in case.verdict["set"])
         for case in at_2 + at_3
     ]
-    yield _share("the 95 % set holds the truth", held, 0.95)
+    yield _share("the 95 % set holds the truth", covered, 0.95)
     noisy = [case.named == "unknown" or case.is_only_noise for case in withheld]
     yield _share("withheld: unknown or noise", noisy, 0.85)
     right = [case.is_right for case in withheld]
@@ -190,7 +190,9 @@ def _rates(answered):
     yield _share("withheld: wrongly named", far, maximum=0.04)
     flagged = [case for case in outside if case.named == "unknown"]
     yield _share("outside: unknown", [case.named == "unknown" for case in outside], 0.80)
-    yield _share("outside: lead right where unknown", [case.leads for case in flagged], 0.75)
+    yield _share(
+        "outside: lead right where unknown", [case.is_hint_right for case in flagged], 0.75
+    )
     yield _share("both of a pair", [case.names(case.named) for case in pair], 0.90)
     by_class = [case.names(case.named, by_class=True) for case in pair]
     yield _share("both of a pair, by class", by_class, 0.90)

@@ -44,9 +44,9 @@ def calibrate(
     for name, part in content.get("scanners", {}).items():
         say(f"Scanner {name}")
         terminal.say_statements(part["statements"])
-        _tell_estimates(part)
+        _print_estimates(part)
     if "scanners" not in content:
-        _tell_estimates(content)
+        _print_estimates(content)
     terminal.say_results(
         [
             ("Calibration", out / "calibration.json"),
@@ -64,16 +64,16 @@ def calibrate(
         raise typer.Exit(terminal.Exit.IN_PART)
 
 
-def _tell_estimates(content):
+def _print_estimates(content):
     """Print the corrections of one scanner's mounting, and their effect on its targets."""
     methods = {"LSC": content["lsc"], "LS": content["ls"]}
     if not content["ls"]["control"]["n"]:  # it uses only control
         del methods["LS"]
-    _tell_mounting(content, methods)
-    _tell_misclosures(content, methods)
+    _print_mounting(content, methods)
+    _print_misclosures(content, methods)
 
 
-def _tell_mounting(content, methods):
+def _print_mounting(content, methods):
     """Print the recorded mounting, its corrections by each method, and the determined
     components.
     """
@@ -93,7 +93,7 @@ def _tell_mounting(content, methods):
             say(f"{about:34s}{numbers}  {determined}")
 
 
-def _tell_misclosures(content, methods):
+def _print_misclosures(content, methods):
     if "with_drift" in content:
         methods = methods | {"LSC with drift": content["with_drift"]}
     rows = [

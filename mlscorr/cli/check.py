@@ -26,7 +26,7 @@ EXAMPLES = (
 
 
 def check(survey: SurveyArgument, quiet: Quiet = False, verbose: Verbose = 0) -> None:
-    """Tell in seconds all that is wrong with a survey or project, and what correcting it takes."""
+    """Report in seconds all faults of a survey or project, and the cost of correcting it."""
     checked = _checked(survey)
     say_checked(checked)
     following = f"mlscorr correct {quote(str(survey))}"
@@ -38,7 +38,7 @@ def check(survey: SurveyArgument, quiet: Quiet = False, verbose: Verbose = 0) ->
 
 
 def say_checked(checked: CheckedSurvey, with_amounts: bool = True) -> None:
-    """Say what a check found, and end with its exit code where there is a fault.
+    """Print the result of a check, and end with its exit code if there is a fault.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def _amount(amount):
 
 
 def check_first(survey: Path) -> None:
-    """Check a survey before the work, and end with the result if there is a fault.
+    """Check a survey before the work, and print the result and end if there is a fault.
 
     Parameters
     ----------

@@ -80,7 +80,7 @@ def compare(
         result = mlscorr.compare(recorded, progress=progress)
         report = result.write(out, clouds, overwrite, progress)
     print_json(report, as_json)
-    _tell(report, out)
+    _print(report, out)
     left = [file for file in report["files"] if file["points_outside_trajectory"]]
     for file in left:
         terminal.warn(
@@ -136,7 +136,7 @@ def _compare_results(first, second, out, overwrite, as_json):
         terminal.say_results([("Report", out / "compare_results.html")])
 
 
-def _tell(report, out):
+def _print(report, out):
     """Print the first screen, the table of scores, and the location of the results."""
     by = report["scored_by"]
     terminal.say_statements(report["statements"])

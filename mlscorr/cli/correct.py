@@ -211,7 +211,7 @@ def correct(
         if path != survey:
             check_first(path)
         report = _corrected(path, out, overwrite, order, ties, chosen, settings)
-    tell(report, out, as_json, not no_report, pdf, worst_first)
+    report_result(report, out, as_json, not no_report, pdf, worst_first)
     terminal.end(failures(gates, report), not report["coverage"]["points_untouched"])
 
 
@@ -254,7 +254,7 @@ def _written(survey, settings):
     return names
 
 
-def tell(
+def report_result(
     report: dict,
     out: Path,
     as_json: bool,

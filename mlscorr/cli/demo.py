@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from mlscorr.cli.correct import tell
+from mlscorr.cli.correct import report_result
 from mlscorr.cli.terminal import Json, Overwrite, Quiet, Verbose, path_or_url, say
 from mlscorr.cli.work import work
 
@@ -31,4 +31,4 @@ def demo(
 
         say("Simulating a street, a drive with two GNSS outages, and a scanner ...")
         report = demo(out, seed, overwrite, progress)
-    tell(report, out / "corrected", as_json)
+    report_result(report, out / "corrected", as_json)

@@ -62,7 +62,7 @@ def diagnose(
     with terminal.exit_code(terminal.Exit.USAGE), progress_bars():
         from mlscorr.simulate import read_simulator
 
-        believed = read_simulator(simulator) if simulator else None
+        assumed = read_simulator(simulator) if simulator else None
         chosen = _costs(costs)
         if len(simulated) > 2:
             raise ValueError(
@@ -80,14 +80,14 @@ def diagnose(
         if until_none:
             from mlscorr.pipeline import diagnose_until_none
 
-            diagnosed = diagnose_until_none(recorded, believed, progress=progress, costs=chosen)
+            diagnosed = diagnose_until_none(recorded, assumed, progress=progress, costs=chosen)
         else:
             diagnosed = mlscorr.diagnose(
-                recorded, believed, progress=progress, simulated=tuple(simulated), costs=chosen
+                recorded, assumed, progress=progress, simulated=tuple(simulated), costs=chosen
             )
         content = diagnosed.write(out, overwrite)
     print_json(content, as_json)
-    _tell(content)
+    _print(content)
     terminal.say_results(
         [
             ("Page", out / "gap.html"),
@@ -116,7 +116,7 @@ def _costs(text):
     return Costs(*numbers)
 
 
-def _tell(content):
+def _print(content):
     """Print the first screen, and the advice."""
     for sentence in content["warnings"]:
         terminal.warn(f"Warning: {sentence}")
@@ -124,10 +124,10 @@ def _tell(content):
     for number, sentence in enumerate(content["advice"], start=1):
         terminal.say(f"{number}. {sentence}")
     if "ablation" in content:
-        _tell_rounds(content["ablation"])
+        _print_rounds(content["ablation"])
 
 
-def _tell_rounds(ablation):
+def _print_rounds(ablation):
     """Print the gap with each single effect, and after each round."""
     from mlscorr.effects import title
 

@@ -234,7 +234,7 @@ def _compilations(stages: Stages) -> Iterator[None]:
 
 
 def _is_shown(task: Any) -> bool:
-    """Whether a stage has run long enough to be shown."""
+    """True if a stage has run long enough to be shown."""
     patience = PATIENCE
     if task.description.startswith(LOADING) and not task.finished:
         patience = LOADING_PATIENCE

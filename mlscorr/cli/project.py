@@ -62,7 +62,7 @@ def correct_drives(
         parts = choosing(parts, **chosen)
         check_project_output(parts, out, options)
     with terminal.exit_code(terminal.Exit.BAD_DATA, lambda: RESUMPTION):
-        result = correct_project(parts, out, options, tell)
+        result = correct_project(parts, out, options, print_statement)
         terminal.deafen()
     print_json(result.document, as_json)
     terminal.say_statements(result.document["statements"])
@@ -75,7 +75,7 @@ def correct_drives(
     terminal.end(failed, result.is_whole)
 
 
-def tell(statement: Statement) -> None:
+def print_statement(statement: Statement) -> None:
     """Print a progress statement; warnings and failures even in quiet mode.
 
     Parameters

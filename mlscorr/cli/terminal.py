@@ -269,10 +269,10 @@ def exit_code(code: Exit, has_results: Callable[[], bool | str] = lambda: False)
     except (OSError, ImportError, ValueError, SystemError, MemoryError) as error:
         if _repeats:  # a library made it from an interruption
             _stop(has_results())
-        _tell(error, code)
+        _report_error(error, code)
 
 
-def _tell(error, code):
+def _report_error(error, code):
     """Print the error, and end with its exit code; that of a ValueError is given."""
     if isinstance(error, SystemError):
         raise error

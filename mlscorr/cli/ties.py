@@ -44,9 +44,9 @@ def ties(
     )
     for pair in content["pairs"]:
         parts = [
-            f"{axis} {1000 * misfit['rms']:.0f} mm"
-            for axis, misfit in pair["misfit"].items()
-            if misfit["n"]
+            f"{axis} {1000 * statistics['rms']:.0f} mm"
+            for axis, statistics in pair["misfit"].items()
+            if statistics["n"]
         ]
         first, second = pair["passes"]
         if first == second:

@@ -27,7 +27,7 @@ def collocate_rows(
     rows: Sequence[SparseRows],
     like: Any = None,
     tolerance: float = 0.0,
-    believed: np.ndarray | None = None,
+    prior_rows: np.ndarray | None = None,
 ) -> Collocation:
     r"""Separate the misclosures of sparse rows into trend, signal and noise.
 
@@ -40,7 +40,7 @@ def collocate_rows(
         With the same signals and trend: targets, steps of the path, ties.
     like, tolerance
         See ``collocate_by_knots``.
-    believed : (k, p + 1) array, optional
+    prior_rows : (k, p + 1) array, optional
         Prior of the trend; see Collocation.
 
     Returns
@@ -68,13 +68,13 @@ def collocate_rows(
     (array([[0.3]]), array([[[0.0014]]]))
     """
     if not _is_in_time(rows):
-        return collocate_by_knots(rows, like, tolerance, believed)
+        return collocate_by_knots(rows, like, tolerance, prior_rows)
     if len(rows) == 1 and _epochs(rows[0]) == 1:
         (part,) = rows
         given = part.misclosure, part.noise, part.design, part.signals
-        return collocate(part.gps_time[:, 0], *given, believed)
+        return collocate(part.gps_time[:, 0], *given, prior_rows)
     gps_time, misclosure, noise, design, signals, second_views = _in_time(rows)
-    return collocate(gps_time, misclosure, noise, design, signals, believed, second_views)
+    return collocate(gps_time, misclosure, noise, design, signals, prior_rows, second_views)
 
 
 def _is_in_time(rows):

@@ -25,14 +25,14 @@ UNCORRELATED_LAG = float(-np.log(np.square(np.finfo(float).eps)))
 
 
 def collocate_rows_dense(
-    rows: Sequence[SparseRows], believed: np.ndarray | None = None
+    rows: Sequence[SparseRows], prior_rows: np.ndarray | None = None
 ) -> Collocation:
     """Solve rows of any number of epochs by the dense formula; see collocate_rows.
 
     Parameters
     ----------
     rows : sequence of SparseRows
-    believed : (k, p + 1) array, optional
+    prior_rows : (k, p + 1) array, optional
         Prior of the trend; see Collocation.
 
     Raises
@@ -66,13 +66,13 @@ def collocate_rows_dense(
     covariances = tuple(signal.covariance for signal in rows[0].signals)
     solver = DenseSolver(sides.clocks, sides.mixings, covariances, sides.first, factor)
     misclosure = np.concatenate([np.ravel(part.misclosure) for part in rows])
-    return solve_trend(solver, misclosure, _design(rows), believed)
+    return solve_trend(solver, misclosure, _design(rows), prior_rows)
 
 
 def covariance_given(
     observations: Sequence[SparseRows],
     sought: Sequence[SparseRows],
-    believed: np.ndarray | None = None,
+    prior_rows: np.ndarray | None = None,
 ) -> np.ndarray:
     r"""Error covariance (q, q) of noise-free rows predicted from other observations (Eq. 15).
 
@@ -83,7 +83,7 @@ def covariance_given(
     ----------
     observations, sought : sequences of SparseRows
         With the same signals and trend.
-    believed : (k, p + 1) array, optional
+    prior_rows : (k, p + 1) array, optional
         Prior of the trend; see Collocation.
 
     Raises
@@ -104,7 +104,7 @@ def covariance_given(
     >>> np.sqrt(covariance_given([at_0], [at_15])).round(3)
     array([[0.795]])
     """
-    solved = collocate_rows_dense(observations, believed)
+    solved = collocate_rows_dense(observations, prior_rows)
     m = len(solved.misclosure)
     total = signal_covariance([*observations, *sought])
     half = solved.solver.whiten(total[m:, :m].T)
@@ -118,7 +118,7 @@ def likelihood_changes(
     solved: Collocation,
     rows: Sequence[SparseRows],
     changed: Sequence[Sequence[SparseRows]],
-    believed: Sequence[np.ndarray] | None = None,
+    prior_rows: Sequence[np.ndarray] | None = None,
 ) -> np.ndarray:
     r"""First-order changes (k,) of the restricted log-likelihood with changed signals.
 
@@ -133,7 +133,7 @@ def likelihood_changes(
         Rows that were solved.
     changed : sequence of k sequences of SparseRows
         The same rows with slightly different signals.
-    believed : sequence of k arrays, optional
+    prior_rows : sequence of k arrays, optional
         Prior of the trend for each of these; by default that of the solution.
 
     Examples
@@ -158,19 +158,19 @@ def likelihood_changes(
     by_variance = np.einsum("mi,mi->i", solved.design, slope @ solved.design)  # dV = A dS A^T
     before: dict[tuple, np.ndarray] = {}
     changes = []
-    for other, trend in zip(changed, believed or [solved.believed] * len(changed), strict=True):
+    for other, trend in zip(changed, prior_rows or [solved.prior_rows] * len(changed), strict=True):
         numbers = _differing(rows, other)
         if numbers not in before:
             before[numbers] = signal_covariance(_with_signals(rows, numbers))
         after = signal_covariance(_with_signals(other, numbers))
         change = np.vdot(slope, after - before[numbers])
-        changes.append(change + by_variance @ (_variance(trend) - _variance(solved.believed)))
+        changes.append(change + by_variance @ (_variance(trend) - _variance(solved.prior_rows)))
     return np.array(changes)
 
 
-def _variance(believed):
+def _variance(prior_rows):
     """Prior variance of each coefficient (p,); zero without a prior, so that it never changes."""
-    precision = np.sum(believed[:, :-1] ** 2, axis=0)
+    precision = np.sum(prior_rows[:, :-1] ** 2, axis=0)
     return np.divide(1.0, precision, out=np.zeros_like(precision), where=precision > 0)
 
 

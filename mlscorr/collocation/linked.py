@@ -49,7 +49,7 @@ def collocate_by_knots(
     rows: Sequence[SparseRows],
     like: InformationSolver | None = None,
     tolerance: float = 0.0,
-    believed: np.ndarray | None = None,
+    prior_rows: np.ndarray | None = None,
 ) -> Collocation:
     r"""Separate the misclosures of sparse rows into trend, signal and noise.
 
@@ -67,7 +67,7 @@ def collocate_by_knots(
     tolerance : float
         Allowed ratio of the interpolation error between two knots to the uncertainty that the
         observations between them leave; a larger one needs fewer knots.
-    believed : (k, p + 1) array, optional
+    prior_rows : (k, p + 1) array, optional
         Prior of the trend; see Collocation.
 
     Returns
@@ -96,7 +96,7 @@ def collocate_by_knots(
     >>> mean.round(4), np.sqrt(covariance).round(4)
     (array([[0.3]]), array([[[0.0014]]]))
     """
-    return _solve(InformationSolver.of(rows, like, tolerance), believed)
+    return _solve(InformationSolver.of(rows, like, tolerance), prior_rows)
 
 
 def reweight(solved: Collocation, weights: Sequence[np.ndarray]) -> Collocation:
@@ -117,11 +117,11 @@ def reweight(solved: Collocation, weights: Sequence[np.ndarray]) -> Collocation:
     ValueError
         If a weight is not positive.
     """
-    return _solve(solved.solver.reweighted(weights), solved.believed)
+    return _solve(solved.solver.reweighted(weights), solved.prior_rows)
 
 
-def _solve(solver, believed):
-    return solve_trend(solver, solver.columns[:, -1], solver.columns[:, :-1], believed)
+def _solve(solver, prior_rows):
+    return solve_trend(solver, solver.columns[:, -1], solver.columns[:, :-1], prior_rows)
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ def collocate(
     noise: Noise,
     design: np.ndarray,
     signals: Sequence[Signal],
-    believed: np.ndarray | None = None,
+    prior_rows: np.ndarray | None = None,
     second_views: np.ndarray | None = None,
 ) -> Collocation:
     r"""Separate misclosures into trend, signal and noise.
@@ -56,7 +56,7 @@ def collocate(
     design : (n, r, p) array
         A. May have zero columns.
     signals : sequence of Signal
-    believed : (k, p + 1) array, optional
+    prior_rows : (k, p + 1) array, optional
         Prior of the trend; see Collocation.
     second_views : (h, r) array, optional
         Sigmas of the places that the last h epochs share with others; see ``collocate_rows``.
@@ -102,7 +102,7 @@ def collocate(
     )
     observed = n * r - second_views.size
     design = design.reshape(n * r, design.shape[2])[:observed]
-    return solve_trend(solver, np.reshape(misclosure, -1)[:observed], design, believed)
+    return solve_trend(solver, np.reshape(misclosure, -1)[:observed], design, prior_rows)
 
 
 def check_finite(gps_time: np.ndarray, *arrays: np.ndarray) -> None:

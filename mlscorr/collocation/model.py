@@ -176,7 +176,7 @@ class Collocation:
     sigma0 : float
         Square root of the weighted residual sum of squares over the redundancy, m - p plus the
         priors of the trend; one if the model is right.
-    believed : (k, p + 1) array
+    prior_rows : (k, p + 1) array
         Prior of the trend: further rows of A, one coefficient each, and their misclosures, all with
         a sigma of one.
     """
@@ -188,7 +188,7 @@ class Collocation:
     trend_root: np.ndarray
     log_likelihood: float
     sigma0: float
-    believed: np.ndarray
+    prior_rows: np.ndarray
 
     @property
     def trend_covariance(self) -> np.ndarray:
@@ -248,7 +248,7 @@ class Collocation:
     @cached_property
     def _leverage(self):
         """Orthonormal basis (m + k, p) of the columns of A and of the prior of the trend."""
-        return np.linalg.qr(np.vstack([self.design, self.believed[:, :-1]]))[0]
+        return np.linalg.qr(np.vstack([self.design, self.prior_rows[:, :-1]]))[0]
 
     @cached_property
     def projected(self) -> np.ndarray:
@@ -298,7 +298,7 @@ class Collocation:
 
 
 def solve_trend(
-    solver: Any, misclosure: np.ndarray, design: np.ndarray, believed: np.ndarray | None = None
+    solver: Any, misclosure: np.ndarray, design: np.ndarray, prior_rows: np.ndarray | None = None
 ) -> Collocation:
     """Solve generalized least squares, x = (A^T V^-1 A)^-1 A^T V^-1 l  (Eq. 13).
 
@@ -313,7 +313,7 @@ def solve_trend(
         ``solve(columns)``, V^-1 c; ``precision(rows)``, a block of V^-1; ``predictor(columns,
         trend, root)``, of means only if the root is None.
     misclosure, design : (m,), (m, p) array
-    believed : (k, p + 1) array, optional
+    prior_rows : (k, p + 1) array, optional
         See Collocation.
 
     Raises
@@ -322,13 +322,13 @@ def solve_trend(
         If the rank of A is less than its number of columns.
     """
     p = design.shape[1]
-    if believed is None:
-        believed = np.zeros((0, p + 1))
-    whitened = np.vstack([solver.whiten(np.column_stack([design, misclosure])), believed])
+    if prior_rows is None:
+        prior_rows = np.zeros((0, p + 1))
+    whitened = np.vstack([solver.whiten(np.column_stack([design, misclosure])), prior_rows])
     basis, triangle = np.linalg.qr(whitened[:, :p])
     values = np.linalg.svd(triangle, compute_uv=False)
     smallest = len(whitened) * np.finfo(float).eps  # for the rank, as in numpy's matrix_rank
-    redundancy = len(misclosure) + len(believed) - p
+    redundancy = len(misclosure) + len(prior_rows) - p
     if redundancy < 0 or (p and values[-1] <= smallest * values[0]):
         raise ValueError(
             f"{len(misclosure)} misclosures do not determine {p} trend parameters. Lower the "
@@ -339,7 +339,7 @@ def solve_trend(
     residual = whitened[:, p] - whitened[:, :p] @ trend
     squares = float(residual @ residual)
     determinants = solver.log_determinant + 2 * np.log(np.abs(np.diag(triangle))).sum()
-    determinants -= 2 * np.log(believed[:, :p].sum(axis=1)).sum()
+    determinants -= 2 * np.log(prior_rows[:, :p].sum(axis=1)).sum()
     log_likelihood = -0.5 * (squares + determinants + redundancy * np.log(2 * np.pi))
     sigma0 = np.nan
     if redundancy:
@@ -352,5 +352,5 @@ def solve_trend(
         trend_root=root,
         log_likelihood=float(log_likelihood),
         sigma0=float(sigma0),
-        believed=believed,
+        prior_rows=prior_rows,
     )

@@ -34,33 +34,33 @@ from mlscorr.estimate.factors import KINDS, TARGET, TIE, Factor, target_factor, 
 from mlscorr.estimate.guards import COMPONENTS, few_targets, guards_of
 from mlscorr.estimate.inputs import check_order, checked_inputs, filled_sigmas
 from mlscorr.estimate.mounting import (
-    believed_mounting,
     calibration_with_ties,
     control_fault,
     estimate_mounting,
     previewed_mounting,
+    prior_mounting,
 )
 from mlscorr.estimate.outages import with_drift_history
 from mlscorr.estimate.placement import NextControl, PlannedAccuracy, place_control, predict_accuracy
 from mlscorr.estimate.pos_error import (
     Alternative,
     Estimate,
-    believed_correction,
     estimate_correction,
     previewed_correction,
+    prior_correction,
     with_ties,
 )
 from mlscorr.estimate.posterior import Objective, position_prior
 from mlscorr.estimate.settings import SETTINGS
 from mlscorr.estimate.support import (
+    CONSTRAINED,
     DRIFT,
-    HELD,
     REASONS,
     Jump,
     Support,
-    WeakStretch,
+    WeakInterval,
     find_jumps,
-    weak_stretches,
+    weak_intervals,
 )
 from mlscorr.estimate.target_tests import TargetTest
 from mlscorr.estimate.tied import TieResiduals

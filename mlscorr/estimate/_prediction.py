@@ -163,8 +163,8 @@ def bridge_steps(
         if last - first < 2:
             continue
         ends = [first, last]
-        beside = np.clip([first - 1, last + 1], 0, len(time) - 1)
-        speed = (corrected[ends] - corrected[beside]) / (time[ends] - time[beside])[:, None]
+        neighbors = np.clip([first - 1, last + 1], 0, len(time) - 1)
+        speed = (corrected[ends] - corrected[neighbors]) / (time[ends] - time[neighbors])[:, None]
         path = CubicHermiteSpline(time[ends], corrected[ends], speed)
         pose[inside, :3] = path(time[inside]) - trajectory.position[inside]
         share = ((time[inside] - before) / (after - before))[:, None]

@@ -95,8 +95,8 @@ class AddedUnknowns:
         right = weights.T @ solved.misclosure
         correction = covariance @ right
         critical = float(chdtri(len(correction), SETTINGS.significance))
-        beside = np.diag(solved.trend_covariance + response @ covariance @ response.T)
-        return cls(correction, covariance, response, beside, float(right @ correction), critical)
+        variance = np.diag(solved.trend_covariance + response @ covariance @ response.T)
+        return cls(correction, covariance, response, variance, float(right @ correction), critical)
 
     @property
     def sigma(self) -> np.ndarray:

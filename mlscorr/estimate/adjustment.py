@@ -313,7 +313,7 @@ class Adjustment(Summary):
         if self.ties is not None:  # few knots suffice with hundreds of them
             tolerance = self.tolerance
         rows = self.rows(parameters)
-        return collocate_rows(rows, known, tolerance, self.believed(parameters))
+        return collocate_rows(rows, known, tolerance, self.prior_rows(parameters))
 
     def weigh(self, parameters: SignalParameters, like: Collocation | None = None) -> Collocation:
         """Collocation for the likelihood alone: few rows with ties are solved by covariances.
@@ -326,7 +326,7 @@ class Adjustment(Summary):
             difference is smooth, and costs half as much.
         """
         if self._is_dense:
-            return collocate_rows_dense(self.rows(parameters), self.believed(parameters))
+            return collocate_rows_dense(self.rows(parameters), self.prior_rows(parameters))
         return self.solve(parameters, like)
 
     def likelihoods(
@@ -345,8 +345,8 @@ class Adjustment(Summary):
             return np.array([self.weigh(each, solved).log_likelihood for each in near])
         rows = self.rows(parameters)
         changed = [self.rows(each) for each in near]
-        believed = [self.believed(each) for each in near]
-        return solved.log_likelihood + likelihood_changes(solved, rows, changed, believed)
+        prior_rows = [self.prior_rows(each) for each in near]
+        return solved.log_likelihood + likelihood_changes(solved, rows, changed, prior_rows)
 
     @property
     def _is_dense(self):
@@ -387,7 +387,7 @@ class Adjustment(Summary):
             designs.append(design)
         return designs
 
-    def believed(self, parameters: SignalParameters | None) -> np.ndarray:
+    def prior_rows(self, parameters: SignalParameters | None) -> np.ndarray:
         """Prior of unknowns and trend, (k, p + 1), in the form of a Collocation.
 
         Parameters

@@ -103,7 +103,7 @@ class MountingEstimate:
         covariance = self.covariance[rows, rows]
         return MountingEstimate(mountings, self.correction[rows], covariance, self.sigma0)
 
-    def beside_first(self, number: int) -> tuple[np.ndarray, np.ndarray]:
+    def relative_to_first(self, number: int) -> tuple[np.ndarray, np.ndarray]:
         """Correction of a mounting relative to the first, and its sigma: (6,) each, m and rad.
 
         If this is known, both scanners of a vehicle agree on objects seen at one time, whatever
@@ -427,10 +427,10 @@ def clock_warnings(estimate: MountingEstimate, trajectory: Trajectory) -> Iterat
     """
     lack = estimate.correction[1]
     if abs(lack) > SETTINGS.setup_sigmas * estimate.sigma[1]:
-        way = np.linalg.norm(np.diff(trajectory.position, axis=0), axis=1)
-        speeds = way / np.diff(trajectory.gps_time)
-        speed = np.average(speeds, weights=way)  # while driving, not at halts
-        spread = np.sqrt(np.average((speeds - speed) ** 2, weights=way))
+        steps = np.linalg.norm(np.diff(trajectory.position, axis=0), axis=1)
+        speeds = steps / np.diff(trajectory.gps_time)
+        speed = np.average(speeds, weights=steps)  # while driving, not at halts
+        spread = np.sqrt(np.average((speeds - speed) ** 2, weights=steps))
         values = {"lack": float(lack), "speed": float(speed), "spread": float(spread)}
         yield Statement("clock", "warning", values)
 

@@ -312,8 +312,8 @@ def _shared_epochs(gps_time, history):
     takes 17 times as long to solve.
     """
     since = gps_time - gps_time.min(initial=np.inf)
-    stretch = np.floor(since / SETTINGS.tie_epoch)
-    keys = np.column_stack([history.segment(gps_time), stretch])
+    interval = np.floor(since / SETTINGS.tie_epoch)
+    keys = np.column_stack([history.segment(gps_time), interval])
     number = np.unique(keys, axis=0, return_inverse=True)[1].ravel()
     mean = np.bincount(number, since) / np.bincount(number)
     return (gps_time - since) + mean[number]

@@ -234,9 +234,9 @@ def _burst(trajectory, time, names, start, end):
     begin, finish = trajectory.passes[trajectory.segment(time[start])]
     # a target observed in the first or last epoch of a pass is inside, too
     begin, finish = np.nextafter(begin, -np.inf), np.nextafter(finish, np.inf)
-    beside = POS_SETTINGS.sigma_interval  # observations within it share their drift
-    first = time[time < time[start] - beside].max(initial=begin)
-    last = time[time > time[end - 1] + beside].min(initial=finish)
+    interval = POS_SETTINGS.sigma_interval  # observations within it share their drift
+    first = time[time < time[start] - interval].max(initial=begin)
+    last = time[time > time[end - 1] + interval].min(initial=finish)
     is_open = bool(last == finish)
     return UnstatedDrift(
         float(first), float(last), 1.0, is_open, tuple(dict.fromkeys(names[start:end]))
@@ -269,9 +269,9 @@ def _courses_of(burst, time):
     inside = (time > burst.first) & (time < burst.last)
     walk = burst.course(time)
     order = np.argsort(time, kind="stable")
-    apart = np.diff(time[order], prepend=-np.inf) > POS_SETTINGS.sigma_interval
+    is_new = np.diff(time[order], prepend=-np.inf) > POS_SETTINGS.sigma_interval
     moment = np.empty(len(time), int)
-    moment[order] = np.cumsum(apart)
+    moment[order] = np.cumsum(is_new)
     free = (moment[:, None] == np.unique(moment[inside])) & inside[:, None]
     return walk / walk.max(), inside, free
 

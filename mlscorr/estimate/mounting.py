@@ -74,7 +74,7 @@ def estimate_mounting(
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
-def believed_mounting(
+def prior_mounting(
     trajectory: Trajectory, mountings: Sequence[Mounting], matched: Matched, pos: Pos | None = None
 ) -> Calibration:
     """Prior calibration before ties, for control points that do not determine the mountings alone.
@@ -97,7 +97,7 @@ def believed_mounting(
     filled, notes = filled_sigmas(trajectory)
     adjustment = position_adjustment(filled, matched, pos, 0, mounting_prior)
     kept, start, ls = _least_squares(adjustment, matched, mountings)
-    screening = Screening.believed(kept)
+    screening = Screening.untested(kept)
     used = np.ones(len(matched), dtype=bool)
     return calibration_by(trajectory, mountings, kept, screening, (start, ls), used, notes)
 
@@ -241,14 +241,14 @@ def _least_squares(adjustment, matched, recorded):
         if np.abs(step).max() < SETTINGS.resolution:
             break
     # A weak constraint adds the same amount to the redundancy as to the estimate
-    held = solved.trend_covariance / _weak(recorded) ** 2
+    prior_share = solved.trend_covariance / _weak(recorded) ** 2
     observed = 3 * len(matched)
     sigma0 = 1.0
-    redundancy = observed - len(correction) + np.trace(held)
+    redundancy = observed - len(correction) + np.trace(prior_share)
     if round(redundancy) > 0:  # a redundancy below one contains no information on the noise
         sigma0 = solved.sigma0 * np.sqrt(observed / redundancy)
     # Larger noise makes the targets worse, but not the constraint: s^2 (C^-1 + (s^2 - 1) W)^-1
-    shared = np.eye(len(correction)) + (sigma0**2 - 1.0) * held
+    shared = np.eye(len(correction)) + (sigma0**2 - 1.0) * prior_share
     covariance = np.linalg.solve(shared, sigma0**2 * solved.trend_covariance)
     return about, correction, MountingEstimate(mountings, correction, covariance, float(sigma0))
 

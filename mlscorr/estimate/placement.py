@@ -296,7 +296,7 @@ class Outlook:
         shown = [_shown(adjustment, chosen, at, moved) for chosen, _ in families]
         covariances = np.stack(
             [
-                covariance_given(thinned.rows(chosen), [part], thinned.believed(chosen))
+                covariance_given(thinned.rows(chosen), [part], thinned.prior_rows(chosen))
                 for (chosen, _), part in zip(families, shown, strict=True)
             ]
         )

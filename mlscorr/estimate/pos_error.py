@@ -239,7 +239,7 @@ def _judged(trajectory, matched, pos, order, kept_in):
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")
-def believed_correction(trajectory: Trajectory, pos: Pos | None = None) -> Estimate:
+def prior_correction(trajectory: Trajectory, pos: Pos | None = None) -> Estimate:
     """Prior estimate of the POS error without control, from re-acquisitions and sigmas alone.
 
     Parameters
@@ -259,7 +259,7 @@ def believed_correction(trajectory: Trajectory, pos: Pos | None = None) -> Estim
     filled, notes = filled_sigmas(trajectory)
     adjustment = position_adjustment(filled, Matched.none(), pos, 0, position_prior)
     adjustment = with_reacquisitions(adjustment, adjustment.errors.history.steps)
-    screening = Screening.believed(adjustment)
+    screening = Screening.untested(adjustment)
     return _estimate(trajectory, (), GridPredictions(adjustment), screening, notes)
 
 

@@ -113,8 +113,8 @@ def _prior(adjustment, time, attitude_follows):
     }
     if adjustment.errors.history.is_stated:  # otherwise jitter may represent drift, too
         start["jitter_time"] = min(adjustment.interval, SETTINGS.jitter_time)
-    is_held = len(adjustment.names) > 0
-    if not is_held:  # the error common to all passes is undetermined, but stated so
+    is_constrained = len(adjustment.names) > 0
+    if not is_constrained:  # the error common to all passes is undetermined, but stated so
         start["trend_sigma"] = float(np.sqrt(np.mean(adjustment.errors.epochs.gnss**2)))
     is_split = bool(np.any(adjustment.errors.epochs.gnss))
     fixed: list[str] = []
@@ -124,7 +124,7 @@ def _prior(adjustment, time, attitude_follows):
         fixed.append("attitude_time")
     if len(adjustment.errors.history.turns) == 0:
         fixed.append("level_scale")
-    if adjustment.order == NO_TREND or not is_held:
+    if adjustment.order == NO_TREND or not is_constrained:
         fixed.append("trend_sigma")
     free = [name for name in NAMES if name not in fixed]
     return Prior(
@@ -343,11 +343,11 @@ def choose_parameters(
     if adjustment.ties is not None:
         ties = len(adjustment.ties)  # one row each, whereas targets have three
     others = [f for f in adjustment.observing if f.kind != REACQUISITION]
-    if sum(f.misclosure.size for f in others) <= adjustment.believed(None).shape[1] - 1:
+    if sum(f.misclosure.size for f in others) <= adjustment.prior_rows(None).shape[1] - 1:
         families = (*FAMILIES, INTEGRATED)
         stated = [objective.parameters(family, objective.initial) for family in families]
-        believed = tuple((parameters, 1 / len(families)) for parameters in stated)
-        return Posterior(believed, believed)
+        prior_modes = tuple((parameters, 1 / len(families)) for parameters in stated)
+        return Posterior(prior_modes, prior_modes)
     probable = most_probable(adjustment, start)
     share = np.exp([value - probable[0][1] for _, value in probable])
     chosen = zip([row[0] for row in probable], (share / share.sum()).tolist(), strict=True)

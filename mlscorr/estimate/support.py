@@ -21,11 +21,11 @@ REASONS = (
     "in a GNSS outage, after the last control point",
     "control points explain less than half of the variance of the drift",
 )
-HELD, NO_CONTROL, BEFORE_FIRST, PAST_LAST, IN_OUTAGE, DRIFT = range(len(REASONS))
+CONSTRAINED, NO_CONTROL, BEFORE_FIRST, PAST_LAST, IN_OUTAGE, DRIFT = range(len(REASONS))
 
 
 @dataclass(frozen=True)
-class WeakStretch:
+class WeakInterval:
     """A part of the drive whose correction is extrapolated.
 
     Parameters
@@ -65,7 +65,7 @@ class Support:
 
     Parameters
     ----------
-    weak : tuple of WeakStretch
+    weak : tuple of WeakInterval
         In time order, without overlap.
     outages : tuple of (float, float)
         Start of the growth of drift, and its restart. Units: s.
@@ -73,7 +73,7 @@ class Support:
         Times at which the recorded position steps back. Units: s.
     """
 
-    weak: tuple[WeakStretch, ...] = ()
+    weak: tuple[WeakInterval, ...] = ()
     outages: tuple[tuple[float, float], ...] = ()
     steps: tuple[float, ...] = ()
 
@@ -87,12 +87,12 @@ class Support:
 
         Examples
         --------
-        >>> weak = WeakStretch(0.0, 2.0, 9.0, 0.3, "a"), WeakStretch(2.0, 3.0, 5.0, 0.2, "b")
+        >>> weak = WeakInterval(0.0, 2.0, 9.0, 0.3, "a"), WeakInterval(2.0, 3.0, 5.0, 0.2, "b")
         >>> Support(weak).contains(np.array([-1.0, 0.0, 2.0, 3.0, 3.5]))
         array([False,  True,  True,  True, False])
         """
-        starts = np.array([stretch.start for stretch in self.weak])
-        ends = np.array([stretch.end for stretch in self.weak])
+        starts = np.array([interval.start for interval in self.weak])
+        ends = np.array([interval.end for interval in self.weak])
         number = np.searchsorted(starts, gps_time, side="right")
         return gps_time <= np.append(-np.inf, ends)[number]
 
@@ -123,7 +123,7 @@ def find_support(
     # a start without a later re-acquisition may be caused by the noise of GNSS
     shown = ends_by_step | (history.is_stated & (epochs[1] > epochs[0]))
     return Support(
-        tuple(weak_stretches(codes, corrected)),
+        tuple(weak_intervals(codes, corrected)),
         tuple(
             (float(start), float(end))
             for start, end, is_shown in zip(starts, history.edges[1:], shown, strict=True)
@@ -151,7 +151,7 @@ def _reasons(adjustment, solved, parameters, corrected, is_drifting):
     if len(control) == 0:
         return np.full(len(time), NO_CONTROL)
     is_open = is_drifting & _is_drift_open(adjustment, solved, parameters, corrected)
-    codes = np.where(is_open, DRIFT, HELD)
+    codes = np.where(is_open, DRIFT, CONSTRAINED)
     if adjustment.ties is not None:
         return codes
     for first, last in pairwise(adjustment.errors.history.edges):
@@ -168,7 +168,7 @@ def _reasons(adjustment, solved, parameters, corrected, is_drifting):
         codes[rows & (time > inside[-1] + SAME_EPOCH)] = PAST_LAST
     near = np.searchsorted(control, time)
     gap = np.abs(control[np.clip([near - 1, near], 0, len(control) - 1)] - time).min(axis=0)
-    codes[(codes == DRIFT) & (gap <= SAME_EPOCH)] = HELD
+    codes[(codes == DRIFT) & (gap <= SAME_EPOCH)] = CONSTRAINED
     return codes
 
 
@@ -202,8 +202,8 @@ def _is_drifting(adjustment, parameters):
     return size > (stated.gnss**2).sum(axis=1)
 
 
-def weak_stretches(codes: np.ndarray, trajectory: Trajectory) -> Iterator[WeakStretch]:
-    """Yield a WeakStretch for each run of epochs with one reason, split at the trajectory's gaps.
+def weak_intervals(codes: np.ndarray, trajectory: Trajectory) -> Iterator[WeakInterval]:
+    """Yield a WeakInterval for each run of epochs with one reason, split at the trajectory's gaps.
 
     Parameters
     ----------
@@ -215,20 +215,20 @@ def weak_stretches(codes: np.ndarray, trajectory: Trajectory) -> Iterator[WeakSt
     time = trajectory.gps_time
     part = trajectory.segment(trajectory.gps_time)
     size = np.linalg.norm(trajectory.position_sigma, axis=1)
-    way = np.linalg.norm(np.diff(trajectory.position, axis=0), axis=1)
+    lengths = np.linalg.norm(np.diff(trajectory.position, axis=0), axis=1)
     is_empty = ~np.isin(np.arange(len(time)), trajectory.scanned_rows)
-    codes = np.where(is_empty, HELD, codes)  # no support is needed without points
+    codes = np.where(is_empty, CONSTRAINED, codes)  # no support is needed without points
     cuts = np.flatnonzero(np.diff(codes) | np.diff(part)) + 1
     for first, end in pairwise([0, *cuts.tolist(), len(time)]):
-        if codes[first] != HELD and end - first > 1:
+        if codes[first] != CONSTRAINED and end - first > 1:
             rows = slice(first, end)
-            yield WeakStretch(
+            yield WeakInterval(
                 float(time[first]),
                 float(time[end - 1]),
-                float(way[first : end - 1].sum()),
+                float(lengths[first : end - 1].sum()),
                 float(size[rows].max()),
                 REASONS[codes[first]],
-                float(way[:first].sum()),
+                float(lengths[:first].sum()),
             )
 
 

@@ -207,7 +207,7 @@ class Screening:
     warnings: tuple[Statement, ...]
 
     @classmethod
-    def believed(cls, adjustment: Adjustment) -> Screening:
+    def untested(cls, adjustment: Adjustment) -> Screening:
         """Return a Screening without any test, under the prior parameters."""
         objective = Objective.of(adjustment)
         mode = ((objective.parameters(INTEGRATED, objective.initial), 1.0),)
@@ -336,10 +336,10 @@ def _gains(solved, rows_of):
 
 def _rejected_groups(adjustment, rejected):
     """Statement on each two neighbors in time that were rejected and agree in direction."""
-    ways = {test.name: test.left_out.mean(axis=0) for test in rejected}
+    means = {test.name: test.left_out.mean(axis=0) for test in rejected}
     for first, other in _neighbours(adjustment):
-        if first in ways and other in ways and _agree(ways[first], ways[other]):
-            misclosures = ways[first].tolist(), ways[other].tolist()
+        if first in means and other in means and _agree(means[first], means[other]):
+            misclosures = means[first].tolist(), means[other].tolist()
             values = {"names": (first, other), "misclosures": misclosures}
             yield Statement("neighbours rejected", "warning", values)
 
@@ -354,7 +354,7 @@ def _doubtful_pairs(adjustment, posterior):
     modes = [chosen for chosen, _ in posterior.modes]
     none = -np.inf
     pairs = {}
-    ways = {}
+    by_pair = {}
     for block in Objective.of(adjustment).blocks:
         objective = Objective.of(block)
         rows = block.target_rows
@@ -370,15 +370,15 @@ def _doubtful_pairs(adjustment, posterior):
             for pair, gain in _gains(solved, both).items():
                 if score + gain > pairs.get(pair, -np.inf):
                     pairs[pair] = score + gain
-                    ways[pair] = solved.leave_out(both[pair])[0].reshape(-1, 3)
+                    by_pair[pair] = solved.leave_out(both[pair])[0].reshape(-1, 3)
     pair = max(pairs, key=pairs.get, default=None)
     if (
         pair is None
         or pairs[pair] < none - np.log(SETTINGS.strong_evidence)
-        or not _agree(*ways[pair][[0, -1]])
+        or not _agree(*by_pair[pair][[0, -1]])
     ):
         return
-    misclosures = ways[pair][0].tolist(), ways[pair][-1].tolist()
+    misclosures = by_pair[pair][0].tolist(), by_pair[pair][-1].tolist()
     yield Statement("neighbours kept", "warning", {"names": pair, "misclosures": misclosures})
 
 

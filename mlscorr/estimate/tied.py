@@ -281,17 +281,17 @@ def robust_ties(tied: Adjustment, parameters: SignalParameters) -> WeighedTies:
         Parameters chosen by the control points.
     """
     weighed = graduated(tied, parameters)
-    held = _held(weighed)
-    if held == len(weighed.ties):
+    accepted = _accepted_ties(weighed)
+    if accepted == len(weighed.ties):
         return weighed
     prior = Objective((), tied.prior(tied))
     other = graduated(tied, prior.parameters(INTEGRATED, prior.initial))
-    if _held(other) > held:
+    if _accepted_ties(other) > accepted:
         return other
     return weighed
 
 
-def _held(weighed):
+def _accepted_ties(weighed):
     """Number of accepted ties."""
     least = _geman_mcclure(SETTINGS.tie_cut)(SETTINGS.tie_cut)
     return np.count_nonzero(weighed.weight > least)

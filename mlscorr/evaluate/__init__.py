@@ -13,7 +13,13 @@
 from mlscorr.evaluate.beams import BeamCheck, outside_warnings
 from mlscorr.evaluate.check_sigmas import CheckSigmas
 from mlscorr.evaluate.datum import DatumDifference, datum_differences
-from mlscorr.evaluate.model import largest_sigma, misfit, misfit_section, model_section, tie_section
+from mlscorr.evaluate.model import (
+    largest_sigma,
+    misclosure_statistics,
+    model_section,
+    tie_residual_section,
+    tie_section,
+)
 from mlscorr.evaluate.quality import Gate, failures, read_gate
 from mlscorr.evaluate.rows import SEEN_BY_OTHERS, PointCounts, Score, Statistics, TargetRow
 from mlscorr.evaluate.scores import (

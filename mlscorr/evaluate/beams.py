@@ -117,10 +117,10 @@ class BeamCheck:
         trajectory = self.survey.trajectory
         lag = utc_lag(trajectory.gps_time, times - file.time_constant)
         for later in (-lag, lag):
-            way = _place(trajectory, times + later) - _place(trajectory, times)
-            driven = np.linalg.norm(way, axis=1)
+            motion = _place(trajectory, times + later) - _place(trajectory, times)
+            driven = np.linalg.norm(motion, axis=1)
             rows = (trajectory.segment(times + later) >= 0) & (driven > IO.moving * lag)
-            length, shifted = (np.linalg.norm(x[rows], axis=1) for x in (beam, beam - way))
+            length, shifted = (np.linalg.norm(x[rows], axis=1) for x in (beam, beam - motion))
             if len(length) < 10 or np.quantile(shifted / driven[rows], 0.75) > 0.5:
                 continue
             values = {

@@ -240,8 +240,8 @@ class _Evidence:
             plain, _ = objective.maximum(family, objective.initial)
             # From the same start: from the mode of a POS that explains everything, the search would
             # not move
-            beside, _ = complete.maximum(family, complete.initial)
-            for logarithms in (plain, beside):
+            refitted, _ = complete.maximum(family, complete.initial)
+            for logarithms in (plain, refitted):
                 value = objective(family, logarithms)
                 parameters = objective.parameters(family, logarithms)
                 self.modes.append((family, value, *_normal(adjustment, parameters, matrix)))
@@ -292,9 +292,9 @@ def _normal(adjustment: Adjustment, parameters: SignalParameters, matrix: np.nda
     solved = adjustment.solve(parameters)
     white = solved.solver.whiten(np.column_stack([solved.design, matrix, solved.misclosure]))
     known = solved.design.shape[1]
-    believed = np.zeros((len(solved.believed), white.shape[1]))
-    believed[:, :known] = solved.believed[:, :known]
-    white = np.vstack([white, believed])
+    prior_rows = np.zeros((len(solved.prior_rows), white.shape[1]))
+    prior_rows[:, :known] = solved.prior_rows[:, :known]
+    white = np.vstack([white, prior_rows])
     trend, rest = np.split(white, [solved.design.shape[1]], axis=1)
     basis = np.linalg.qr(trend)[0]
     rest = rest - basis @ (basis.T @ rest)

@@ -142,13 +142,13 @@ def tie_section(estimate: Estimate) -> dict[str, object] | None:
         return None
     value = tie_value(estimate)
     return {
-        **misfit_section(residuals),
+        **tie_residual_section(residuals),
         "share": value.share,
         "sufficient_control": value.sufficient,
     }
 
 
-def misfit_section(residuals: TieResiduals | None) -> dict[str, object] | None:
+def tie_residual_section(residuals: TieResiduals | None) -> dict[str, object] | None:
     """Numbers and misclosures of ties before and after; None without ties.
 
     Parameters
@@ -163,8 +163,8 @@ def misfit_section(residuals: TieResiduals | None) -> dict[str, object] | None:
         "n": len(ties),
         "used": int(used.sum()),
         "kinds": {kind: int((ties.kind == kind).sum()) for kind in TIE_KINDS},
-        "before": misfit(ties.misclosure[used]),
-        "after": misfit(residuals.after[used]),
+        "before": misclosure_statistics(ties.misclosure[used]),
+        "after": misclosure_statistics(residuals.after[used]),
         "pairs": pair_rows(residuals),
     }
 
@@ -189,14 +189,14 @@ def pair_rows(residuals: TieResiduals) -> list[dict[str, object]]:
             "scanners": (ties.scanner[inside][0] + 1).tolist(),
             "n": int(inside.sum()),
             "used": int(both.sum()),
-            "before": misfit(ties.misclosure[both]),
-            "after": misfit(residuals.after[both]),
+            "before": misclosure_statistics(ties.misclosure[both]),
+            "after": misclosure_statistics(residuals.after[both]),
         }
         rows.append(row)
     return rows
 
 
-def misfit(misclosure: np.ndarray) -> dict[str, float | None]:
+def misclosure_statistics(misclosure: np.ndarray) -> dict[str, float | None]:
     """Median size and root mean square of misclosures. Units: m.
 
     Parameters

@@ -91,13 +91,13 @@ def _turn(size, sigma, ground, **net):
     words = (
         f"rotated counter-clockwise relative to the cloud by {turn:+.4f} +/- {uncertainty:.4f} deg"
     )
-    beside = ""
+    convergence = ""
     if ground is not None:
         angle = -np.degrees(ground.convergence)
-        beside = f" (true north would give {angle:+.4f} deg)"
+        convergence = f" (true north would give {angle:+.4f} deg)"
     return (
         f"{_net(words, **net)} Likely cause: another projection or zone, or a local network with "
-        f"another orientation{beside}. Export the control in the CRS of the cloud. {FOLLOWS}"
+        f"another orientation{convergence}. Export the control in the CRS of the cloud. {FOLLOWS}"
     )
 
 

@@ -144,7 +144,7 @@ def advice_of(
         unjudged = sum(why.key == "no mounting" for why in left_out.values())
         if unjudged:
             advice.append(Statement("unstated mounting", values={"effects": unjudged}))
-        advice.append(Statement("unknown error", values={"lead": verdict.lead}))
+        advice.append(Statement("unknown error", values={"lead": verdict.hint}))
         if closure.effect != "none":  # it mimics the cause
             share = None if closure.is_within_noise else max(0.0, closure.shrink)
             values = {"effect": closure.effect, "share": share}

@@ -75,13 +75,13 @@ def gap_document(
             "set": list(verdict.set),
             "p_value": float(verdict.p_value),
             "same": [name for name in inference.same if name != verdict.label],
-            "lead": verdict.lead,
+            "lead": verdict.hint,
             "hidden": verdict.is_hidden,
             "excess": excess,
             "sentence": with_articles(sentence_of(inference, excess)),
         },
         "gap": vars(closure.gap) | {"unit": closure.unit, "kind": closure.kind},
-        "headline": headline(where, verdict.label, verdict.lead, rows.reference.start),
+        "headline": headline(where, verdict.label, verdict.hint, rows.reference.start),
         "agreement": [vars(part) for part in agreement],
         "advice": advice_sentences(advice),
         "where": [_split(split) for split in where.splits],
@@ -230,8 +230,8 @@ def windows_document(cause: Cause, survey: Survey) -> list[dict]:
     cause : Cause
     survey : Survey
     """
-    stretches = cause.stretches(survey.trajectory)
-    return [{"effect": name, "start": start, "end": end} for name, start, end in stretches]
+    intervals = cause.intervals(survey.trajectory)
+    return [{"effect": name, "start": start, "end": end} for name, start, end in intervals]
 
 
 def map_document(survey: Survey) -> dict:
@@ -241,8 +241,8 @@ def map_document(survey: Survey) -> dict:
     ----------
     survey : Survey
     """
-    way = survey.trajectory.position
-    thin = way[:: max(1, len(way) // MAP_POINTS), :2]
+    position = survey.trajectory.position
+    thin = position[:: max(1, len(position) // MAP_POINTS), :2]
     targets = [
         {"name": name, "role": role, "position": place[:2].tolist()}
         for role, points in (("control", survey.control), ("check", survey.check))

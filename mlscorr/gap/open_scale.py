@@ -74,8 +74,8 @@ def likely_scale(
     others = {sign.name for sign in signatures if sign.kind.stage != "pos"}
 
     def evidence(scale):
-        believed = replace(survey, pos=with_scale(survey.pos, scale, names))
-        given = rows, background(rows, believed), believed, signatures
+        rescaled = replace(survey, pos=with_scale(survey.pos, scale, names))
+        given = rows, background(rows, rescaled), rescaled, signatures
         labels = weigh_labels(*given, rng, replicas=0)
         scores = [score[0] for name, score in labels.score.items() if name in others | {"none"}]
         return labels.blocks.total[0] + np.logaddexp.reduce(scores)

@@ -102,11 +102,11 @@ def sentence_of(inference: Inference, excess: str) -> str:
         return f"{no_cause(verdict.set, excess)} ({chance} of no error)."
     if verdict.is_hidden:
         return (
-            f"The comparison shows no error, but an error is possible: there is a {verdict.lead} "
+            f"The comparison shows no error, but an error is possible: there is a {verdict.hint} "
             f"(probability of an unknown error {verdict.probability:.2f})."
         )
     if verdict.label == "unknown":
-        return f"No tested effect explains the differences ({chance}). Hint: {verdict.lead}."
+        return f"No tested effect explains the differences ({chance}). Hint: {verdict.hint}."
     parameters = distinct_parameters(cause)
     sizes = [f"{p.name} {size(p.estimate, p.sigma, p.unit)}" for p in parameters]
     do = "explain" if "+" in verdict.label else "explains"
@@ -185,7 +185,7 @@ class _GapPlace(NamedTuple):
     words: str
 
 
-def headline(where: Where, label: str, lead: str, start: float) -> str:
+def headline(where: Where, label: str, hint: str, start: float) -> str:
     """Return the sentence on the size of the gap and on its largest part.
 
     Parameters
@@ -193,7 +193,7 @@ def headline(where: Where, label: str, lead: str, start: float) -> str:
     where : Where
     label : str
         Of the verdict.
-    lead : str
+    hint : str
         Hint of an unknown error; otherwise empty.
     start : float
         The gps_time at which the covariate time is zero. Units: s.
@@ -208,7 +208,7 @@ def headline(where: Where, label: str, lead: str, start: float) -> str:
     if not is_measurable and not is_moved:
         return f"There is no significant difference. {size}."
     whole = "the effect of the cause" if is_moved else "the gap"
-    best = _largest(_places(where.splits, _acts_on(label, lead), start))
+    best = _largest(_places(where.splits, _acts_on(label, hint), start))
     if best is None:
         return f"No part of the survey is conspicuous. {size}."
     return (
@@ -217,10 +217,10 @@ def headline(where: Where, label: str, lead: str, start: float) -> str:
     )
 
 
-def _acts_on(label: str, lead: str) -> Callable[[str], bool] | None:
+def _acts_on(label: str, hint: str) -> Callable[[str], bool] | None:
     """Function that is True for covariates on which a cause acts; None if unknown."""
-    if label == "unknown" and lead:
-        return lambda by: NAMES.get(by, (by,))[0] in lead
+    if label == "unknown" and hint:
+        return lambda by: NAMES.get(by, (by,))[0] in hint
     effects = label.split("+")
     if not set(effects) <= set(ACTS_ON):
         return None

@@ -62,8 +62,8 @@ def apply(
     ... )
     >>> simulate(short, np.random.default_rng(1)).write(folder)
     >>> applied = mlscorr.apply(mlscorr.read_survey(folder), [make_effect(**late)])
-    >>> way = applied.correction.corrected.position - applied.correction.recorded.position
-    >>> round(float(np.median(np.linalg.norm(way, axis=1))), 2)  # m, at 4 m/s
+    >>> shift = applied.correction.corrected.position - applied.correction.recorded.position
+    >>> round(float(np.median(np.linalg.norm(shift, axis=1))), 2)  # m, at 4 m/s
     0.08
     """
     check_survey(survey)
@@ -240,9 +240,11 @@ class AppliedSurvey(Summary):
                 stacklevel=3,
             )
         if survey.reference is not None and correction.datum.any():
-            way = ", ".join(f"{a} {v:+.3f}" for a, v in zip("ENH", correction.datum, strict=True))
+            components = ", ".join(
+                f"{a} {v:+.3f}" for a, v in zip("ENH", correction.datum, strict=True)
+            )
             warnings.warn(
-                f"The reference surface {survey.reference} was not moved. Move it by {way} m as "
-                "well, or remove scene.reference from the new survey.toml.",
+                f"The reference surface {survey.reference} was not moved. Move it by {components} "
+                "m as well, or remove scene.reference from the new survey.toml.",
                 stacklevel=3,
             )

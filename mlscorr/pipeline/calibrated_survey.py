@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mlscorr.estimate import MOUNTING_COMPONENTS, SCANNER_COMPONENTS, Calibration
-from mlscorr.evaluate import TargetRow, misfit_section, score, surveyed_rows
+from mlscorr.evaluate import TargetRow, score, surveyed_rows, tie_residual_section
 from mlscorr.io.clouds import written_name
 from mlscorr.io.surveys import FILE_NAME, mounting_values, write_survey_copy
 from mlscorr.io.trajectories import write_trajectory_csv
@@ -205,7 +205,7 @@ class CalibratedSurvey(CalibrationResult):
             "parameters": _parameters(calibration.parameters),
             "outliers": [outlier.document() for outlier in calibration.outliers],
             "targets": [row.document() for row in rows],
-            "ties": misfit_section(calibration.ties),
+            "ties": tie_residual_section(calibration.ties),
             "warnings": list(self.warnings),
             "notes": list(self.survey.notes),
         }
@@ -215,7 +215,7 @@ class CalibratedSurvey(CalibrationResult):
             content["with_drift"] = {
                 "control": self._statistics("control", drift),
                 "check": self._statistics("check", drift),
-                "ties": misfit_section(calibration.ties_with_drift),
+                "ties": tie_residual_section(calibration.ties_with_drift),
                 "position_rms": np.sqrt(np.mean(change**2, axis=0)).tolist(),
                 "position_largest": np.abs(change).max(axis=0).tolist(),
             }

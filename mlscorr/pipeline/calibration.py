@@ -12,12 +12,12 @@ import numpy as np
 
 from mlscorr.estimate import (
     Calibration,
-    believed_mounting,
     control_fault,
     estimate_mounting,
+    prior_mounting,
     with_scanner_errors,
 )
-from mlscorr.evaluate import SEEN_BY_OTHERS, misfit_section, unseen_rows
+from mlscorr.evaluate import SEEN_BY_OTHERS, tie_residual_section, unseen_rows
 from mlscorr.io.clouds import sample_gps_times
 from mlscorr.matching import Refusal
 from mlscorr.pipeline.calibrated_survey import CalibratedSurvey, CalibrationResult, estimate_section
@@ -180,7 +180,7 @@ def calibrate_together(
     """
     faults = [control_fault(control, number) for number in range(len(survey.mountings))]
     if all(faults):
-        estimate = believed_mounting
+        estimate = prior_mounting
     else:
         estimate = estimate_mounting
     calibration = estimate(survey.trajectory, survey.mountings, control, survey.pos)
@@ -265,12 +265,12 @@ class CalibratedScanners(CalibrationResult):
             "relative": {
                 name: {
                     "beside": first,
-                    **estimate_section(*self.calibration.lsc.beside_first(number)),
+                    **estimate_section(*self.calibration.lsc.relative_to_first(number)),
                     "fit_sigma": self.calibration.fit_sigma(number),
                 }
                 for number, name in enumerate(others, start=1)
             },
-            "ties": misfit_section(self.calibration.ties),
+            "ties": tie_residual_section(self.calibration.ties),
             "warnings": list(self.calibration.shared_warnings),
         }
         return scanners_screen(content) | content

@@ -26,7 +26,7 @@ from mlscorr.pipeline import needs
 from mlscorr.pipeline.control_checks import check_control, reuse_warnings
 from mlscorr.pipeline.faults import Fault, Faults, find_faults
 from mlscorr.pipeline.finding import find_control
-from mlscorr.pipeline.quick_look import QuickLook, look_near_control
+from mlscorr.pipeline.quick_look import QuickLook, check_near_control
 from mlscorr.survey import ControlPoints, Matched, Survey
 
 
@@ -123,7 +123,7 @@ def checked_survey(survey: Survey, faults: Faults, needs_control: bool = True) -
     passes, outside = _placed_times(survey)
     if not passes:
         faults.add("data", "No point of any cloud was measured during the trajectory.")
-    uncovered, is_beside = _uncovered(survey, layouts)
+    uncovered, is_uncovered = _uncovered(survey, layouts)
     faults.warn(*outside, *_crs_hints(survey, layouts), *uncovered)
     for layout in layouts:
         sentence, is_explained = far_cloud(
@@ -137,7 +137,7 @@ def checked_survey(survey: Survey, faults: Faults, needs_control: bool = True) -
         sample = faults.of("data", needs.sample_clouds, survey)
         faults.warn(*(sample.warnings if sample else ()))
         probe, matched, is_searched, notes, unchecked = _looked(
-            survey, faults, needs_control, is_beside
+            survey, faults, needs_control, is_uncovered
         )
     notes += filter(None, [noise.sentence])
     datum: tuple[DatumDifference, ...] = ()
@@ -208,7 +208,7 @@ def _uncovered(survey, layouts) -> tuple[list[str], bool]:
 
 
 def _looked(
-    survey: Survey, faults: Faults, needs_control: bool, is_beside: bool
+    survey: Survey, faults: Faults, needs_control: bool, is_uncovered: bool
 ) -> tuple[QuickLook | None, Matched | None, bool, list[str], tuple[str, ...]]:
     """Search for some targets.
 
@@ -225,7 +225,7 @@ def _looked(
         reason = f"Targets in the cloud: only the first points of {', '.join(parts)} were read."
         return None, None, False, [], (reason,)
     problems = Faults()
-    probe = problems.of("data", look_near_control, survey)
+    probe = problems.of("data", check_near_control, survey)
     if probe is None:
         reasons = tuple(f"Targets in the cloud: {fault.sentence}" for fault in problems.faults)
         return None, None, False, [], reasons
@@ -235,7 +235,7 @@ def _looked(
     if probe.fault:
         faults.add("data", probe.fault)
     elif needs_control and len(survey.control) and probe.refusal:
-        if is_beside:
+        if is_uncovered:
             faults.add("data", probe.refusal)
         else:
             finding = faults.of("data", find_control, survey)

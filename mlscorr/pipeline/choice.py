@@ -41,7 +41,7 @@ def choose_control(
     """
     points = {}
     problems = {}
-    apart = {}
+    refusals = {}
     for path in [role.path for role in roles if role.role == "control" and holds_points(role.path)]:
         section = ControlSection.model_validate({**given, "file": path.name})
         try:
@@ -55,7 +55,7 @@ def choose_control(
                 check_together(path, read.control + read.check, trajectory)
             points[path] = read
         except ValueError as error:
-            apart[path] = str(error)
+            refusals[path] = str(error)
     if len(points) + len(problems) > 1:
         states = {path: str(error) for path, error in problems.items()}
         question = ambiguous("control", dict.fromkeys(points, "usable") | states)
@@ -63,11 +63,11 @@ def choose_control(
         raise OpenQuestion(sentence, question.places)
     if points:
         path, read = next(iter(points.items()))
-        return path, read, apart
-    if problems and not apart:
+        return path, read, refusals
+    if problems and not refusals:
         raise next(iter(problems.values()))
-    if problems or apart:
-        raise ValueError(" ".join((*map(str, problems.values()), *apart.values())))
+    if problems or refusals:
+        raise ValueError(" ".join((*map(str, problems.values()), *refusals.values())))
     tables = [role for role in roles if role.role == "table"]
     if tables:
         raise ValueError(

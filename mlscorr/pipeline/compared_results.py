@@ -450,7 +450,7 @@ def _pairs(
         others[row["name"]].append(row)
     singles = []
     for row in first:
-        times = [_apart(row, other) for other in others[row["name"]]]
+        times = [_lag(row, other) for other in others[row["name"]]]
         if times and min(times) <= SAME_EPOCH:
             yield row, others[row["name"]].pop(int(np.argmin(times)))
         else:
@@ -463,7 +463,7 @@ def _pairs(
         yield from ((None, row) for row in rest)
 
 
-def _apart(row, other):
+def _lag(row, other):
     """Time between two rows of a target; zero if both were not observed. Units: s."""
     times = row["gps_time"], other["gps_time"]
     if times == (None, None):

@@ -58,7 +58,7 @@ class ComparedRows:
 
 def compare_with_belief(
     survey: Survey,
-    believed: Survey,
+    assumed: Survey,
     effects: tuple[Effect, ...],
     library: Iterable[type[Effect]],
     rng: np.random.Generator,
@@ -69,7 +69,7 @@ def compare_with_belief(
     Parameters
     ----------
     survey : Survey
-    believed : Survey
+    assumed : Survey
         With the simulator's assumptions.
     effects : tuple of Effect
         Effects of the simulator.
@@ -84,14 +84,14 @@ def compare_with_belief(
     ValueError
         If there are too few data.
     """
-    pairing, rows, beams, absence, patches = _observed(survey, believed, library, progress)
+    pairing, rows, beams, absence, patches = _observed(survey, assumed, library, progress)
     progress("Simulating the survey's own pulses")
-    rows, noisy = residuals.beside_seen_noise(rows)
-    simulator = BeamSimulator(rows, believed, beams, effects, int(rng.integers(2**63)))
+    rows, noisy = residuals.limited_noise(rows)
+    simulator = BeamSimulator(rows, assumed, beams, effects, int(rng.integers(2**63)))
     used = np.arange(len(rows)) < len(pairing.rows)
-    observed = without_effects(rows, believed, effects)
+    observed = without_effects(rows, assumed, effects)
     # so that contrasts do not change the random draws of the verdict
-    contrasts = contrast.contrast_returns(believed, patches, _loss(effects), rng.spawn(1)[0])
+    contrasts = contrast.contrast_returns(assumed, patches, _loss(effects), rng.spawn(1)[0])
     notes = (*pairing.notes, *noisy)
     return ComparedRows(observed, used, simulator.added, absence, notes, contrasts, (), NEXT_RUN)
 
@@ -106,7 +106,7 @@ def _loss(effects):
 
 def compare_with_clouds(
     survey: Survey,
-    believed: Survey,
+    assumed: Survey,
     folders: Sequence[Path],
     library: Iterable[type[Effect]],
     rng: np.random.Generator,
@@ -128,13 +128,13 @@ def compare_with_clouds(
     ValueError
         If clouds cannot be read or paired, or there are too few data.
     """
-    opened = [simulated_survey(folder, believed) for folder in folders]
-    sampler = contrast.SampleCollector(believed)
-    finding, patches, _, notes = _read(believed, progress, sampler)
+    opened = [simulated_survey(folder, assumed) for folder in folders]
+    sampler = contrast.SampleCollector(assumed)
+    finding, patches, _, notes = _read(assumed, progress, sampler)
     samples = [sampler.sample(patches)]
-    absence = residuals.find_absence(believed, finding.matches)
-    correction = _by_control(believed, finding.matches.matched)
-    matched = _with_moved(finding, believed).matches.matched
+    absence = residuals.find_absence(assumed, finding.matches)
+    correction = _by_control(assumed, finding.matches.matched)
+    matched = _with_moved(finding, assumed).matches.matched
     if patches is None:
         patches = None
     else:
@@ -144,7 +144,7 @@ def compare_with_clouds(
         clouds, sample = _simulated_clouds(simulated, patches, correction, progress)
         samples.append(sample)
         observed = matched, finding.candidates, patches
-        rows, sentence = residuals.rows_against(believed, *observed, clouds, correction)
+        rows, sentence = residuals.rows_against(assumed, *observed, clouds, correction)
         _check_simulated(rows, folder)
         compared.append(rows)
         notes = (*notes, sentence)
@@ -153,19 +153,21 @@ def compare_with_clouds(
     is_check = np.isin(first.targets.name, survey.check.name)
     used = (first.survey_item < 0) | ~is_check[first.survey_item]
     real, simulated_first = samples[:2]
-    apart = rng.spawn(1)[0]
+    child_rng = rng.spawn(1)[0]
     channels = (
-        contrast.contrast_clouds(believed, real, simulated_first, apart),
-        contrast.cloud_distances(real, simulated_first, samples[2] if following else None, apart),
+        contrast.contrast_clouds(assumed, real, simulated_first, child_rng),
+        contrast.cloud_distances(
+            real, simulated_first, samples[2] if following else None, child_rng
+        ),
     )
-    quiet, noisy = residuals.beside_seen_noise(first)
+    quiet, noisy = residuals.limited_noise(first)
     notes = (*notes, *noisy)
     if following:
         change = first.residual - following[0].residual
         return ComparedRows(quiet, used, change, absence, notes, *channels, SECOND_CLOUDS)
 
     def to_first_order(effects):
-        return expected(first, believed, effects).shift
+        return expected(first, assumed, effects).shift
 
     return ComparedRows(quiet, used, to_first_order, absence, (*notes, LINEAR), *channels)
 
@@ -220,39 +222,39 @@ def _with_moved(finding: MatchedTargets, survey: Survey) -> MatchedTargets:
 
 
 def _read(
-    believed, progress, sampler=None
+    assumed, progress, sampler=None
 ) -> tuple[MatchedTargets, residuals.Patches | None, Surroundings, tuple[str, ...]]:
     """Read MatchedTargets, Patches, Surroundings and notes.
 
     The clouds are read once: targets, patches, surroundings of targets and, with a SampleCollector,
     its sample are collected from each chunk.
     """
-    collector = residuals.PatchCollector(believed)
-    surroundings = Surroundings(believed)
+    collector = residuals.PatchCollector(assumed)
+    surroundings = Surroundings(assumed)
     if sampler is None:
         others = [surroundings]
     else:
         others = [surroundings, sampler]
     read = read_into(collector.add, *map(_chunks_alone, others))
-    finding, notes = find_or_compare_surfaces(believed, read, surroundings.settle, progress)
+    finding, notes = find_or_compare_surfaces(assumed, read, surroundings.settle, progress)
     return finding, collector.patches(), surroundings, notes
 
 
 def _observed(
-    survey, believed, library, progress
+    survey, assumed, library, progress
 ) -> tuple[residuals.Pairing, residuals.Rows, Beams, residuals.Absence, residuals.Patches | None]:
     """Pairing, all its rows with check points last, their Beams, the Absence, and the Patches."""
-    finding, patches, surroundings, notes = _read(believed, progress)
+    finding, patches, surroundings, notes = _read(assumed, progress)
     progress("Pairing targets and surfaces")
-    absence = residuals.find_absence(believed, finding.matches)
-    correction = _by_control(believed, finding.matches.matched)
-    finding = _with_moved(finding, believed)
+    absence = residuals.find_absence(assumed, finding.matches)
+    correction = _by_control(assumed, finding.matches.matched)
+    finding = _with_moved(finding, assumed)
     observed = finding.matches.matched, finding.candidates, patches
-    pairing = residuals.build_rows(believed, *observed, correction=correction)
+    pairing = residuals.build_rows(assumed, *observed, correction=correction)
     check_enough(survey, pairing.rows, library, notes)
     pairing = replace(pairing, notes=(*notes, *pairing.notes))
     rows = residuals.Rows.concatenate([pairing.rows, pairing.check])
-    beams = collect_beams(believed, rows, finding, patches, surroundings)
+    beams = collect_beams(assumed, rows, finding, patches, surroundings)
     return pairing, rows, beams, absence, patches
 
 

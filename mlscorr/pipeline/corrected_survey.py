@@ -332,7 +332,7 @@ class CorrectedSurvey(Summary):
 
         survey = self.survey
         rows = [row.document() for row in self.targets]
-        weak = [stretch.document() for stretch in self.estimate.support.weak]
+        weak = [interval.document() for interval in self.estimate.support.weak]
         exports = {
             name: lambda path: export_trajectory(
                 path, self.trajectory, survey.crs, self.estimate.correction.recorded

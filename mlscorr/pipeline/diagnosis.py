@@ -36,7 +36,7 @@ from mlscorr.gap.closure import (
 from mlscorr.gap.evidence import Costs, Inference, infer_causes
 from mlscorr.gap.plan import NextData, next_data
 from mlscorr.gap.residuals import Absence, Rows, background
-from mlscorr.gap.signatures import Signature, as_believed, curvature, select, signatures, with_cause
+from mlscorr.gap.signatures import Signature, as_assumed, curvature, select, signatures, with_cause
 from mlscorr.pipeline._result import KnownResult, ResultFiles
 from mlscorr.pipeline.compared_rows import compare_with_belief, compare_with_clouds
 from mlscorr.pipeline.finding import silent
@@ -117,39 +117,39 @@ def diagnose(
         simulator = beliefs_of(survey)
     if simulated:  # the clouds show the noise of the simulator's scanner
         simulator = replace(simulator, scanner=replace(simulator.scanner, assumed=()))
-    believed, effects = as_believed(survey, simulator)
+    assumed, effects = as_assumed(survey, simulator)
     if simulated:
         if isinstance(simulated, str | Path):
             simulated = [simulated]
-        compared = compare_with_clouds(survey, believed, simulated, library, rng, progress)
+        compared = compare_with_clouds(survey, assumed, simulated, library, rng, progress)
     else:
-        compared = compare_with_belief(survey, believed, effects, library, rng, progress)
+        compared = compare_with_belief(survey, assumed, effects, library, rng, progress)
     observed = compared.rows
     used = compared.used
     absence = compared.absence
     step = progress("Comparing the hypotheses", STEPS)
-    signs, left_out = signatures(observed, believed, library, rng)
+    signs, left_out = signatures(observed, assumed, library, rng)
     part = observed.select(used)
     signs_of_part = select(signs, observed, used)
     # so that the search for the scale does not change the random draws of the verdict
-    scale = likely_scale(part, believed, signs_of_part, rng.spawn(1)[0])
-    believed = replace(believed, pos=with_scale(believed.pos, scale, open_sigmas(believed)))
+    scale = likely_scale(part, assumed, signs_of_part, rng.spawn(1)[0])
+    assumed = replace(assumed, pos=with_scale(assumed.pos, scale, open_sigmas(assumed)))
     step(1)
-    errors = background(part, believed)
-    infer = partial(infer_causes, survey=believed, signatures=signs_of_part, absence=absence)
+    errors = background(part, assumed)
+    infer = partial(infer_causes, survey=assumed, signatures=signs_of_part, absence=absence)
     inference = infer(part, errors, rng=rng, costs=costs)
-    curved = curvature(part, believed, inference.cause.parts)
+    curved = curvature(part, assumed, inference.cause.parts)
     if np.sum(curved**2 / part.noise) > 1:  # less is not a sigma, for all rows together
         part = replace(part, residual=part.residual - curved)
         inference = infer(part, errors, rng=rng, costs=costs)
     step(2)
     cause = cause_for_simulator(part, signs_of_part, inference)
     change = compared.simulated
-    case = FoundCause(observed, used, believed, signs, inference.evidence, cause)
+    case = FoundCause(observed, used, assumed, signs, inference.evidence, cause)
     closure = close_gap(case, change, rng, step)
     labels = [n for n in (*inference.verdict.set, *inference.same) if n != "unknown"]
-    plan = next_data(part, believed, library, tuple(dict.fromkeys(labels)), inference.separability)
-    plan = (*_looks_again(absence), *plan)
+    plan = next_data(part, assumed, library, tuple(dict.fromkeys(labels)), inference.separability)
+    plan = (*_repeat_advice(absence), *plan)
     step(2)
     return DiagnosedSurvey(
         survey,
@@ -178,7 +178,7 @@ def _of_innovations(rows, errors, inference, rng):
     return contrast.innovation_distances(rows.channel[where.row], where.innovation, replicas, rng)
 
 
-def _looks_again(absence):
+def _repeat_advice(absence):
     """Advice on surveyed targets without a residual."""
     return [
         NextData(
@@ -217,18 +217,18 @@ class DiagnosedSurvey(KnownResult):
     scale: float = 1.0
 
     @property
-    def _believed(self):
+    def _assumed(self):
         """Survey as diagnosed."""
-        believed, _ = as_believed(self.survey, self.simulator)
-        pos = with_scale(believed.pos, self.scale, open_sigmas(believed))
-        return replace(believed, pos=pos)
+        assumed, _ = as_assumed(self.survey, self.simulator)
+        pos = with_scale(assumed.pos, self.scale, open_sigmas(assumed))
+        return replace(assumed, pos=pos)
 
     def _content(self):
         from mlscorr.report.gap import gap_screen
 
-        believed = self._believed
+        assumed = self._assumed
         content = gap_document(
-            survey=believed,
+            survey=assumed,
             rows=self.rows,
             inference=self.inference,
             closure=self.closure,
@@ -239,7 +239,7 @@ class DiagnosedSurvey(KnownResult):
             absence=self.absence,
             further_advice=self._further_advice,
         )
-        content["assumed"] = assumed_document(believed, self.inference, self.scale)
+        content["assumed"] = assumed_document(assumed, self.inference, self.scale)
         content["costs"] = vars(self.costs)
         content["contrasts"] = [contrast.document() for contrast in self.contrasts]
         content["distances"] = [distance.document() for distance in self.distances]
@@ -274,11 +274,11 @@ class DiagnosedSurvey(KnownResult):
         """Simulator with the cause, or unchanged with the reason."""
         if not self._has_named_cause:
             return self.simulator, ""
-        believed = self._believed
-        names = open_sigmas(believed)
+        assumed = self._assumed
+        names = open_sigmas(assumed)
         try:
             improved = with_cause(
-                replace(self.simulator, pos=believed.pos), self.survey, self.inference.cause
+                replace(self.simulator, pos=assumed.pos), self.survey, self.inference.cause
             )
             if set(names) <= set(improved.pos.assumed):  # the next run estimates their scale again
                 pos = with_scale(improved.pos, 1.0 / self.scale, names)

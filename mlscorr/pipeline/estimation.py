@@ -13,11 +13,11 @@ from threadpoolctl import threadpool_limits
 from mlscorr.estimate import (
     SETTINGS,
     Estimate,
-    believed_correction,
     check_order,
     estimate_correction,
     find_mounting_error,
     mounting_warnings,
+    prior_correction,
     scanner_warnings,
 )
 from mlscorr.evaluate import CheckSigmas, Score, misclosures
@@ -211,7 +211,7 @@ def estimate_together(
             survey.trajectory, control, survey.pos, order, survey.included
         )
     else:
-        estimate = believed_correction(survey.trajectory, survey.pos)
+        estimate = prior_correction(survey.trajectory, survey.pos)
     _log_estimate(estimate)
     if features is None:
         LOG.info("%s", LEFT_OUT)

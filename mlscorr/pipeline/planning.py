@@ -80,7 +80,7 @@ def plan(survey: Survey, library: Iterable[type[Effect]] | None = None) -> Plann
 
 def _accuracy(survey, rows):
     """PlannedAccuracy from the expected control; None without any."""
-    first = _looks_at_control(survey, rows)
+    first = _control_rows(survey, rows)
     if len(first) == 0:
         return None
     points = survey.surveyed[rows.survey_item[first]]
@@ -98,7 +98,7 @@ def _accuracy(survey, rows):
     return predict_accuracy(survey.trajectory, Matched(observed, points), survey.pos)
 
 
-def _looks_at_control(survey, rows):
+def _control_rows(survey, rows):
     """First row of each view of a control point."""
     first = np.unique(rows.item[rows.channel == "target"], return_index=True)[1]
     first = np.flatnonzero(rows.channel == "target")[first]
@@ -156,7 +156,7 @@ class PlannedSurvey(KnownResult):
         if self.accuracy is None:
             return None
         sigma = self.accuracy.sigma
-        rows = _looks_at_control(self.survey, self.rows)
+        rows = _control_rows(self.survey, self.rows)
         return {
             "gps_time": self.accuracy.gps_time.round(3).tolist(),
             "sigma": sigma.round(5).tolist(),

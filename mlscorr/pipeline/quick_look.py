@@ -6,7 +6,7 @@ from time import perf_counter, process_time
 
 import numpy as np
 
-from mlscorr.io.clouds import read_windows
+from mlscorr.io.clouds import read_intervals
 from mlscorr.io.tables import nearest_epochs
 from mlscorr.pipeline.finding import (
     FoundTargets,
@@ -49,7 +49,7 @@ class QuickLook:
     seconds: float
 
 
-def look_near_control(survey: Survey) -> QuickLook:
+def check_near_control(survey: Survey) -> QuickLook:
     """Search for some targets of a survey where the vehicle passed them.
 
     Targets found are matched with all surveyed points, as in a correction. Missing targets are
@@ -73,17 +73,17 @@ def look_near_control(survey: Survey) -> QuickLook:
         check=survey.surveyed[[]],
         excluded=survey.surveyed[[]],
     )
-    windows = {file: list(_near(survey, file)) for file in survey.clouds}
-    survey = replace(survey, control=_affordable(survey, windows))
+    chunks = {file: list(_near(survey, file)) for file in survey.clouds}
+    survey = replace(survey, control=_affordable(survey, chunks))
     start = perf_counter()
-    near_control = _fit(survey, windows)
+    near_control = _fit(survey, chunks)
     seconds = (perf_counter() - start) / len(survey.control)
     matched, refusal = _decided(whole, near_control)
     matched = matched[np.isin(matched.name, survey.control.name)]
     fault = doubt = ""
     if 2 * len(set(matched.name)) < len(survey.control):
-        fault = _with_sizes_doubled(survey, windows, matched) or _with_other_heights(
-            survey, windows, matched
+        fault = _with_sizes_doubled(survey, chunks, matched) or _with_other_heights(
+            survey, chunks, matched
         )
         doubt = "" if fault else _doubt(survey, matched, near_control)
     return QuickLook(survey.control, matched, fault, refusal, doubt, seconds)
@@ -114,7 +114,7 @@ def spread_points(survey: Survey) -> ControlPoints:
     return survey.surveyed[order[np.rint(some).astype(int)]]
 
 
-def _affordable(survey, windows):
+def _affordable(survey, chunks):
     """Select points, still spread, that can be fitted in the available time.
 
     Processor time is used, so that other load on the machine does not change the result.
@@ -124,7 +124,7 @@ def _affordable(survey, windows):
     single = replace(survey, control=points[len(points) // 2 :][:1])
     for _ in range(2):  # the first fit may include compilation
         start = process_time()
-        _fit(single, windows)
+        _fit(single, chunks)
         seconds = process_time() - start
         if seconds <= share:
             return points
@@ -136,7 +136,7 @@ def _near(survey, file) -> Iterator[PointCloud]:
     """Yield points of a file near surveyed points, at any height."""
     place = survey.control.position
     radius = search_radius(survey, survey.control)
-    for chunk in read_windows(file, _spans(survey)):
+    for chunk in read_intervals(file, _spans(survey)):
         is_near = np.zeros(len(chunk), bool)
         for centre, limit in zip(place, radius, strict=True):
             rows = np.flatnonzero(np.abs(chunk.xyz[:, 0] - centre[0]) <= limit)
@@ -151,8 +151,8 @@ def _spans(survey):
     trajectory = survey.trajectory
     inside = np.zeros(len(survey.trajectory), bool)
     for centre in survey.control.position[:, :2]:
-        apart = np.hypot(*(trajectory.position[:, :2] - centre).T)
-        inside |= apart <= np.hypot(apart.min(), SETTINGS.looked_length)
+        distance = np.hypot(*(trajectory.position[:, :2] - centre).T)
+        inside |= distance <= np.hypot(distance.min(), SETTINGS.looked_length)
     number = np.where(inside, trajectory.segment(trajectory.gps_time) + 1, 0)
     edge = np.diff(number, prepend=0, append=0) != 0
     starts = np.flatnonzero(edge[:-1] & inside)
@@ -160,22 +160,22 @@ def _spans(survey):
     return np.column_stack([trajectory.gps_time[starts], trajectory.gps_time[ends]])
 
 
-def _fit(survey, windows) -> FoundTargets:
+def _fit(survey, chunks) -> FoundTargets:
     """Targets near surveyed points, fitted in the points read."""
-    return fit_while_reading(survey, lambda file: iter(windows[file]))
+    return fit_while_reading(survey, lambda file: iter(chunks[file]))
 
 
-def _find(survey, windows) -> Matched:
+def _find(survey, chunks) -> Matched:
     """Surveyed targets found in the points read."""
-    near_control = _fit(survey, windows)
+    near_control = _fit(survey, chunks)
     return match_fitted(survey, near_control.targets, near_control.candidates).control
 
 
-def _with_sizes_doubled(survey, windows, matched):
+def _with_sizes_doubled(survey, chunks, matched):
     """Sentence if sizes are radii."""
     points = survey.control
     doubled = replace(points, size=2 * points.size)
-    refit = _find(replace(survey, control=doubled), windows)
+    refit = _find(replace(survey, control=doubled), chunks)
     if not _is_better(refit, matched, points):
         return ""
     return (
@@ -185,14 +185,14 @@ def _with_sizes_doubled(survey, windows, matched):
     )
 
 
-def _with_other_heights(survey, windows, matched):
+def _with_other_heights(survey, chunks, matched):
     """Sentence if heights belong to another system."""
     points = survey.control
-    above = _above_cloud(points, [chunk for chunks in windows.values() for chunk in chunks])
+    above = _above_cloud(points, [chunk for clouds in chunks.values() for chunk in clouds])
     if not np.isfinite(above) or abs(above) < survey.search_radius / 2:
         return ""
     lowered = replace(points, position=points.position - [0.0, 0.0, above])
-    refit = _find(replace(survey, control=lowered), windows)
+    refit = _find(replace(survey, control=lowered), chunks)
     if not _is_better(refit, matched, points):
         return ""
     shift = above + refit.misclosure[:, 2]

@@ -258,10 +258,10 @@ def _text(folder, path, answers, roles):
     else:
         accuracy = choose_accuracy([r for r in roles if r.role == "accuracy"], drive, crs)
         trajectory = near = drive.read(crs, accuracy)
-    control, points, apart = choose_control(
+    control, points, refused = choose_control(
         _roles(folder, given, "control", roles), near, given.get("control", {})
     )
-    refusals = late | apart
+    refusals = late | refused
     refusals |= {
         copy: f"a copy of {first.name}, which would count twice" for copy, first in copies.items()
     }

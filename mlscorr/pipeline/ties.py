@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mlscorr.evaluate import misfit
+from mlscorr.evaluate import misclosure_statistics
 from mlscorr.io.clouds import read_chunks
 from mlscorr.io.tables import write_ties_csv
 from mlscorr.pipeline._result import KnownResult, ResultFiles
@@ -23,8 +23,8 @@ from mlscorr.ties import (
     group_by_time,
     information,
     search_ties,
-    unheld_directions,
-    unheld_sentence,
+    unconstrained_directions,
+    unconstrained_sentence,
 )
 
 if TYPE_CHECKING:
@@ -117,7 +117,8 @@ class TiedSurvey(KnownResult):
         for passes in np.unique(ties.pass_number, axis=0):
             inside = (ties.pass_number == passes).all(axis=1)
             by_axis = {
-                name: _misfit(ties.misclosure[inside & (axis == i)]) for i, name in enumerate(AXES)
+                name: _misclosure_statistics(ties.misclosure[inside & (axis == i)])
+                for i, name in enumerate(AXES)
             }
             rows.append(
                 {
@@ -169,8 +170,8 @@ class TiedSurvey(KnownResult):
         kinds = ("planes", "poles", "lines", "dashes")
         rows = [("passes", *kinds, "misclosure across, along, up (m, RMS)")]
         for pair in self.pairs:
-            apart = (pair["misfit"][axis]["rms"] for axis in AXES)
-            numbers = ", ".join("-" if rms is None else f"{rms:.3f}" for rms in apart)
+            rms_values = (pair["misfit"][axis]["rms"] for axis in AXES)
+            numbers = ", ".join("-" if rms is None else f"{rms:.3f}" for rms in rms_values)
             rows.append((pair["passes"], *(pair[kind] for kind in kinds), numbers))
         return [(self.survey.name,), *rows, *((sentence,) for sentence in self.warnings)]
 
@@ -215,7 +216,7 @@ class TiedSurvey(KnownResult):
                 "in time, so most are not ties. The POS may be less accurate than it states, or "
                 "the mounting wrong by degrees: run mlscorr calibrate."
             )
-        sentences += [unheld_sentence(*unheld) for unheld in unheld_directions(ties)]
+        sentences += [unconstrained_sentence(*each) for each in unconstrained_directions(ties)]
         return tuple(sentences)
 
     def _content(self):
@@ -247,9 +248,9 @@ class TiedSurvey(KnownResult):
         )
 
 
-def _misfit(misclosure):
+def _misclosure_statistics(misclosure):
     """Number, median and root mean square of misclosures (n,). Units: m."""
-    return {"n": len(misclosure), **misfit(misclosure)}
+    return {"n": len(misclosure), **misclosure_statistics(misclosure)}
 
 
 def _weakest(ties):

@@ -1,4 +1,4 @@
-"""The sentences of a correction's stages: on control points that are excluded or included."""
+"""Sentences of a correction's stages, on excluded or included control points."""
 
 from mlscorr.survey import Wording
 from mlscorr.wording import length_in_words

@@ -40,10 +40,10 @@ class DriftHistory:
         (infinite) if it states no growth, else at once. Units: s.
     sigma : (n, 3) array
         Stated sigmas of E, N, H, synchronized with the path; zero if missing. Units: m.
-    held : (3,) array
+    fixed_sigma : (3,) array
         The sigma of E, N, H that remains with GNSS; zero if sigma(t) doesn't separate it from the
         growing part. Units: m.
-    level : (n, 3) array
+    solution_sigma : (n, 3) array
         The same at each epoch of the trajectory, larger after an abrupt increase of sigma(t), as by
         a solution that is not fixed: the smallest value since the increase, until the next one.
         Units: m.
@@ -56,13 +56,13 @@ class DriftHistory:
     smoothed: np.ndarray
     starts: np.ndarray
     sigma: np.ndarray
-    held: np.ndarray
-    level: np.ndarray
+    fixed_sigma: np.ndarray
+    solution_sigma: np.ndarray
 
     @property
     def is_stated(self) -> bool:
         """True if sigma(t) shows the growth of drift."""
-        return bool(self.held.any())
+        return bool(self.fixed_sigma.any())
 
     @cached_property
     def edges(self) -> np.ndarray:
@@ -98,7 +98,7 @@ class DriftHistory:
         """
         return np.searchsorted(self.edges[1:-1], gps_time, side="right")
 
-    def raised(self, gps_time: np.ndarray) -> np.ndarray:
+    def increase(self, gps_time: np.ndarray) -> np.ndarray:
         """Number of the interval of elevated sigma(t), from 0; -1 outside: (n,).
 
         Parameters
@@ -110,23 +110,25 @@ class DriftHistory:
             return np.full(len(gps_time), -1)
         epochs = self.trajectory.gps_time
         size = np.linalg.norm(self.sigma, axis=1)
-        is_raised = size > SETTINGS.steady_ratio * np.linalg.norm(self.held)
-        number = np.cumsum(np.diff(is_raised, prepend=False) & is_raised) - 1
-        number[~is_raised] = -1
+        is_increased = size > SETTINGS.steady_ratio * np.linalg.norm(self.fixed_sigma)
+        number = np.cumsum(np.diff(is_increased, prepend=False) & is_increased) - 1
+        number[~is_increased] = -1
         return number[np.clip(np.searchsorted(epochs, gps_time), 0, len(epochs) - 1)]
 
     @cached_property
     def turns(self) -> np.ndarray:
-        """Times (j,) of abrupt changes of the level: another solution, of other errors. s.
+        """Times (j,) of abrupt changes of solution_sigma: another solution, of other errors. s.
 
         At a step of the path, or if one of the two solutions is GNSS at its best.
         """
         time = self.trajectory.gps_time
-        size = np.linalg.norm(self.level, axis=1)
+        size = np.linalg.norm(self.solution_sigma, axis=1)
         # end of the change: values in between are no larger than the earlier one
         rows = quick_changes(time, size)[:, 1]
-        beside = np.linalg.norm([self.added[rows - 1], self.added[rows]], axis=2).min(axis=0)
-        is_turn = np.isin(rows, self.steps.rows(time)) | (beside < np.linalg.norm(self.held))
+        smaller = np.linalg.norm([self.added[rows - 1], self.added[rows]], axis=2).min(axis=0)
+        is_turn = np.isin(rows, self.steps.rows(time)) | (
+            smaller < np.linalg.norm(self.fixed_sigma)
+        )
         return ((time[rows - 1] + time[rows]) / 2)[is_turn]
 
     @cached_property
@@ -136,21 +138,23 @@ class DriftHistory:
         Zero if nothing is stated.
         """
         if self.is_stated:
-            return np.tile(self.held, (len(self.sigma), 1))
+            return np.tile(self.fixed_sigma, (len(self.sigma), 1))
         return self._continuous(np.minimum(self.sigma, SETTINGS.gnss))
 
     @cached_property
     def added(self) -> np.ndarray:
-        """Part (n, 3) of the level in excess of that with best GNSS. Units: m.
+        """Part (n, 3) of solution_sigma in excess of that with best GNSS. Units: m.
 
         It changes abruptly only at steps, like drift.
         """
-        return self._continuous(np.sqrt(np.maximum(self.level**2 - self.held**2, 0.0)))
+        return self._continuous(
+            np.sqrt(np.maximum(self.solution_sigma**2 - self.fixed_sigma**2, 0.0))
+        )
 
     @cached_property
     def drift(self) -> np.ndarray:
         """The part (n, 3) of the stated sigma that grows without GNSS. Units: m."""
-        return self._continuous(np.sqrt(np.maximum(self.sigma**2 - self.level**2, 0.0)))
+        return self._continuous(np.sqrt(np.maximum(self.sigma**2 - self.solution_sigma**2, 0.0)))
 
     @cached_property
     def folds(self) -> np.ndarray:
@@ -177,7 +181,7 @@ class DriftHistory:
         time = self.trajectory.gps_time
         steps = self.steps
         starts = np.searchsorted(time, self.restarts)
-        least = self.held if self.is_stated else SETTINGS.gnss
+        least = self.fixed_sigma if self.is_stated else SETTINGS.gnss
         return continuous(time, amplitude, least, np.append(starts, steps.rows(time)))
 
 
@@ -202,17 +206,21 @@ def _history(trajectory):
         steps = find_steps(trajectory, time[changes].mean(axis=1))
         stated, steady = timely_sigma(trajectory, steps)
     restarts = np.sort(np.concatenate([trajectory.passes[1:, 0], steps.middle]))
-    held = _held(steady)
-    level = np.tile(held, (len(time), 1))
-    if not held.any():
+    fixed_sigma = _fixed_sigma(steady)
+    solution_sigma = np.tile(fixed_sigma, (len(time), 1))
+    if not fixed_sigma.any():
         starts = np.append(time[0], restarts)
         none = np.empty(0)
-        return DriftHistory(trajectory, steps, restarts, none, none, starts, stated, held, level)
+        return DriftHistory(
+            trajectory, steps, restarts, none, none, starts, stated, fixed_sigma, solution_sigma
+        )
     size = np.linalg.norm(steady, axis=1)
     changes = quick_changes(time, size)
-    falls = _falls(time, size, changes, held, restarts)
-    is_raised = np.maximum(steady**2 - held**2, 0.0).sum(axis=1) > held @ held
-    smoothed = _returns(time, size, runs(is_raised), np.sort(np.append(restarts, falls)))
+    falls = _falls(time, size, changes, fixed_sigma, restarts)
+    is_increased = (
+        np.maximum(steady**2 - fixed_sigma**2, 0.0).sum(axis=1) > fixed_sigma @ fixed_sigma
+    )
+    smoothed = _returns(time, size, runs(is_increased), np.sort(np.append(restarts, falls)))
     returns = smoothed
     if _shows_steps(trajectory):
         returns = np.sort(np.append(smoothed, falls))
@@ -222,20 +230,24 @@ def _history(trajectory):
     grown = [np.inf]
     cuts = np.searchsorted(time, edges)
     following = len(time)
-    for first, last in reversed(runs(is_raised, cuts)):
+    for first, last in reversed(runs(is_increased, cuts)):
         at_once = changes[(changes[:, 0] <= first) & (first <= changes[:, 1]), 1]
         settled = min(at_once.max(initial=first), last - 1)
         if first in cuts or len(at_once):
             lowest = np.minimum.accumulate(steady[settled:following], axis=0)
-            level[settled:following] = np.maximum(lowest, held)
-            level[first:settled] = level[settled]
+            solution_sigma[settled:following] = np.maximum(lowest, fixed_sigma)
+            solution_sigma[first:settled] = solution_sigma[settled]
         # a temporary abrupt increase is no drift, but a worse solution of GNSS
-        if np.any((steady[settled:last] ** 2 - 2 * level[settled:last] ** 2).sum(axis=1) > 0):
+        if np.any(
+            (steady[settled:last] ** 2 - 2 * solution_sigma[settled:last] ** 2).sum(axis=1) > 0
+        ):
             grown.append(time[first])
         following = first
     first = np.array(grown[::-1])[np.searchsorted(grown[::-1], edges)]
     starts = np.where(first < np.append(edges[1:], np.inf), first, np.inf)
-    return DriftHistory(trajectory, steps, restarts, returns, smoothed, starts, stated, held, level)
+    return DriftHistory(
+        trajectory, steps, restarts, returns, smoothed, starts, stated, fixed_sigma, solution_sigma
+    )
 
 
 def _shows_steps(trajectory):
@@ -244,10 +256,10 @@ def _shows_steps(trajectory):
     return SETTINGS.largest_jerk / 2 * epoch**3 < SETTINGS.smallest_step
 
 
-def _returns(time, size, raised, restarts):
+def _returns(time, size, intervals, restarts):
     """Ends of outages with the largest sigma(t) in the middle, as stated by a smoother. s."""
     returns = []
-    for first, last in raised:
+    for first, last in intervals:
         if last == len(time):
             continue
         # sigma of a filter grows until GNSS returns, that of a smoother until the middle
@@ -259,10 +271,10 @@ def _returns(time, size, raised, restarts):
     return np.array(returns)
 
 
-def _falls(time, size, changes, held, restarts):
+def _falls(time, size, changes, fixed_sigma, restarts):
     """Times at which sigma(t) falls, except those of known restarts. Units: s."""
     first, last = changes.T
-    limit = SETTINGS.steady_ratio * np.linalg.norm(held)
+    limit = SETTINGS.steady_ratio * np.linalg.norm(fixed_sigma)
     is_fall = (size[last] < size[first]) & (size[first] > limit)
     falls = (time[last - 1] + time[last])[is_fall] / 2
     # a fall of sigma a little before or after a step of the path is the same return
@@ -270,13 +282,13 @@ def _falls(time, size, changes, held, restarts):
     return falls[away > SETTINGS.reacquisition_time]
 
 
-def _held(sigma):
+def _fixed_sigma(sigma):
     """Sigma (3,) with GNSS, from (n, 3) stated ones; zero if constant."""
-    held = np.percentile(sigma, SETTINGS.held_percentile, axis=0)
-    is_steady = (sigma.max(axis=0) <= SETTINGS.steady_ratio * held).all()
+    fixed_sigma = np.percentile(sigma, SETTINGS.fixed_percentile, axis=0)
+    is_steady = (sigma.max(axis=0) <= SETTINGS.steady_ratio * fixed_sigma).all()
     if is_steady:
         return np.zeros(3)
-    return held
+    return fixed_sigma
 
 
 def quick_changes(gps_time: np.ndarray, size: np.ndarray) -> np.ndarray:
@@ -292,7 +304,7 @@ def quick_changes(gps_time: np.ndarray, size: np.ndarray) -> np.ndarray:
     size : (n,) array
         Units: m.
     """
-    later = _beside(gps_time, np.arange(len(size)), SETTINGS.step_duration)
+    later = _rows_after(gps_time, np.arange(len(size)), SETTINGS.step_duration)
     least, largest = np.sort([size[later], size], axis=0)
     changed = []
     for first, last in runs(largest > SETTINGS.steady_ratio * least):
@@ -301,14 +313,14 @@ def quick_changes(gps_time: np.ndarray, size: np.ndarray) -> np.ndarray:
         changed.append((large[0], large[-1] + 1))
     first, last = np.array(changed, int).reshape(-1, 2).T
     as_long = np.maximum(gps_time[last] - gps_time[first], SETTINGS.step_duration)
-    sooner = _beside(gps_time, first, -as_long)
-    later = _beside(gps_time, last, as_long)
-    beside = np.abs([size[sooner] - size[first], size[later] - size[last]]).max(axis=0)
-    is_quick = np.abs(size[last] - size[first]) > SETTINGS.steady_ratio * beside
+    sooner = _rows_after(gps_time, first, -as_long)
+    later = _rows_after(gps_time, last, as_long)
+    change_nearby = np.abs([size[sooner] - size[first], size[later] - size[last]]).max(axis=0)
+    is_quick = np.abs(size[last] - size[first]) > SETTINGS.steady_ratio * change_nearby
     return np.column_stack([first, last])[is_quick]
 
 
-def _beside(gps_time, rows, duration):
+def _rows_after(gps_time, rows, duration):
     """Rows a duration after rows, or before if it is negative; at least one row away."""
     away = np.searchsorted(gps_time, gps_time[rows] + duration, side="right") - 1
     away = np.where(duration > 0, np.maximum(away, rows + 1), np.minimum(away, rows - 1))
@@ -343,9 +355,9 @@ def steady_sigma(trajectory: Trajectory) -> np.ndarray:
     for first, last in np.searchsorted(time, trajectory.passes):
         own = slice(first, last + 1)
         step = np.median(np.diff(time[max(first - 1, 0) : last + 2]))  # sessions differ in rate
-        beside = round(SETTINGS.step_duration / float(step))
+        half_width = round(SETTINGS.step_duration / float(step))
         for axis, stated in enumerate(sigma.T):
-            steady[own, axis] = median_filter(stated[own], 2 * beside + 1, mode="nearest")
+            steady[own, axis] = median_filter(stated[own], 2 * half_width + 1, mode="nearest")
     return steady
 
 
@@ -379,7 +391,7 @@ def timely_sigma(trajectory: Trajectory, steps: Steps) -> tuple[np.ndarray, np.n
 def _whole_change(gps_time, values, first, last):
     """Rows of a change from the largest values (n, 3) on: a filter's variance falls slowly."""
     size = np.linalg.norm(values, axis=1)
-    sooner, later = _beside(
+    sooner, later = _rows_after(
         gps_time, np.array([first, last]), np.array([-1, 1]) * SETTINGS.step_duration
     )
     if size[last] < size[first]:

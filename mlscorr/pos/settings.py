@@ -9,7 +9,7 @@ import numpy as np
 class Settings:
     """Limits and scales, each with its unit and source."""
 
-    held_percentile: float = 5.0  # of sigma(t): GNSS at its best, free of single epochs
+    fixed_percentile: float = 5.0  # of sigma(t): GNSS at its best, free of single epochs
     # of largest to remaining sigma, below which sigma(t) shows no drift; of a change within
     # step_duration, below which neither GNSS nor its solution changes
     steady_ratio: float = 2.0
@@ -38,7 +38,7 @@ class Settings:
     )
     # ratio to an elevated sigma, and its prior: a POS knows of missing GNSS, and has errors up to
     # five times the sigma stated then (real units, pos_study.py)
-    raised_scales: tuple[tuple[float, float], ...] = ((1.0, 0.5), (2.0, 0.3), (3.5, 0.2))
+    increased_scales: tuple[tuple[float, float], ...] = ((1.0, 0.5), (2.0, 0.3), (3.5, 0.2))
 
     # Hypotheses before any observation (``benchmarks/ablation.py matching`` shows the effect of
     # each)

@@ -72,10 +72,10 @@ def pose_signals(
     added = ()
     if stated.history.added.any():
         clock = stated.gnss_clock
-        raised = parameters.level_scale * position * stated.added[:, None]
+        increased = parameters.level_scale * position * stated.added[:, None]
         added = (
-            Signal(parameters.jitter_scale * raised, jitter, clock),
-            Signal(parameters.bias_scale * raised, bias, clock),
+            Signal(parameters.jitter_scale * increased, jitter, clock),
+            Signal(parameters.bias_scale * increased, bias, clock),
         )
     return (
         *_drift(stated, parameters, position),

@@ -61,7 +61,7 @@ class StatedSigma:
         return map_root(self.rotation, self.angles)
 
     @property
-    def held(self) -> np.ndarray:
+    def known_gnss(self) -> np.ndarray:
         """Part (n, 3) of the position's sigma that remains with GNSS; zero if unknown. Units: m."""
         if self.history.is_stated:
             return self.gnss

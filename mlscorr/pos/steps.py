@@ -115,13 +115,15 @@ def _differences(driven, span, changes):
     gps_time = driven.gps_time
     if len(gps_time) <= 3 * span + 1:
         return []
-    ways, times = (values[span:] - values[:-span] for values in (driven.position, gps_time))
-    speed = ways / times[:, None]
-    frames = driven.attitude[span // 2 : span // 2 + len(ways)]
+    displacements, times = (
+        values[span:] - values[:-span] for values in (driven.position, gps_time)
+    )
+    speed = displacements / times[:, None]
+    frames = driven.attitude[span // 2 : span // 2 + len(displacements)]
     turned = frames.inv().apply(speed)  # a car turns with its path, a drone may not
     about = [(v[: -2 * span] + v[2 * span :]) / 2 for v in (speed, turned)]
     about[1] = frames[span:-span].apply(about[1])
-    sizes = ways[span:-span] - times[span:-span, None] * np.array(about)
+    sizes = displacements[span:-span] - times[span:-span, None] * np.array(about)
     lengths = np.linalg.norm(sizes, axis=2)
     nearer = np.argmin(lengths, axis=0)
     rows = np.arange(lengths.shape[1])
@@ -145,8 +147,8 @@ def _differences(driven, span, changes):
     is_step[:span] = is_step[-span:] = False  # half of a step in the outer span
     rows = np.flatnonzero(is_step)
     # a step shown by both adjacent spans is none: filters and resampling ring near one
-    beside = np.pad(length, 2 * span, constant_values=usual)
-    sigma = beside[[rows, rows + 4 * span]].max(axis=0).clip(usual)
+    padded = np.pad(length, 2 * span, constant_values=usual)
+    sigma = padded[[rows, rows + 4 * span]].max(axis=0).clip(usual)
     return [
         (start[i], gps_time[i + 2 * span], *size[i], s) for i, s in zip(rows, sigma, strict=True)
     ]

@@ -287,16 +287,16 @@ def _common_origin(layers):
             )
     ends = np.array([[layer.xyz.min(axis=0), layer.xyz.max(axis=0)] for layer in there])
     middles = ends.mean(axis=1)
-    apart = np.linalg.norm(middles[:, None] - middles[None], axis=2)
+    distance = np.linalg.norm(middles[:, None] - middles[None], axis=2)
     extent = float(np.linalg.norm(ends.max(axis=(0, 1)) - ends.min(axis=(0, 1))))
     if extent > SETTINGS.shown_extent:
-        first, second = np.unravel_index(apart.argmax(), apart.shape)
+        first, second = np.unravel_index(distance.argmax(), distance.shape)
         raise ValueError(
             f"The layers extend over {extent / 1000:.0f} km; one view can show "
             f"{SETTINGS.shown_extent / 1000:.0f} km ({there[first].name} and "
-            f"{there[second].name} are {apart.max() / 1000:.0f} km apart). One may be in another "
-            "CRS or relative to a local origin: an Open3D geometry in map coordinates needs its "
-            "attribute origin."
+            f"{there[second].name} are {distance.max() / 1000:.0f} km apart). One may be in "
+            "another CRS or relative to a local origin: an Open3D geometry in map coordinates "
+            "needs its attribute origin."
         )
     return chosen_origin(ends.reshape(-1, 3), None)
 

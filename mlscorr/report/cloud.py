@@ -122,7 +122,7 @@ def cloud_sampler(targets: list[TargetRow], ties: TieResiduals | None = None) ->
 
 
 def _in_time(targets):
-    """Observed ones of rows of targets, sorted by time."""
+    """Observed rows of targets, sorted by time."""
     return sorted((row for row in targets if row.is_observed), key=lambda row: row.gps_time)
 
 
@@ -171,7 +171,7 @@ def close_ups(rows: list[TargetRow], limit: int = SETTINGS.close_ups) -> list[st
 
 
 def cloud_content(views: CloudViews, targets: list[TargetRow]) -> dict:
-    """What the templates show of CloudViews."""
+    """Content of CloudViews for the templates."""
     pictures = [_pair(picture) for picture in views.pictures]
     kinds = {pair["kind"]: pair for pair in pictures}
     close = [pair for pair in pictures if pair["kind"] == "target"]

@@ -167,7 +167,7 @@ def weak_places(correction: Correction, report: CorrectionReport) -> list[list[f
     correction : Correction
     report : CorrectionReport
     """
-    middles = [(stretch.start + stretch.end) / 2 for stretch in report.support.weak]
+    middles = [(interval.start + interval.end) / 2 for interval in report.support.weak]
     return _places(correction, middles)
 
 
@@ -346,7 +346,7 @@ def coverage(correction: Correction, report: CorrectionReport) -> list[tuple[str
     metres = number(report.metres_extrapolated, 0)
     outside = covered.points_outside_trajectory
     beyond = covered.points_outside_control
-    unheld = covered.points_extrapolated
+    extrapolated = covered.points_extrapolated
     gaps = correction.recorded.gaps
     noise = covered.points_noise
     values = {
@@ -355,7 +355,7 @@ def coverage(correction: Correction, report: CorrectionReport) -> list[tuple[str
         "Longest time without control within a pass": f"{number(covered.longest_gap_s)} s",
         "Points outside the trajectory (not corrected)": points(outside),
         "Points before the first or after the last control point": points(beyond),
-        "Points with extrapolated correction (outside the control)": points(unheld),
+        "Points with extrapolated correction (outside the control)": points(extrapolated),
         "Points flagged as noise (not used for measurements, corrected like all others)": points(
             noise
         ),

@@ -165,7 +165,7 @@ class CorrectionReport:
             | {"seconds_extrapolated": self.seconds_extrapolated}
             | {"metres_extrapolated": self.metres_extrapolated},
             "ties": self.ties,
-            "weak": [stretch.document() for stretch in self.support.weak],
+            "weak": [interval.document() for interval in self.support.weak],
             "drift": {
                 "outages": [list(outage) for outage in self.support.outages],
                 "steps": list(self.support.steps),
@@ -194,12 +194,12 @@ class CorrectionReport:
     @property
     def seconds_extrapolated(self) -> float:
         """Total duration of the poorly constrained intervals. Units: s."""
-        return sum(stretch.seconds for stretch in self.support.weak)
+        return sum(interval.seconds for interval in self.support.weak)
 
     @property
     def metres_extrapolated(self) -> float:
         """Total length of the poorly constrained intervals along the path. Units: m."""
-        return sum(stretch.length_m for stretch in self.support.weak)
+        return sum(interval.length_m for interval in self.support.weak)
 
     @property
     def holds_everywhere(self) -> bool:
@@ -211,9 +211,9 @@ class CorrectionReport:
         return is_whole and not self.points("check").missing
 
     @property
-    def is_held_by_others(self) -> bool:
+    def is_constrained_by_others(self) -> bool:
         """True if only control of other drives constrains it, without any unconstrained part."""
-        whys = {stretch.why for stretch in self.support.weak}
+        whys = {interval.why for interval in self.support.weak}
         return self.points("control").scored == 0 and whys <= {REASONS[DRIFT]}
 
     @property

@@ -223,8 +223,8 @@ def _shade(panels, trajectory, span, support):
         panel.set_xlim(first - start, last - start)
         for gap in trajectory.gaps - start:
             panel.axvspan(*gap, zorder=0.6, linewidth=0, **GAP)
-        for stretch in support.weak:
-            panel.axvspan(stretch.start - start, stretch.end - start, zorder=0.5, **OUTSIDE)
+        for interval in support.weak:
+            panel.axvspan(interval.start - start, interval.end - start, zorder=0.5, **OUTSIDE)
         low = panel.get_xaxis_transform()
         for begin, end in support.outages:  # a strip, as an outage may also be extrapolated
             outage = np.array([begin, end]) - start

@@ -53,8 +53,12 @@ def locator_map(
         place = (float(marked.surveyed[0]), float(marked.surveyed[1]))
         ring: dict[str, Any] = {"marker": "o", "markersize": 13.0, "markerfacecolor": "none"}
         axes.plot(*place, color=MARK, markeredgewidth=2.0, **ring)
-        beside: dict[str, Any] = {"xytext": (0, 10), "textcoords": "offset points", "ha": "center"}
-        axes.annotate(marked.name or "no name", place, fontsize=11, fontweight="bold", **beside)
+        text_style: dict[str, Any] = {
+            "xytext": (0, 10),
+            "textcoords": "offset points",
+            "ha": "center",
+        }
+        axes.annotate(marked.name or "no name", place, fontsize=11, fontweight="bold", **text_style)
     bar = nice(0.3 * 2 * half[0])
     west = middle[0] - 0.95 * half[0]
     foot = middle[1] - 0.93 * half[1]
@@ -81,9 +85,9 @@ def weak_lines(correction: Correction, report: CorrectionReport) -> list[np.ndar
     """
     corrected = correction.corrected
     lines = []
-    for stretch in report.support.weak:
+    for interval in report.support.weak:
         time = corrected.gps_time
-        inside = np.flatnonzero((time >= stretch.start) & (time <= stretch.end))
+        inside = np.flatnonzero((time >= interval.start) & (time <= interval.end))
         if len(inside):
             step = max(1, len(inside) // SETTINGS.curve_epochs)
             lines.append(corrected.position[inside[::step], :2])

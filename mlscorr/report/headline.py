@@ -18,7 +18,7 @@ from mlscorr.evaluate import SEEN_BY_OTHERS, CheckSigmas, PointCounts, reason_in
 from mlscorr.report.correction_report import CorrectionReport
 from mlscorr.report.settings import SETTINGS
 from mlscorr.report.tables import AXES
-from mlscorr.report.wording import NAMED, assumed_in_words, in_words, stretch_in_words
+from mlscorr.report.wording import NAMED, assumed_in_words, in_words, interval_in_words
 from mlscorr.survey import Severity, Statement
 
 RATINGS = ("green", "amber", "red")  # good; warning; incomplete, or worse than before
@@ -146,7 +146,7 @@ def headline(report: CorrectionReport) -> str:
     """
     check = check_statement(report.points("check")).sentence
     control = _control(report).sentence
-    if report.points("control").surveyed == 0 and not report.is_held_by_others:
+    if report.points("control").surveyed == 0 and not report.is_constrained_by_others:
         return f"{control} {check}"
     return f"{check} Control: {control} {_extrapolated(report).sentence}"
 
@@ -273,11 +273,11 @@ def _control(report):
     points = report.points("control")
     if points.surveyed:
         return control_statement(points)
-    if report.is_held_by_others:
+    if report.is_constrained_by_others:
         return StatementRow.of("Control points", Statement("control of other drives", "warning"))
     values = {
         "is_tied": report.ties is not None and report.ties["used"] > 0,
-        "sigma": max((stretch.sigma for stretch in report.support.weak), default=0.0),
+        "sigma": max((interval.sigma for interval in report.support.weak), default=0.0),
     }
     return StatementRow.of("Control points", Statement("no control point", "fault", values))
 
@@ -316,12 +316,12 @@ def _datum(report) -> Iterator[StatementRow]:
 def _extrapolated(report):
     """Row of the unconstrained parts: green if they are as good as the rest."""
     weak = report.support.weak
-    if not weak and report.is_held_by_others:
+    if not weak and report.is_constrained_by_others:
         return StatementRow.of("Extrapolated", Statement("held by other drives", "warning"))
     if not weak:
         return StatementRow.of("Extrapolated", Statement("held"))
     share = report.coverage.share_extrapolated
-    largest = max(stretch.sigma for stretch in weak)
+    largest = max(interval.sigma for interval in weak)
     after = report.judgement[1]
     severity = "warning"
     if after is not None and largest <= after.maximum[4] and share < 1:
@@ -337,15 +337,15 @@ def _extrapolated(report):
     if sigma is not None and not report.support.contains(np.array(sigma["time"])):
         facts.append(Statement("between control points", values={"sigma": sigma["largest"]}))
     items = [
-        stretch_in_words(
-            stretch.start,
-            stretch.end,
-            stretch.chainage,
-            stretch.length_m,
-            stretch.why,
-            stretch.sigma,
+        interval_in_words(
+            interval.start,
+            interval.end,
+            interval.chainage,
+            interval.length_m,
+            interval.why,
+            interval.sigma,
         )
-        for stretch in sorted(weak, key=lambda stretch: -stretch.sigma)
+        for interval in sorted(weak, key=lambda interval: -interval.sigma)
     ]
     return StatementRow.of("Extrapolated", *facts, items=capped(items))
 

@@ -71,22 +71,22 @@ def search_figure(trajectory: Trajectory, ties: Ties, refused: Ties) -> Figure:
 
 def _tie_plan(trajectory, place, used, states, words):
     """Draw plans of positions (n, 2, 3) colored by misclosures (n,) of one or two states, in m."""
-    way = track(trajectory)
+    path = track(trajectory)
     places = place.mean(axis=1)[:, :2]
-    misfits = [1000 * np.abs(misclosure) for misclosure in states.values()]  # mm
-    low, high = corners(np.vstack([way, places]), 0.1)
+    magnitudes = [1000 * np.abs(misclosure) for misclosure in states.values()]  # mm
+    low, high = corners(np.vstack([path, places]), 0.1)
     figure, panels = map_panels(len(states), (high - low)[1] / (high - low)[0])
     figure.set_dpi(SETTINGS.dots_per_inch)
-    largest = max(np.max(misfit[used], initial=10.0) for misfit in misfits)
+    largest = max(np.max(magnitude[used], initial=10.0) for magnitude in magnitudes)
     scale = {"norm": LogNorm(1.0, largest), "cmap": ListedColormap(colour_table("sigma") / 255)}
-    for panel, misfit, title in zip(panels, misfits, states, strict=True):
-        panel.plot(*way.T, **TRACK, zorder=1)
+    for panel, magnitude, title in zip(panels, magnitudes, states, strict=True):
+        panel.plot(*path.T, **TRACK, zorder=1)
         panel.plot(*places[~used].T, linestyle="none", zorder=2, rasterized=True, **MARKS["unused"])
-        front = np.flatnonzero(used)[np.argsort(misfit[used], kind="stable")]  # the worst on top
+        front = np.flatnonzero(used)[np.argsort(magnitude[used], kind="stable")]  # the worst on top
         dots = panel.scatter(
             *places[front].T,
             9,
-            np.maximum(misfit[front], 1.0),
+            np.maximum(magnitude[front], 1.0),
             linewidths=0,
             zorder=3,
             rasterized=True,
@@ -128,8 +128,8 @@ def map_figure(correction: Correction, report: CorrectionReport) -> Figure:
     correction : Correction
     report : CorrectionReport
     """
-    way = track(correction.corrected)
-    driven = way[np.isfinite(way).all(axis=1)]
+    path = track(correction.corrected)
+    driven = path[np.isfinite(path).all(axis=1)]
     margin = max(float(np.ptp(driven, axis=0).max()), 200.0) / 4  # m
     low = driven.min(axis=0) - margin
     high = driven.max(axis=0) + margin
@@ -148,7 +148,7 @@ def map_figure(correction: Correction, report: CorrectionReport) -> Figure:
     width, height = high - low
     figure = new_figure(1.25 + (SETTINGS.figure_width - 1.1) * height / width)
     axes = figure.add_subplot()
-    axes.plot(*way.T, **TRACK)
+    axes.plot(*path.T, **TRACK)
     # hidden under its mark
     if times:
         short = _arrows(axes, arrows, times, 0.008 * width)
@@ -346,8 +346,8 @@ def map_panels(count: int, share: float) -> tuple[Figure, np.ndarray]:
     columns = 2 if share > 0.7 and count > 1 else 1
     # inch: labels and colors
     lines = count // columns
-    beside = 1.8
-    width = SETTINGS.figure_width / columns - beside
+    label_width = 1.8
+    width = SETTINGS.figure_width / columns - label_width
     figure = new_figure(0.8 + lines * (0.35 + width * share))
     return figure, figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False).ravel()
 

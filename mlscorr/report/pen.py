@@ -1,4 +1,4 @@
-"""A pen that draws marks and letters on pixels: for pictures of which a page shows dozens.
+"""Pen that draws marks and letters on pixels, for pages with dozens of pictures.
 
 matplotlib takes a tenth of a second for each of them. Edges are smooth as the pen draws at a
 multiple of the size, and each pixel is the mean of the finer ones in it.
@@ -19,7 +19,7 @@ FINENESS = 4  # finer pixels for each pixel, along either axis
 
 
 class Pen:
-    """Draws on a picture. Places are column and row, lengths too: in its pixels.
+    """Pen on a picture. Positions are column and row; positions and lengths are in its pixels.
 
     Parameters
     ----------
@@ -39,13 +39,13 @@ class Pen:
 
     @property
     def pixels(self) -> np.ndarray:
-        """The picture with all that was drawn on it: (h, w, 3) uint8."""
+        """Picture with everything drawn on it: (h, w, 3) uint8."""
         return np.array(self._image.reduce(self.fineness))
 
     def line(
         self, points: np.ndarray, color: str, width: float, halo: float = 0.0, closed: bool = False
     ) -> None:
-        """Draw a line through points (n, 2), with white of some width on either side."""
+        """Draw a line through points (n, 2), with a white margin on either side."""
         if closed:
             points = np.concatenate([points, points[:2]])
         path = self._finer(points)
@@ -58,7 +58,7 @@ class Pen:
         self._draw.polygon(self._finer(points), fill)
 
     def dots(self, points: np.ndarray, color: str, diameter: float) -> None:
-        """Draw a disc at each of points (n, 2)."""
+        """Draw a disc at each of some points (n, 2)."""
         radius = diameter / 2 * self.fineness
         for column, row in points * self.fineness:
             box = (column - radius, row - radius, column + radius, row + radius)
@@ -88,7 +88,7 @@ class Pen:
         self.polygon(triangle, color)
 
     def tint(self, points: np.ndarray, color: str, share: float) -> None:
-        """Lay a color over a polygon of points (n, 2), as opaque as a share of 1."""
+        """Lay a color over a polygon of points (n, 2), with an opacity from 0 to 1."""
         path = self._finer(points)
         low = np.floor(np.min(path, axis=0)).astype(int) - 1
         high = np.ceil(np.max(path, axis=0)).astype(int) + 1
@@ -111,7 +111,7 @@ class Pen:
         bold: bool = False,
         halo: float = 0.0,
     ) -> None:
-        """Write words; the anchor is that of Pillow: left, middle or right, then the height."""
+        """Write text; the anchor is Pillow's: left, middle or right, then the height."""
         font = _font(bold, round(size * self.fineness))
         at = self._finer(np.array([place]))[0]
         if halo:
@@ -122,7 +122,7 @@ class Pen:
         self._draw.text(at, words, color, font, anchor)
 
     def _finer(self, points):
-        """Points as the finer picture has them."""
+        """Points in the pixels of the finer picture."""
         return [(column, row) for column, row in (np.asarray(points) * self.fineness).tolist()]
 
     def _thick(self, width):
@@ -131,7 +131,7 @@ class Pen:
 
 @cache
 def _font(bold: bool, size: int) -> ImageFont.FreeTypeFont:
-    """The letters of all figures. Their size is in pixels."""
+    """Font of all figures, with its size in pixels."""
     weight = "bold" if bold else "normal"
     path = findfont(FontProperties(family=STYLE["font.family"], weight=weight))
     return ImageFont.truetype(path, size, layout_engine=ImageFont.Layout.BASIC)

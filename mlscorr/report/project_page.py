@@ -65,7 +65,9 @@ def project_map(tracks: dict[str, np.ndarray]) -> Figure:
         lines.set_capstyle("round")  # a short drive is a dot
         axes.add_collection(lines)
     known = {name: track[np.isfinite(track[:, 0]), :2] for name, track in tracks.items()}
-    write_names(axes, {name: (way[len(way) // 2], 1) for name, way in known.items()}, 1.2 * width)
+    write_names(
+        axes, {name: (line[len(line) // 2], 1) for name, line in known.items()}, 1.2 * width
+    )
     ends = nice(colours.vmin), nice(colours.vmax)
     powers = 10.0 ** np.arange(np.floor(np.log10(ends[0])), np.ceil(np.log10(ends[1])) + 1)
     bar = figure.colorbar(lines, ax=axes, location="bottom", shrink=0.8, aspect=50)

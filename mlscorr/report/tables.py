@@ -125,8 +125,8 @@ def tie_statements(section: dict[str, Any] | None, control: int) -> list[Stateme
     if section["used"] == 0:
         values = {"n": section["n"], "has_control": control > 0}
         return [Statement("unused ties", "warning", values)]
-    apart = {state: section[state]["median"] for state in ("before", "after")}
-    facts = [Statement("ties", values={"n": section["n"], **apart})]
+    medians = {state: section[state]["median"] for state in ("before", "after")}
+    facts = [Statement("ties", values={"n": section["n"], **medians})]
     wrong = section["n"] - section["used"]
     if wrong:
         facts.append(Statement("contradicting ties", values={"wrong": wrong}))

@@ -98,7 +98,7 @@ def draw_grid(figure: Figure, pictures: Sequence[np.ndarray], columns: int) -> N
 
 @dataclass(frozen=True)
 class Frame:
-    """Where the axes of a target's picture are: pixels of what is in its plane, in cm.
+    """Axes of a target's picture: from positions in its plane in cm to pixels.
 
     Parameters
     ----------
@@ -237,7 +237,7 @@ def _axes(pen, frame):
 
 
 def _beams(pen, frame, target):
-    """Where the beams met the plane, by what they met."""
+    """Draw where the beams met the plane, in the color of the surface they met."""
     view = target.view
     points = (view.points - view.outline.centre) @ (100.0 * _upright(target)).T  # cm
     rows = np.flatnonzero(np.abs(points).max(axis=1) < frame.half_width)

@@ -48,7 +48,7 @@ def names_in_words(names: Sequence[str]) -> str:
     return words
 
 
-def stretch_in_words(
+def interval_in_words(
     start: float, end: float, chainage: float, length: float, why: str, sigma: float
 ) -> tuple[str, str]:
     """Location of an unconstrained part, and the reason, with its sigma.

@@ -140,7 +140,7 @@ class Mechanism:
         return DIRECTIONS[self.direction][1:]
 
     @property
-    def lead(self) -> tuple[str, str]:
+    def hint(self) -> tuple[str, str]:
         """Words of a correct hint, which has one of each; alternatives are separated by |."""
         return DIRECTIONS[self.direction][0], COVARIATES[self.covariate]
 
@@ -185,7 +185,7 @@ def described(known: Iterable[Mechanism]) -> Described:
     ----------
     known : iterable of Mechanism
     """
-    return {each.name: (each, each.unit, each.lead) for each in known}
+    return {each.name: (each, each.unit, each.hint) for each in known}
 
 
 def load_mechanisms(path: Path) -> Described:

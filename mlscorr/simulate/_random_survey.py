@@ -159,8 +159,8 @@ def _passes(rng, river, two):
         return ({},)
     lateral = rng.uniform(0.9, 1.4)
     pause = rng.uniform(20.0, 60.0)
-    way = "forward" if river else "back"
-    return ({"lateral": lateral}, {"direction": way, "lateral": -lateral, "pause": pause})
+    direction = "forward" if river else "back"
+    return ({"lateral": lateral}, {"direction": direction, "lateral": -lateral, "pause": pause})
 
 
 def _mounting(rng, boresight):
@@ -217,5 +217,5 @@ def _heavier(survey, rng):
     """
     happens = rng.random() < MIX.heavy_tails
     n = len(survey.targets)
-    stretch = np.sqrt((MIX.freedom - 2.0) / rng.chisquare(MIX.freedom, (n, 1)))
-    return happens * (stretch - 1.0) * (survey.targets.position - survey.true_centre)
+    factor = np.sqrt((MIX.freedom - 2.0) / rng.chisquare(MIX.freedom, (n, 1)))
+    return happens * (factor - 1.0) * (survey.targets.position - survey.true_centre)

@@ -152,8 +152,8 @@ class Scenario(_Part):
         """Latest end of the last pass, from the start of the drive; None for a file."""
         if self.drive.file is not None:
             return None
-        ways = [self.drive.speed / (p.speed or self.drive.speed) for p in self.drive.passes]
-        return self.drive.duration * sum(ways) + sum(p.pause for p in self.drive.passes[1:])
+        factors = [self.drive.speed / (p.speed or self.drive.speed) for p in self.drive.passes]
+        return self.drive.duration * sum(factors) + sum(p.pause for p in self.drive.passes[1:])
 
     @model_validator(mode="after")
     def _holds_its_events(self):

@@ -28,7 +28,7 @@ class Settings:
     path_quiet: float = 0.08  # s, smoothing of a recorded path: vehicles move below 2 Hz
     course_speed: float = 1.0  # m/s, below which course does not give the heading
     course_time: float = 0.3  # s, over which a heading from the course is smoothed
-    lead: float = 0.05  # s of trajectory before the first and after the last pulse of a pass
+    trajectory_margin: float = 0.05  # s before the first and after the last pulse of a pass
 
     # The POS
     filter_rate: float = 10.0  # Hz at least; in 0.1 s the better sensors add 0.1 mm/s, 0.0005 deg

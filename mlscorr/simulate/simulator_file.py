@@ -48,7 +48,7 @@ class WindowSection(TomlSection):
     shape: Literal["rise", "hump"] = "rise"
 
 
-class BelievedPosSection(PosSection):
+class AssumedPosSection(PosSection):
     """POS as stated by the survey, with intervals of larger errors."""
 
     windows: list[WindowSection] = Field(default_factory=list)
@@ -64,7 +64,7 @@ class SimulatorFile(TomlSection):
 
     mounting: MountingSection | None = None
     scanner: ScannerSection = ScannerSection()
-    pos: BelievedPosSection = BelievedPosSection()
+    pos: AssumedPosSection = AssumedPosSection()
     effects: list[EffectScenario] = Field(default_factory=list)
 
     @property

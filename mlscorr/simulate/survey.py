@@ -426,15 +426,15 @@ def _scanner_sections(survey):
     beliefs = []
     for scanner in scanners:
         noise = {"range_noise": scanner.range_noise, "angle_noise": scanner.angle_noise}
-        believed = {name: sigma for name, sigma in noise.items() if sigma > 0}
-        beliefs.append(believed | {"lines_per_second": scanner.lines_per_second})
+        assumed = {name: sigma for name, sigma in noise.items() if sigma > 0}
+        beliefs.append(assumed | {"lines_per_second": scanner.lines_per_second})
     if len(scanners) == 1:
         return {"mounting": mountings[0], "scanner": beliefs[0]}
     files = [survey.files[k :: len(scanners)] for k in range(len(scanners))]
     return {
         "scanner": [
-            {"name": str(k), "files": list(of), **believed, "mounting": mounting}
-            for k, (of, believed, mounting) in enumerate(
+            {"name": str(k), "files": list(of), **assumed, "mounting": mounting}
+            for k, (of, assumed, mounting) in enumerate(
                 zip(files, beliefs, mountings, strict=True), start=1
             )
         ]

@@ -192,7 +192,7 @@ def find_markings(crossings: Crossings, start: float) -> TieFeatures:
         The group is that of pass_number and scanner.
     """
     since = crossings.gps_time - start
-    whole = _connected(crossings, window_of(since))
+    whole = _connected(crossings, interval_of(since))
     moment = np.floor(since / SETTINGS.moment)
     pieces = _numbered(whole, moment, np.floor(crossings.place[:, :2] / SETTINGS.cell))
     dashes = _with_both_ends(fit_stripes(crossings, whole), start)
@@ -233,7 +233,7 @@ def _features(kind, stripes, centre, direction, variance, extent):
     )
 
 
-def window_of(since: np.ndarray) -> np.ndarray:
+def interval_of(since: np.ndarray) -> np.ndarray:
     """Number (n,) of the window in which paint is followed: a dash is cut in few of them.
 
     Parameters
@@ -248,7 +248,7 @@ def _with_both_ends(dashes, start):
     """Tracks observed at once, and entirely in one window: two lost crossings are no end."""
     took = dashes.end - dashes.begin
     margin = 3 * took / (dashes.count - 1)
-    begin, end = (window_of(t - start) for t in (dashes.begin - margin, dashes.end + margin))
+    begin, end = (interval_of(t - start) for t in (dashes.begin - margin, dashes.end + margin))
     return dashes[(begin == end) & (took <= SETTINGS.moment)]
 
 
@@ -257,12 +257,12 @@ def _numbered(*columns):
     return np.unique(np.column_stack(columns), axis=0, return_inverse=True)[1].ravel()
 
 
-def _connected(crossings, window):
+def _connected(crossings, interval):
     """Number (n,) of what each crossing is of: those near each other in a window of a group."""
     if len(crossings) == 0:
         return np.empty(0, int)
     radius = SETTINGS.cell / 2
-    key = _numbered(crossings.group, window)
+    key = _numbered(crossings.group, interval)
     place = crossings.place[:, :2] - crossings.place[0, :2]
     tree = cKDTree(np.column_stack([place, 2 * radius * key]))
     pairs = tree.query_pairs(radius, output_type="ndarray")

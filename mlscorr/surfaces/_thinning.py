@@ -44,11 +44,11 @@ def moment_number(gps_time: np.ndarray, trajectory: Trajectory | None = None) ->
     moment = np.floor(gps_time / SETTINGS.moment).astype(np.int64)
     if trajectory is None:
         return moment
-    window = np.floor(trajectory.gps_time / SETTINGS.pause)
-    first = np.flatnonzero(np.diff(window, prepend=-np.inf))
+    interval = np.floor(trajectory.gps_time / SETTINGS.pause)
+    first = np.flatnonzero(np.diff(interval, prepend=-np.inf))
     position = trajectory.position
     extent = np.maximum.reduceat(position, first) - np.minimum.reduceat(position, first)
-    stands = window[first][np.linalg.norm(extent, axis=1) < SETTINGS.cell]
+    stands = interval[first][np.linalg.norm(extent, axis=1) < SETTINGS.cell]
     own = np.floor(gps_time / SETTINGS.pause)
     whole = np.floor(own * SETTINGS.pause / SETTINGS.moment).astype(np.int64)
     return np.where(np.isin(own, stands), whole, moment)

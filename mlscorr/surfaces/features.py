@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mlscorr.surfaces._paint import Crossings, find_crossings, find_markings, window_of
+from mlscorr.surfaces._paint import Crossings, find_crossings, find_markings, interval_of
 from mlscorr.surfaces._shapes import find_shapes
 from mlscorr.surfaces._thinning import thin
 from mlscorr.surfaces.cells import CellTable
@@ -75,7 +75,9 @@ class FeatureCollector:
         self._kept.append(self._shapes(rows))
         self._cells.remove(rows)
         crossings = Crossings.concatenate(self._crossings)
-        later = window_of(crossings.gps_time - self._start) >= window_of(moment * SETTINGS.moment)
+        later = interval_of(crossings.gps_time - self._start) >= interval_of(
+            moment * SETTINGS.moment
+        )
         self._kept.append(find_markings(crossings[~later], self._start))
         self._crossings = [crossings[later]]
         self._loose += len(self._kept[-1]) + len(self._kept[-2])

@@ -58,13 +58,13 @@ class TieFeatures(Columns):
     points: np.ndarray
     sweep: np.ndarray
 
-    def time_beside(self, rows: np.ndarray, way: np.ndarray) -> np.ndarray:
+    def time_near(self, rows: np.ndarray, offset: np.ndarray) -> np.ndarray:
         """Times at which points near the centers of some features were measured. Units: s.
 
         Parameters
         ----------
         rows : int array
-        way : (*rows.shape, 3) array
+        offset : (*rows.shape, 3) array
             Offset of the points from each center. Units: m.
 
         Returns
@@ -73,7 +73,7 @@ class TieFeatures(Columns):
             Limited to the times of the first and last feature of the pass.
         """
         low, high = (span[self.pass_number] for span in time_spans(self.pass_number, self.gps_time))
-        times = self.gps_time[rows] + np.einsum("...i,...i->...", self.sweep[rows], way)
+        times = self.gps_time[rows] + np.einsum("...i,...i->...", self.sweep[rows], offset)
         return np.clip(times, low[rows], high[rows])
 
 
@@ -151,9 +151,9 @@ class Ties(Columns):
         place = features.centre[pairs]
         gps_time = features.gps_time[pairs]
         if correction is not None:
-            way = _midway(features, pairs, place + correction[pairs])
-            place = place + way
-            gps_time = features.time_beside(pairs, way)
+            offset = _midway(features, pairs, place + correction[pairs])
+            place = place + offset
+            gps_time = features.time_near(pairs, offset)
         return cls(
             gps_time=gps_time,
             place=place,
@@ -182,10 +182,10 @@ def _midway(features, pairs, place):
     """Vectors (n, 2, 3) from both positions, along their planes or poles, to the middle between
     them.
     """
-    way = place.mean(axis=1, keepdims=True) - place
+    offset = place.mean(axis=1, keepdims=True) - place
     axis = features.direction[pairs]
-    along = np.einsum("nvi,nvi->nv", axis, way)[:, :, None] * axis
-    return np.where((features.kind[pairs[:, :1]] == "pole")[:, :, None], along, way - along)
+    along = np.einsum("nvi,nvi->nv", axis, offset)[:, :, None] * axis
+    return np.where((features.kind[pairs[:, :1]] == "pole")[:, :, None], along, offset - along)
 
 
 def time_spans(number: np.ndarray, gps_time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -127,10 +127,10 @@ def _grow(xyz, level, brightest_first, voxel, keys_of, keys, number, limits):
 
 
 @loop
-def _join(parent, chain, sums, box, voxel, beside):
+def _join(parent, chain, sums, box, voxel, neighbor):
     """Join the components of two voxels, appending the smaller one's voxels to the larger one's."""
     a = root_of(parent, voxel)
-    b = root_of(parent, beside)
+    b = root_of(parent, neighbor)
     if a == b:
         return
     if sums[0, a] < sums[0, b]:
@@ -356,10 +356,10 @@ def neighbours(key: int, keys: np.ndarray, number: np.ndarray) -> Iterator[int]:
     for dx in range(-1, 2):
         for dy in range(-1, 2):
             for dz in range(-1, 2):
-                beside = key + (dx << 42) + (dy << 21) + dz
-                if beside >= 0:
-                    slot = _slot(keys, beside)
-                    if keys[slot] == beside:
+                neighbor = key + (dx << 42) + (dy << 21) + dz
+                if neighbor >= 0:
+                    slot = _slot(keys, neighbor)
+                    if keys[slot] == neighbor:
                         yield number[slot]
 
 

@@ -63,8 +63,8 @@ def region_seeds(
     size : float or None
         Units: m.
     """
-    apart = np.linalg.norm(echoes.xyz - (region.centre - origin), axis=1)
-    rows = np.flatnonzero((apart <= region.radius) & (echoes.intensity >= region.threshold))
+    distance = np.linalg.norm(echoes.xyz - (region.centre - origin), axis=1)
+    rows = np.flatnonzero((distance <= region.radius) & (echoes.intensity >= region.threshold))
     guess = size or 1.4 * region.radius  # half of a square's diagonal
     yield from _bright_parts(echoes, rows, region.threshold, kind, size, guess)
 
@@ -257,8 +257,8 @@ def _gaps(echoes, plane, points, size):
     centres = []
     tree = cKDTree(points)
     for i in order:
-        apart = all(np.linalg.norm(centre[i] - other) > radius[i] for other in centres)
-        if apart and _surrounded(
+        is_separate = all(np.linalg.norm(centre[i] - other) > radius[i] for other in centres)
+        if is_separate and _surrounded(
             points[tree.query_ball_point(centre[i], 1.5 * radius[i])], centre[i]
         ):
             centres.append(centre[i])

@@ -230,8 +230,8 @@ def _with_threshold(intensity, beams, bright, outside, seed):
     else:
         dark = 0.0
     bright = np.median(bright)
-    is_apart = dark < SETTINGS.same_surface * bright
-    threshold = (bright + dark) / 2 if is_apart else seed.threshold
+    is_separate = dark < SETTINGS.same_surface * bright
+    threshold = (bright + dark) / 2 if is_separate else seed.threshold
     returned = np.where(intensity[rows] >= threshold, BRIGHT, DARK)
     beams = points, np.where(state == MISS, MISS, returned), rows
     return beams, replace(seed, threshold=float(threshold))

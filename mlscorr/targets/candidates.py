@@ -94,13 +94,13 @@ def collect(
     starts = {}
     seconds = [np.empty(0, int)]
 
-    def hand_on(file, held, before, latest):
-        for index in held.passed(before):
-            fit(file, index, held.take(index))
-        settled(min(held.since(), latest))
+    def hand_on(file, pending, before, latest):
+        for index in pending.passed(before):
+            fit(file, index, pending.take(index))
+        settled(min(pending.since(), latest))
 
     for number, file in enumerate(survey.clouds):
-        held = PointsInBalls(near)
+        pending = PointsInBalls(near)
         limit = IO.chunk_points
         for chunk in read(file):
             segment = trajectory.segment(chunk.gps_time)
@@ -112,15 +112,15 @@ def collect(
             has_pose = segment[rows] >= 0
             unplaced.append(chunk[rows[~has_pose]])
             placed = chunk[rows[has_pose]]
-            held.add(placed)
+            pending.add(placed)
             count(placed)
-            if len(held) > limit:
+            if len(pending) > limit:
                 latest = chunk.gps_time.max()
-                hand_on(number, held, latest - MATCHING.visit_gap, latest)
-                limit = max(IO.chunk_points, 2 * len(held))
+                hand_on(number, pending, latest - MATCHING.visit_gap, latest)
+                limit = max(IO.chunk_points, 2 * len(pending))
             progress(len(chunk))
             del chunk, segment, rows, has_pose, placed  # large, and not needed any more
-        hand_on(number, held, np.inf, np.inf)
+        hand_on(number, pending, np.inf, np.inf)
     cloud = PointCloud.concatenate(unplaced)
     passes = number_passes(starts)
     times = np.unique(np.concatenate(seconds))
@@ -228,10 +228,10 @@ def _enter(xyz, raster, position, squares, free, rows):
         cell = int(x) * shape[1] + int(y)
         for k in range(starts[cell], starts[cell + 1]):
             ball = balls[k]
-            apart = 0.0
+            square = 0.0
             for axis in range(3):
-                apart += (xyz[i, axis] - position[ball, axis]) ** 2
-            if apart <= squares[ball]:
+                square += (xyz[i, axis] - position[ball, axis]) ** 2
+            if square <= squares[ball]:
                 if len(rows) > 0:
                     rows[free[ball]] = i
                 free[ball] += 1

@@ -274,9 +274,9 @@ def _best(fits):
     """Best fit at each position, sorted by score; up to half a target apart is one position."""
     best: list[ShapeFit] = []
     for fit in sorted(fits, key=lambda fit: -fit.assessment.rank):
-        apart = [np.linalg.norm(fit.position - other.position) for other in best]
+        distances = [np.linalg.norm(fit.position - other.position) for other in best]
         sizes = [max(fit.outline.size, other.outline.size) for other in best]
-        if all(distance >= size / 2 for distance, size in zip(apart, sizes, strict=True)):
+        if all(distance >= size / 2 for distance, size in zip(distances, sizes, strict=True)):
             best.append(fit)
     return best
 

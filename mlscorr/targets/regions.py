@@ -191,10 +191,10 @@ def _joined(table, brightest, order, keys_of, keys, number, smallest, largest):
 
 
 @loop
-def _join(parent, table, voxel, beside):
+def _join(parent, table, voxel, neighbor):
     """Join the components of two voxels."""
     a = root_of(parent, voxel)
-    b = root_of(parent, beside)
+    b = root_of(parent, neighbor)
     if a == b:
         return
     parent[b] = a
@@ -261,11 +261,11 @@ def _as_regions(table, likeness, level, low):
     for i in np.argsort(-likeness * np.sqrt(table[:, 1]), kind="stable"):
         if likeness[i] < SETTINGS.smallest_likeness:
             continue
-        apart = np.linalg.norm(middle[kept] - middle[i], axis=1)
-        beside = apart > np.maximum(radius[kept], radius[i]) / 2
+        distance = np.linalg.norm(middle[kept] - middle[i], axis=1)
+        is_separate = distance > np.maximum(radius[kept], radius[i]) / 2
         around = (level[kept] <= level[i] - 2 * OCTAVE) & (radius[kept] > radius[i])
-        if (beside | around).all():
-            kept = [k for k, free in zip(kept, beside, strict=True) if free] + [i]
+        if (is_separate | around).all():
+            kept = [k for k, free in zip(kept, is_separate, strict=True) if free] + [i]
     threshold = 2.0 ** (level / OCTAVE)
     return [BrightRegion(low + middle[k], radius[k], threshold[k], likeness[k]) for k in kept]
 

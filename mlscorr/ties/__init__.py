@@ -11,8 +11,8 @@ from mlscorr.ties.agreement import (
     group_by_time,
     information,
     residuals,
-    unheld_directions,
-    unheld_sentence,
+    unconstrained_directions,
+    unconstrained_sentence,
     weigh_by_time,
 )
 from mlscorr.ties.coarse import coarse_correction

@@ -191,8 +191,8 @@ def turned_directions(features: TieFeatures, move: Callable) -> np.ndarray:
     centre = move(features.centre, features.gps_time)
 
     def tangent(unit):
-        way = SURFACES.narrowest * unit
-        return move(features.centre + way, features.time_beside(rows, way)) - centre
+        offset = SURFACES.narrowest * unit
+        return move(features.centre + offset, features.time_near(rows, offset)) - centre
 
     up = np.array([0.0, 0.0, 1.0])
     is_plane, is_line = ((features.kind == kind)[:, None] for kind in ("plane", "line"))

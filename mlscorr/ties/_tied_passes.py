@@ -10,8 +10,8 @@ from mlscorr.survey import Statement, Survey, TieFeatures, Ties, time_spans
 from mlscorr.ties.agreement import (
     narrowest_gate,
     placed_sigma,
-    unheld_directions,
-    unheld_sentence,
+    unconstrained_directions,
+    unconstrained_sentence,
     widest_gate,
 )
 from mlscorr.ties.coarse import coarse_correction
@@ -64,8 +64,8 @@ def tie_passes(survey: Survey, estimate: Estimate, features: TieFeatures) -> Est
         if len(ties) == 0:
             return estimate
         if is_last:
-            unheld = _unheld(estimate, features, ties)
-            noted = replace(estimate, notes=(*estimate.notes, *unheld))
+            unconstrained = _unconstrained(estimate, features, ties)
+            noted = replace(estimate, notes=(*estimate.notes, *unconstrained))
             return with_ties(noted, ties, mountings, survey.included)
 
         half = thinned_ties(ties, SETTINGS.ties // 2)  # also shows how near partners are
@@ -81,9 +81,7 @@ def tie_passes(survey: Survey, estimate: Estimate, features: TieFeatures) -> Est
 
 
 def _untied(estimate: Estimate, features: TieFeatures, radius: float) -> Estimate:
-    """Return the estimate with the reason why nothing is tied, a warning if there should be
-    ties.
-    """
+    """Return the estimate with the reason why nothing is tied, a warning if ties were expected."""
     cells = np.floor(features.centre / radius)
     cell = np.unique(cells, axis=0, return_inverse=True)[1].ravel()
     first, last = time_spans(cell, features.gps_time)
@@ -110,16 +108,16 @@ def _noted(sentence):
     return Statement("on ties", "warning", {"sentence": sentence})
 
 
-def _unheld(estimate: Estimate, features: TieFeatures, ties: Ties) -> Iterator[Statement]:
+def _unconstrained(estimate: Estimate, features: TieFeatures, ties: Ties) -> Iterator[Statement]:
     """Yield statements on passes with a direction that neither ties nor common control
     constrain.
     """
     control = estimate.adjustment.observed
     first, last = time_spans(features.pass_number, features.gps_time)
 
-    for part, axis in unheld_directions(ties):
+    for part, axis in unconstrained_directions(ties):
         if np.median(np.diff(part.gps_time)) < SETTINGS.pause:  # of one pass: the POS constrains it
             continue
         spans = zip(first[part.pass_number[0]], last[part.pass_number[0]], strict=True)
         if not all(((control >= begin) & (control <= end)).any() for begin, end in spans):
-            yield _noted(unheld_sentence(part, axis))
+            yield _noted(unconstrained_sentence(part, axis))

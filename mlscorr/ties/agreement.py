@@ -92,7 +92,7 @@ def information(ties: Ties, group: np.ndarray) -> np.ndarray:
     return total
 
 
-def unheld_directions(ties: Ties) -> Iterator[tuple[Ties, np.ndarray]]:
+def unconstrained_directions(ties: Ties) -> Iterator[tuple[Ties, np.ndarray]]:
     """Yield the ties of each two passes that leave a shift along an axis (3,) open, with it.
 
     Intervals of time are judged separately, and reported if they are more than half of all. Drift
@@ -106,20 +106,20 @@ def unheld_directions(ties: Ties) -> Iterator[tuple[Ties, np.ndarray]]:
     ties : Ties
     """
     ties = ties[np.lexsort(ties.pass_number.T[::-1])]
-    stretch = group_by_time(ties, 0, SETTINGS.pause)
-    axis = np.linalg.eigh(information(ties, stretch))[1][stretch, :, 0]
+    interval = group_by_time(ties, 0, SETTINGS.pause)
+    axis = np.linalg.eigh(information(ties, interval))[1][interval, :, 0]
     along = np.einsum("ni,ni->n", ties.direction, axis)
     along = np.where(np.abs(along) > np.sin(SETTINGS.parallel), along, 0.0)
-    held = np.bincount(stretch, along**2 / ties.variance) * SETTINGS.least_gate**2
+    constraint = np.bincount(interval, along**2 / ties.variance) * SETTINGS.least_gate**2
     begins = np.flatnonzero(np.diff(ties.pass_number, axis=0, prepend=-1).any(axis=1))
     for begin, end in pairwise([*begins, len(ties)]):
-        is_unheld = held[stretch[begin:end]] < 1.0
-        if np.median(held[np.unique(stretch[begin:end])]) < 1.0:
-            part = ties[begin:end][is_unheld]
+        is_unconstrained = constraint[interval[begin:end]] < 1.0
+        if np.median(constraint[np.unique(interval[begin:end])]) < 1.0:
+            part = ties[begin:end][is_unconstrained]
             yield part, np.linalg.eigh(information(part, np.zeros(len(part), int))[0])[1][:, 0]
 
 
-def unheld_sentence(ties: Ties, axis: np.ndarray) -> str:
+def unconstrained_sentence(ties: Ties, axis: np.ndarray) -> str:
     """Return a sentence on two passes with an axis (3,) that their ties do not constrain.
 
     Parameters
@@ -152,9 +152,9 @@ def weigh_by_time(ties: Ties) -> Ties:
     factor = np.ones(len(ties))
     for side in (0, 1):
         group = group_by_time(ties, side, SURFACES.moment)
-        held = information(ties, group)[group]
-        held = np.einsum("ni,nij,nj->n", ties.direction, held, ties.direction)
-        factor = np.maximum(factor, held * SETTINGS.best_second**2)
+        precision = information(ties, group)[group]
+        precision = np.einsum("ni,nij,nj->n", ties.direction, precision, ties.direction)
+        factor = np.maximum(factor, precision * SETTINGS.best_second**2)
     return replace(ties, variance=ties.variance * factor)
 
 

@@ -21,13 +21,13 @@ class Votes:
         From the middle of the interval to its planes. Units: m.
     normal : (n, 3) array
         Mean of both.
-    misfit : (n,) array
+    misclosure : (n,) array
         Along the normal, earlier pass - interval. Units: m.
     """
 
     arm: np.ndarray
     normal: np.ndarray
-    misfit: np.ndarray
+    misclosure: np.ndarray
 
 
 def coarse_correction(features: TieFeatures, radius: float) -> np.ndarray:
@@ -60,14 +60,14 @@ def coarse_correction(features: TieFeatures, radius: float) -> np.ndarray:
         before = np.concatenate([order[:0], *(passes[i] for i in np.flatnonzero(near))])
         before = before[is_plane[before]]
         tree = cKDTree(features.centre[before] + correction[before])
-        stretch = np.floor(features.gps_time[rows] / SETTINGS.pause)
+        interval = np.floor(features.gps_time[rows] / SETTINGS.pause)
         times = []
         motions = []
         middles = []
-        for part in np.unique(stretch):
-            inside = rows[(stretch == part) & is_plane[rows]]
+        for part in np.unique(interval):
+            inside = rows[(interval == part) & is_plane[rows]]
             votes = _votes(features, inside, before, tree, radius)
-            if len(votes.misfit) >= SURFACES.feature_points:
+            if len(votes.misclosure) >= SURFACES.feature_points:
                 times.append((part + 0.5) * SETTINGS.pause)
                 motions.append(_motion(votes, radius))
                 middles.append(features.centre[inside].mean(axis=0))
@@ -90,7 +90,7 @@ def _edges(place, margin=0.0):
 
 
 def _votes(features, inside, before, tree, radius):
-    """The Votes of planes (k,) with those before, whose places the tree holds."""
+    """Votes of planes (k,) with those before, whose positions the tree contains."""
     limit = np.hypot(radius, SURFACES.cell)
     count = min(4 * SETTINGS.neighbours, len(before))
     if count == 0 or len(inside) == 0:
@@ -106,11 +106,11 @@ def _votes(features, inside, before, tree, radius):
     row = row[parallel]
     normal = (first + second)[parallel]
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    apart = tree.data[near] - features.centre[row]
-    misfit = np.einsum("ni,ni->n", normal, apart)
-    beside = np.linalg.norm(apart - misfit[:, None] * normal, axis=1) <= SURFACES.cell
+    difference = tree.data[near] - features.centre[row]
+    misclosure = np.einsum("ni,ni->n", normal, difference)
+    is_near = np.linalg.norm(difference - misclosure[:, None] * normal, axis=1) <= SURFACES.cell
     arm = features.centre[row] - features.centre[inside].mean(axis=0)
-    return Votes(arm[beside], normal[beside], misfit[beside])
+    return Votes(arm[is_near], normal[is_near], misclosure[is_near])
 
 
 def _motion(votes, radius):
@@ -121,10 +121,10 @@ def _motion(votes, radius):
     width = radius / 2
     while width > SURFACES.roughest:
         for _ in range(3):
-            left = votes.misfit - design @ motion
+            left = votes.misclosure - design @ motion
             weight = width**2 / (width**2 + left**2) ** 2  # Geman-McClure
             normal = (design.T * weight) @ design + np.diag(prior)
-            motion = np.linalg.solve(normal, design.T @ (weight * votes.misfit))
+            motion = np.linalg.solve(normal, design.T @ (weight * votes.misclosure))
         width /= 2
     return motion
 
@@ -139,9 +139,9 @@ def _most_votes(votes, radius):
     right = np.zeros(3)
     width = 2 * SURFACES.roughest
     for number in np.unique(bins):
-        misfit = (votes.misfit * sign)[bins == number]
+        misclosure = (votes.misclosure * sign)[bins == number]
         edges = np.arange(-radius - width, radius + 2 * width, width)
-        count = np.convolve(np.histogram(misfit, edges)[0], [1, 2, 1], "same")
+        count = np.convolve(np.histogram(misclosure, edges)[0], [1, 2, 1], "same")
         best = edges[np.argmax(count)] + width / 2
         weight = float(count.max() - np.median(count))
         normal = (votes.normal * sign[:, None])[bins == number].mean(axis=0)

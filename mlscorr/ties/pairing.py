@@ -63,10 +63,10 @@ def pair_features(
     pairs = pairs[_is_unique(present, features.centre + correction, sigma)[pairs].all(axis=1)]
     direction = np.add(*_directions(present, pairs))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    apart = np.diff((features.centre + correction)[pairs], axis=1)[:, 0]
-    along = np.einsum("ni,ni->n", apart, direction)
+    difference = np.diff((features.centre + correction)[pairs], axis=1)[:, 0]
+    along = np.einsum("ni,ni->n", difference, direction)
     is_pole = features.kind[pairs[:, 0]] == "pole"
-    across = np.maximum((apart**2).sum(axis=1) - along**2, 0.0)
+    across = np.maximum((difference**2).sum(axis=1) - along**2, 0.0)
     lever = np.where(is_pole, along**2, across)
     # each direction is transferred to the middle between both centers
     variance = features.variance[pairs].sum(axis=1) + lever * features.tilt[pairs].sum(axis=1) / 4
@@ -95,13 +95,13 @@ def _beyond_chance(features, search, pairs):
     widest = _largest_near(features.centre + correction, sigma, radius)
     variance = 2 * (widest**2 + features.variance + SETTINGS.surface_sigma**2)
     gate = np.minimum(radius, SETTINGS.gate_sigmas * np.sqrt(variance))
-    way = features.direction.copy()
+    displacement = features.direction.copy()
     is_pole = features.kind == "pole"
-    way[is_pole] = _across(way[is_pole])[0]
-    way *= 2 * gate[:, None]
+    displacement[is_pole] = _across(displacement[is_pole])[0]
+    displacement *= 2 * gate[:, None]
     here, *displaced = (
         _mutual(features, *candidate_pairs(features, correction, sigma, radius, s, pause))
-        for s in (None, way, -way)
+        for s in (None, displacement, -displacement)
     )
     is_chance = np.zeros(len(pairs), bool)
     for group in (_passes, _passes_and_direction):
@@ -128,12 +128,14 @@ def _is_unique(features, place, sigma):
     points = np.column_stack([place, 2 * edge * visit_number(features)])[painted]
     pairs = painted[cKDTree(points).query_pairs(edge, output_type="ndarray")]
     pairs = np.concatenate([pairs, pairs[:, ::-1]])
-    apart = np.diff(place[pairs], axis=1)[:, 0]
+    difference = np.diff(place[pairs], axis=1)[:, 0]
     first, second = _directions(features, pairs)
-    along = np.abs(np.einsum("ni,ni->n", apart, first))
-    beside = np.sqrt(np.maximum((apart**2).sum(axis=1) - along**2, 0.0))
+    along = np.abs(np.einsum("ni,ni->n", difference, first))
+    lateral_distance = np.sqrt(np.maximum((difference**2).sum(axis=1) - along**2, 0.0))
     like = (along > SURFACES.widest_paint) & (along <= width[pairs[:, 0]])
-    like &= (beside <= SURFACES.cell) & (features.kind[pairs[:, 0]] == features.kind[pairs[:, 1]])
+    like &= (lateral_distance <= SURFACES.cell) & (
+        features.kind[pairs[:, 0]] == features.kind[pairs[:, 1]]
+    )
     like &= np.einsum("ni,ni->n", first, second) >= np.cos(SETTINGS.parallel)
     unique[pairs[like, 0]] = False
     return unique
@@ -297,9 +299,9 @@ def visit_number(features: TieFeatures) -> np.ndarray:
     ----------
     features : TieFeatures
     """
-    stretch = np.floor(features.gps_time / SETTINGS.pause).astype(np.int64)
-    stretch -= stretch.min(initial=0)
-    key = features.pass_number * (stretch.max(initial=0) + 1) + stretch
+    interval = np.floor(features.gps_time / SETTINGS.pause).astype(np.int64)
+    interval -= interval.min(initial=0)
+    key = features.pass_number * (interval.max(initial=0) + 1) + interval
     return np.unique(key, return_inverse=True)[1]
 
 
@@ -391,12 +393,12 @@ def _distance(views, first, second, limits):
     length = np.sqrt(length)
     for axis in range(3):
         mean = direction[first, axis] + sign * direction[second, axis]
-        way = points[second, axis] - points[first, axis] + shift[second, axis]
-        along += way * (mean / length)
-        square += way**2
+        difference = points[second, axis] - points[first, axis] + shift[second, axis]
+        along += difference * (mean / length)
+        square += difference**2
     along = abs(along)
     across = np.sqrt(max(square - along**2, 0.0))
-    misfit, beside = (across, along) if kind == POLE else (along, across)
+    misclosure, lateral = (across, along) if kind == POLE else (along, across)
     known = variances[first] + variances[second]
     own = noise[first] + noise[second] + surface_variance
     gate = min(radius, sigmas * np.sqrt(known + own))
@@ -406,6 +408,6 @@ def _distance(views, first, second, limits):
     longer = np.sqrt(12.0) * abs(extent[first] - extent[second])
     sigma = 2.0 * np.sqrt(noise[first] + noise[second])
     unlike = kind == DASH and longer > sigmas * sigma
-    if unlike or misfit > gate or beside > edge:
+    if unlike or misclosure > gate or lateral > edge:
         return np.inf
-    return np.hypot(misfit / gate, beside / edge)
+    return np.hypot(misclosure / gate, lateral / edge)

@@ -1,4 +1,4 @@
-"""What targets can't determine is refused with numbers, and passes are no further targets."""
+"""Undetermined methods are refused with numbers, and passes count as no further targets."""
 
 import numpy as np
 import pytest

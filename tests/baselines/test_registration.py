@@ -65,7 +65,7 @@ def test_icp_comes_close_from_a_metre_away():
 
 
 def test_icp_says_loudly_that_it_failed():
-    "Where the POS drifts by a metre, ICP tells fitness and RMSE, and that it moved from control"
+    "With a POS drift of 1 m, ICP reports fitness and RMSE, and that it moved away from control"
     rng = np.random.default_rng(9)
     # alternately to the left and to the right: ICP takes partners on the wrong side
     case = icp_case(rng, lambda p, t: p + np.outer(np.sin((t - TIME) / 5.0), [1.0, 0.8, 0.3]))

@@ -63,7 +63,7 @@ def test_the_height_is_shifted_alone_where_targets_lie_on_a_line():
 @pytest.mark.long
 @pytest.mark.parametrize("seed", range(5))
 def test_a_constant_shift_is_removed_by_shift_rigid_and_collocation_alike(seed):
-    "Where the POS doesn't drift, collocation costs at most 2 mm against the right model"
+    "Without POS drift, collocation is at most 2 mm worse than the correct model"
     rng = np.random.default_rng(seed)
     place, time = targets(rng)
     noise = np.hypot(SIGMA, 0.001)

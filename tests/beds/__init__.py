@@ -1,1 +1,1 @@
-"""What several tests stand on."""
+"""Fixtures and data that several tests use."""

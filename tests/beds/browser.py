@@ -23,7 +23,7 @@ def need_browser():
 
 
 def browse(folder, wrapper):
-    "What run() in the last script of a wrapper page finds, as text, and the lines of the console"
+    "Text that run() in the last script of a wrapper page returns, and the lines of the console"
     path = folder / "wrapper.html"
     path.write_text(wrapper + ENDING, encoding="utf-8")
     command = [

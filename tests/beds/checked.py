@@ -1,4 +1,4 @@
-"""What check and correct say of one survey."""
+"""Sentences of check and correct about one survey."""
 
 import warnings
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""Whether docs/documents.md says what stands in a JSON document."""
+"""Comparison of docs/documents.md with the keys of a JSON document."""
 
 import re
 

@@ -81,7 +81,7 @@ def bed():
 
 @dataclass(frozen=True)
 class OthersFolder:
-    """How a folder is made, and what is true of it.
+    """Folder as others make it, with its true properties.
 
     ``sentence``: what init says, None where it needs nothing; ``given`` and ``mend``: what that
     sentence asks for; ``clouds``: names of what is corrected; ``control`` points that are used;
@@ -594,7 +594,7 @@ def started(case, folder):
 
 
 def check_result(case, survey, out):
-    "That correct gives what is expected; ties take too long here"
+    "Check that correct gives the expected result; ties take too long here"
     with warnings.catch_warnings(action="ignore"):
         report = mlscorr.correct(mlscorr.read_survey(survey), ties="off").write(out, page=False)
     names = sorted(file["name"] for file in report["files"])
@@ -605,7 +605,7 @@ def check_result(case, survey, out):
 
 
 def check_verdicts(case, survey, out):
-    "That check passes what correct corrects, and finds the fault that correct refuses"
+    "Check that check passes what correct corrects, and finds the fault that correct refuses"
     if case.fault is None:
         with warnings.catch_warnings(action="ignore"):
             checked = mlscorr.check(survey)
@@ -618,7 +618,7 @@ def check_verdicts(case, survey, out):
 
 
 def outcome(case, place):
-    "What comes out of a folder: a result, a sentence and then a result, or what is wrong"
+    "Outcome of a folder: a result, a sentence and then a result, or the fault"
     try:
         survey = started(case, place / case.name)
         check_verdicts(case, survey, place / f"{case.name} out")

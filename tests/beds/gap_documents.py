@@ -305,7 +305,7 @@ def plan_document(**changes):
 
 
 def too_little():
-    "What is left of a document when nothing could be compared"
+    "Document of a survey in which nothing could be compared"
     empty = gap_document()
     gap = {"before": None, "after": None, "unit": "mm", "null_band": [None, None]}
     verdict = {"label": "none", "probability": None, "set": [], "p_value": None, "same": []}

@@ -13,7 +13,7 @@ from mlscorr.pipeline.finding import find_or_compare_surfaces
 
 @dataclass(frozen=True)
 class Read:
-    "What one reading of a survey's clouds gives"
+    "Data from one reading of a survey's clouds"
 
     finding: MatchedTargets
     patches: Patches

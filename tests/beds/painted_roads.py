@@ -38,7 +38,7 @@ def turned(places, azimuth):
 
 
 def on_paint(x, y):
-    "Whether places along and to the left of the middle line are painted"
+    "Flags of places, along and to the left of the middle line, that are painted"
     dashed = (np.abs(y) < WIDTH / 2) & (x % (DASH + GAP) < DASH)
     return dashed | (np.abs(y - EDGE) < WIDTH / 2)
 

@@ -1,4 +1,4 @@
-"""Where the parts of the project lie."""
+"""Folders of the parts of the project."""
 
 import sys
 from pathlib import Path

@@ -105,7 +105,7 @@ def share_tiles(folder):
 
 
 def error(rows):
-    "What the second drive's record is off (n, 3). Units: m"
+    "Error (n, 3) of the second drive's trajectory. Units: m"
     return np.broadcast_to(SHIFT, (len(rows), 3))
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mlscorr.correction import Correction
-from mlscorr.estimate import REASONS, Support, WeakStretch
+from mlscorr.estimate import REASONS, Support, WeakInterval
 from mlscorr.evaluate import Score, Statistics, TargetRow
 from mlscorr.frames import attitude_from_angles
 from mlscorr.report import CorrectionReport, Coverage, FileRow, write_report
@@ -135,8 +135,8 @@ def report_of(trajectory, rows):
     size = 0.09
     ends = trajectory.gps_time[[0, -1]]
     weak = (
-        WeakStretch(ends[0], first, SPEED * (first - ends[0]), size, REASONS[2]),
-        WeakStretch(last, ends[1], SPEED * (ends[1] - last), size, REASONS[3]),
+        WeakInterval(ends[0], first, SPEED * (first - ends[0]), size, REASONS[2]),
+        WeakInterval(last, ends[1], SPEED * (ends[1] - last), size, REASONS[3]),
     )
     if len(trajectory.gaps):
         longest = float(np.ptp(trajectory.gaps))

@@ -30,7 +30,7 @@ class ScannerSite:
     ties: Ties
 
     def of(self, number):
-        "What a scanner by itself saw, as of the only one"
+        "Observations of one scanner, as if it were the only one"
         own = self.matched[self.matched.scanner == number]
         ties = self.ties[(self.ties.scanner == number).all(axis=1)]
         matched = replace(own, scanner=np.zeros(len(own), int))

@@ -1,4 +1,4 @@
-"""Where the data for the tests lies that is not part of the repository."""
+"""Location of test data that is not part of the repository."""
 
 import os
 from pathlib import Path

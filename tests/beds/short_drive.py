@@ -67,7 +67,7 @@ def run(name=None):
 
 
 def survey_of(simulated):
-    "What is recorded, as a Survey without files"
+    "Recorded data as a Survey without files"
     targets = simulated.targets
     is_check = simulated.is_check
 
@@ -120,7 +120,7 @@ def observations(simulated, cloud, target):
 
 
 def in_simulation(clean, name):
-    "How the target rows change when the full simulator has the effect"
+    "Change of the target rows when the full simulator has the effect"
     _, rows, cloud, points = clean
     simulated, changed, _ = run(name)
     assert len(changed) == len(cloud)

@@ -6,7 +6,7 @@ import numpy as np
 
 from mlscorr.correction import Correction
 from mlscorr.estimate import TieResiduals
-from mlscorr.evaluate import misfit_section
+from mlscorr.evaluate import tie_residual_section
 from mlscorr.survey import Trajectory
 from tests.beds.reports import fabricate
 from tests.beds.tied_passes import tied_passes
@@ -31,7 +31,7 @@ def tied_report(wrong=0.0, sufficient=3):
 def section(residuals, sufficient=3):
     "The section of report.json on ties; a fifth of what is known comes from control points"
     return {
-        **misfit_section(residuals),
+        **tie_residual_section(residuals),
         "share": {"control": 0.2, "plane": 0.8, "pole": 0.0},
         "sufficient_control": sufficient,
     }

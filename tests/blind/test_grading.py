@@ -1,4 +1,4 @@
-"""What grades the diagnosis is opened by nothing that sets it."""
+"""Nothing that sets the diagnosis opens the data that grade it."""
 
 import ast
 import re
@@ -91,6 +91,6 @@ def test_every_way_to_the_grading_half_is_seen(text):
 
 
 def test_the_training_half_is_open_to_all():
-    "What trains may be imported by its name, and a command may be spoken of"
+    "Training mechanisms may be imported by name, and texts may mention a command"
     assert not opened("from mlscorr.simulate import training_mechanisms, described")
     assert not opened("'as `mlscorr blind score` has written'")

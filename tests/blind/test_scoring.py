@@ -159,7 +159,7 @@ def test_a_diagnosis_that_gave_up_is_never_right():
 
 
 def test_the_goals_are_those_of_the_manual():
-    "What the table of the manual calls goals is what a score is held to"
+    "Scores are compared with the goals in the table of the manual"
     cases = [(label("clean"), answer("none")), (label("noise", "range_noise"), answer("none"))]
     cases += [(label("single", "range_bias"), answer("range_bias"))] * 2
     rows, _ = scored(*cases)

@@ -326,7 +326,7 @@ def test_a_cloud_that_has_sigmas_is_refused_before_its_points_are_read(survey):
 
 
 def test_files_of_an_earlier_run_are_named(tmp_path, capsys):
-    "What --overwrite leaves as it was, in folders too; what is written anew is not named"
+    "Files that --overwrite leaves unchanged are named, in folders too; rewritten ones are not"
     for name in ("out.sbet", "smrmsg_out.out", "out.tum", "new.json"):
         (tmp_path / name).write_text("old")
     (tmp_path / "pictures").mkdir()
@@ -443,7 +443,7 @@ def test_an_output_folder_that_cannot_be_is_refused(out, arguments, code, words,
     ids=" ".join,
 )
 def test_wrong_usage_is_code_2(arguments, survey):
-    "What cannot be understood does nothing"
+    "Unknown commands and options have no effect"
     process = mlscorr(*arguments, cwd=survey)
     assert process.returncode == 2
     assert "Traceback" not in process.stderr
@@ -561,7 +561,7 @@ def interrupt(survey, number, wait):
 
 
 def is_written(folder):
-    "Whether something of the corrected cloud lies beside the output folder"
+    "True if part of the corrected cloud is in a temporary folder next to the output"
     try:
         return any(folder.glob(".out.*.part/*"))
     except FileNotFoundError:  # a folder that was made to try the place, and removed meanwhile

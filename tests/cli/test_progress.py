@@ -10,7 +10,7 @@ from mlscorr.cli.progress import progress_bars
 
 
 def test_each_stage_has_a_line_with_its_time(monkeypatch, capsys):
-    "Where stderr is no terminal, a stage that takes long enough to matter is one line at its end"
+    "If stderr is no terminal, a stage that takes long enough is one line at its end"
     monkeypatch.setattr(progress, "PATIENCE", 0.05)
     with progress_bars() as begin:
         begin("Reading the cloud", 100)(100)
@@ -26,7 +26,7 @@ def test_each_stage_has_a_line_with_its_time(monkeypatch, capsys):
 
 
 def compile_loops(number, seconds):
-    "What numba announces when it compiles loops"
+    "Emit the events of numba when it compiles loops"
     with progress_bars():
         for _ in range(number):
             with trigger_event("numba:compile"):
@@ -44,7 +44,7 @@ def test_compiled_loops_are_announced_once_with_their_share(monkeypatch, capsys)
 
 
 def bars(monkeypatch, capsys, work):
-    "What a terminal shows at the end of some work"
+    "Output of a terminal at the end of some work"
     monkeypatch.setattr(progress, "PATIENCE", 0.0)
     monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
     with progress_bars() as begin:

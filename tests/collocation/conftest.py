@@ -1,4 +1,4 @@
-"""How all tests of the collocation run."""
+"""Settings common to all tests of the collocation."""
 
 import pytest
 from threadpoolctl import threadpool_limits

@@ -14,7 +14,7 @@ AXES = np.eye(3)
 
 
 def turned(rows, lever):
-    "What rows (n, r, 3) see of position and rotation at points with a lever (n, 3)"
+    "Partials of rows (n, r, 3) by position and rotation at points with a lever arm (n, 3)"
     return np.concatenate([rows, np.cross(lever[:, None], rows)], axis=2)
 
 

@@ -210,7 +210,7 @@ def test_observations_without_noise_are_predicted_back():
 @pytest.mark.long
 @pytest.mark.parametrize("family", FAMILIES)
 def test_stated_covariances_are_those_of_the_errors(family):
-    """Where the model is right the normalised prediction errors are chi-squared.
+    """With the correct model the normalized prediction errors are chi-squared.
 
     The signals are drawn from the model itself: this tests algebra, not realism. 300 surveys,
     each with 4 x 5 predicted values; the mean statistic within 0.6 of 4 (eight standard
@@ -291,7 +291,7 @@ def test_origin_of_time_and_order_of_observations_do_not_matter():
 
 
 def test_prediction_in_parts_equals_the_whole():
-    "How many epochs are predicted at once changes nothing"
+    "The prediction does not depend on the number of epochs predicted at once"
     case = Case(5, asked=50)
     solved = case.solve()
     whole = solved.predict(case.asked, case.asked_design, case.asked_mixing)

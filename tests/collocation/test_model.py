@@ -134,7 +134,7 @@ def test_rows_that_alone_carry_a_column_determine_it():
 
 
 def test_without_a_trend_any_row_can_go():
-    "Where there is no column nothing has to be determined"
+    "Without columns nothing must be determined, so any row can be left out"
     case = Passes(7)
     case.design = case.design[:, :, :0]
     solved = case.solve()

@@ -26,7 +26,7 @@ def test_a_block_is_one_of_the_matrix(seed, size):
 
 
 def test_separate_and_common_parts_are_all_of_it():
-    "What epochs have alone, and U U^T of what they share, sum to the whole"
+    "The noise of each epoch and the shared U U^T sum to the whole covariance"
     noise = noise_of(3)
     separate = np.zeros((8, 3, 8, 3))
     separate[np.arange(8), :, np.arange(8)] = noise.separate

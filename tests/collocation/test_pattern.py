@@ -15,7 +15,7 @@ def random_graph(seed, count=25):
 
 
 def filled(place, edges):
-    "Which blocks of the lower triangle hold something after elimination, by the definition"
+    "Blocks of the lower triangle that are nonzero after elimination, by the definition"
     count = len(place)
     full = np.eye(count, dtype=bool)
     for a, b in place[edges]:
@@ -27,7 +27,7 @@ def filled(place, edges):
 
 
 def places(pattern, i, j):
-    "Where the values (a, b) of block (i, j) stand"
+    "Positions of the values (a, b) of block (i, j)"
     rows, columns = (np.arange(n) for n in np.diff(pattern.first)[[i, j]])
     return locate(pattern, i, j) + rows[:, None] * panel_width(pattern, j) + columns
 

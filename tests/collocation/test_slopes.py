@@ -40,11 +40,11 @@ def test_the_likelihood_changes_with_the_sigma_of_the_trend():
     "With coefficients believed a thousandth larger it changes as two solutions differ"
     street = Street("matern32", 40.0)
     parameters = street.rows[0].design.shape[2]
-    believed = np.eye(parameters, parameters + 1) / 0.2
-    solved = collocate_rows_dense(street.rows, believed)
-    given = street.rows, [street.rows] * 2, [believed / 1.001, believed]
+    prior_rows = np.eye(parameters, parameters + 1) / 0.2
+    solved = collocate_rows_dense(street.rows, prior_rows)
+    given = street.rows, [street.rows] * 2, [prior_rows / 1.001, prior_rows]
     change, none = likelihood_changes(solved, *given)
-    difference = collocate_rows_dense(street.rows, believed / 1.001).log_likelihood
+    difference = collocate_rows_dense(street.rows, prior_rows / 1.001).log_likelihood
     difference -= solved.log_likelihood
     assert abs(difference) > 1e-5 and none == 0.0
     assert change == pytest.approx(difference, rel=0.01)

@@ -31,7 +31,7 @@ ALL_FAMILIES = (*FAMILIES, INTEGRATED)
 
 @dataclass(frozen=True)
 class Solver:
-    "How close a solver comes to the dense formula, in units of signals of 1 m"
+    "Solver with its tolerance against the dense formula, for signals of 1 m"
 
     solve: callable
     mean: float  # m
@@ -41,16 +41,16 @@ class Solver:
     left_out: float  # of itself
 
 
-def by_recursion(rows, believed=None):
+def by_recursion(rows, prior_rows=None):
     "Rows of one epoch each, and a few of two, filtered forward and backward in time"
-    solved = collocate_rows(rows, believed=believed)
+    solved = collocate_rows(rows, prior_rows=prior_rows)
     assert isinstance(solved.solver, MarkovSolver)
     return solved
 
 
-def by_knots(rows, believed=None):
+def by_knots(rows, prior_rows=None):
     "Rows of any epochs, in information form between knots"
-    return collocate_by_knots(rows, believed=believed)
+    return collocate_by_knots(rows, prior_rows=prior_rows)
 
 
 SOLVERS = {
@@ -66,7 +66,7 @@ class Case:
 
     rows: list
     asked: tuple
-    believed: np.ndarray | None = None
+    prior_rows: np.ndarray | None = None
 
 
 def random_survey(seed, families=None):
@@ -197,8 +197,8 @@ def test_a_solver_gives_what_the_dense_formula_gives(solver, name):
     "Trend, likelihood, weights, prediction and its covariance, and misclosures left out"
     case = (OF_ONE_EPOCH | CONTRADICTED | LINKED | STEPPED)[name]()
     solver = SOLVERS[solver]
-    solved = solver.solve(case.rows, case.believed)
-    expected = collocate_rows_dense(case.rows, case.believed)
+    solved = solver.solve(case.rows, case.prior_rows)
+    expected = collocate_rows_dense(case.rows, case.prior_rows)
     assert solved.log_likelihood == pytest.approx(
         expected.log_likelihood, rel=solver.likelihood / 10, abs=solver.likelihood
     )

@@ -122,7 +122,7 @@ def test_there_is_no_sigma_outside_the_trajectory_nor_in_a_gap():
 
 
 def test_a_trajectory_without_sigmas_is_refused():
-    "Where nothing is known of the pose nothing is said of the points"
+    "Points have no sigma if the poses have none"
     trajectory = drive(sigmas=False)
     with pytest.raises(ValueError, match="sigmas of position and attitude; this one has none"):
         PointSigma.of(Correction(trajectory, trajectory), NOISELESS)

@@ -127,7 +127,7 @@ def zero(name):
 
 
 def applied(name, seed=0):
-    "What a small effect makes of its stage's value"
+    "Value of the stage after a small effect"
     effect = make_effect(name, **SMALL[name])
     return effect.apply(VALUES[effect.stage], REFERENCE, np.random.default_rng(seed))
 
@@ -137,7 +137,7 @@ def beam(angle):
 
 
 def place(returns=RETURNS, trajectory=TRAJECTORY, mounting=MOUNTING):
-    "Where the pulses lie in the map, by Eq. 1"
+    "Positions of the pulses on the map, by Eq. 1"
     scanner_xyz = returns.range[:, None] * beam(returns.angle)
     return georeference(trajectory, mounting, scanner_xyz, returns.gps_time)
 

@@ -64,7 +64,7 @@ class Case:
 
     @property
     def share(self):
-        "How much of its pass has gone by at each return, from 0 to 1"
+        "Share of its pass that has elapsed at each return, from 0 to 1"
         whole = self.trajectory
         number = whole.segment(self.returns.gps_time)
         start = np.append(whole.gps_time[0], whole.gaps[:, 1])[number]

@@ -1,4 +1,4 @@
-"""What the code of a user's own effect does wrong is said with its file and line."""
+"""Errors in the code of a user's own effect are reported with its file and line."""
 
 import sys
 from dataclasses import dataclass, replace
@@ -80,7 +80,7 @@ def test_nothing_is_written_into_what_was_recorded():
 
 
 def test_columns_that_stay_are_the_same_ones():
-    "Who compares before and after by identity sees which changed; what was nowhere met may stay so"
+    "A comparison by identity shows the changed columns; a column without any change may stay"
     value = returns()
     changed = applied(lambda given: replace(given, gps_time=given.gps_time + 1.0), value)
     np.testing.assert_array_equal(changed.gps_time, value.gps_time + 1.0)

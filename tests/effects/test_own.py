@@ -35,7 +35,7 @@ class Own(Effect):
 
 @pytest.fixture(autouse=True)
 def forgotten(monkeypatch):
-    "What a test registers is forgotten after it"
+    "Remove the effects that a test registered, after it"
     monkeypatch.setattr(catalogue, "_registered", {})
 
 

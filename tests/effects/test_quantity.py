@@ -1,4 +1,4 @@
-"""What no survey can have is refused."""
+"""Quantities that no survey can have are refused."""
 
 import numpy as np
 import pytest

@@ -15,7 +15,7 @@ VALUES |= {"pos": Trajectory, "control": ControlPoints}
 
 @pytest.mark.parametrize("stage, field", [pair for pair in STAGES.items() if pair[1] is not None])
 def test_a_stage_names_a_field_of_its_value(stage, field):
-    "What an error adds to is there: time, range, angle, position"
+    "The field to which errors are added exists: time, range, angle, position"
     assert field in {each.name for each in fields(VALUES[stage])}
 
 

@@ -1,4 +1,4 @@
-"""What several tests of the estimate stand on."""
+"""Fixtures that several tests of the estimate use."""
 
 import pytest
 

@@ -161,8 +161,8 @@ def test_a_step_adds_three_to_the_redundancy():
     solved = complete.solve(objective.parameters("matern32", objective.initial))
     squares = (solved.misclosure - solved.design @ solved.trend) @ solved.weights
     assert len(solved.misclosure) == 3 * N + 3
-    believed, mean = solved.believed[:, :-1], solved.believed[:, -1]
-    squares += np.sum((believed @ solved.trend - mean) ** 2)
+    prior_rows, mean = solved.prior_rows[:, :-1], solved.prior_rows[:, -1]
+    squares += np.sum((prior_rows @ solved.trend - mean) ** 2)
     redundancy = 3 * N + 3 + 6 - solved.design.shape[1]
     assert solved.sigma0 == pytest.approx(np.sqrt(squares / redundancy), rel=1e-9)
 
@@ -174,8 +174,8 @@ def test_the_solution_is_the_dense_one(family):
     objective = Objective.of(complete)
     parameters = objective.parameters(family, objective.initial)
     solved = complete.solve(parameters)
-    believed = complete.believed(parameters)
-    expected = collocate_rows_dense(complete.rows(parameters), believed)
+    prior_rows = complete.prior_rows(parameters)
+    expected = collocate_rows_dense(complete.rows(parameters), prior_rows)
     np.testing.assert_allclose(solved.trend, expected.trend, atol=1e-7)
     np.testing.assert_allclose(solved.weights, expected.weights, rtol=1e-6, atol=1e-4)
     assert solved.log_likelihood == pytest.approx(expected.log_likelihood, abs=1e-6)
@@ -191,8 +191,8 @@ def test_few_rows_with_ties_are_weighed_as_they_are_solved():
     for family in (*FAMILIES, INTEGRATED):
         parameters = objective.parameters(family, objective.initial)
         weighed = few.weigh(parameters)
-        believed = few.believed(parameters)
-        solved = collocate_rows(few.rows(parameters), believed=believed)
+        prior_rows = few.prior_rows(parameters)
+        solved = collocate_rows(few.rows(parameters), prior_rows=prior_rows)
         assert weighed.log_likelihood == pytest.approx(solved.log_likelihood, abs=0.01)
 
 
@@ -225,13 +225,13 @@ def test_what_is_known_of_unknowns_is_no_row_but_a_belief():
     wider = ADJUSTMENT.with_unknowns(columns, mean, sigma)
     assert wider.unknowns == 2 and len(wider.rows(None)) == 1
     row = np.append(np.eye(8)[0], 0.3) / 0.02
-    np.testing.assert_allclose(wider.believed(None), row[None])
+    np.testing.assert_allclose(wider.prior_rows(None), row[None])
     objective = Objective.of(wider)
     parameters = objective.parameters("matern32", objective.initial)
-    believed = wider.believed(parameters)
-    np.testing.assert_allclose(believed[0], row)
-    np.testing.assert_allclose(believed[1:, 2:8], np.eye(6) / parameters.trend_sigma)
-    assert not believed[1:, :2].any() and not believed[1:, -1].any()
+    prior_rows = wider.prior_rows(parameters)
+    np.testing.assert_allclose(prior_rows[0], row)
+    np.testing.assert_allclose(prior_rows[1:, 2:8], np.eye(6) / parameters.trend_sigma)
+    assert not prior_rows[1:, :2].any() and not prior_rows[1:, -1].any()
 
 
 def test_unknowns_that_come_later_leave_what_is_believed_of_others():
@@ -244,6 +244,6 @@ def test_unknowns_that_come_later_leave_what_is_believed_of_others():
     for number in range(2):
         only = slice(number, number + 1)
         in_turn = in_turn.with_unknowns({TARGET: columns[:, :, only]}, mean[only], sigma[only])
-    np.testing.assert_array_equal(in_turn.believed(None), at_once.believed(None))
+    np.testing.assert_array_equal(in_turn.prior_rows(None), at_once.prior_rows(None))
     expected = at_once.solve(None)
     np.testing.assert_allclose(in_turn.solve(None).trend, expected.trend, atol=1e-9)

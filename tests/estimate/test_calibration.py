@@ -1,4 +1,4 @@
-"What a calibrated mounting says of itself."
+"Statements of a calibrated mounting"
 
 from dataclasses import replace
 
@@ -31,7 +31,7 @@ def test_what_is_not_determined_is_named_with_its_sigma(calibration):
     "A level way driven in both directions hides the lever arm up, and the warning names it alone"
     assert calibration.determined.tolist() == [True, True, False, True, True, True]
     sigma = f"lever arm up (sigma {calibration.lsc.sigma[2]:.3f} m)"
-    assert f"does not determine {sigma}:" in calibration.warnings[0]
+    assert f"does not determine {sigma}." in calibration.warnings[0]
 
 
 def test_a_lever_arm_that_lacks_something_forward_may_be_a_clock(calibration):

@@ -153,19 +153,19 @@ def test_a_mounting_moves_targets_as_its_columns_say():
 
 
 def test_a_mounting_is_weakly_known():
-    "What was corrected already is believed to be needed back, with the sigmas of no measurement"
+    "Without measurements, an earlier correction is assumed to be reversed, with weak sigmas"
     case, position = mounting_case()
     corrected = np.array([0.1, -0.2, 0.3, 0.01, 0.02, -0.03])
     adjustment = mounting_adjustment(position, case.matched, [MOUNTING], corrected, WEAK)
     assert [factor.kind for factor in adjustment.factors] == [TARGET, PRIOR]
     expected = np.column_stack([np.eye(6), -corrected]) / WEAK[:, None]
-    np.testing.assert_allclose(adjustment.believed(None), expected, rtol=1e-12)
+    np.testing.assert_allclose(adjustment.prior_rows(None), expected, rtol=1e-12)
     assert len(adjustment.solve(None).misclosure) == 18
     assert not adjustment.pose_design(case.recorded.gps_time[:4]).any()
 
 
 def test_a_site_without_targets_leaves_the_mounting_as_it_was():
-    "Where targets say next to nothing the estimate is minus what was corrected, with weak sigmas"
+    "With few targets the estimate is minus the earlier correction, with weak sigmas"
     case, position = mounting_case()
     vague = np.tile(1e6 * np.eye(3), (6, 1, 1))
     matched = replace(case.matched, observations=replace(case.observations, covariance=vague))
@@ -240,7 +240,7 @@ def test_another_kind_of_control_is_solved_with_the_others(with_heights):
     assert both.rows_of("height").tolist() == list(range(size, size + 40))
     assert np.array_equal(both.rows_of(TARGET), alone.rows_of(TARGET))
     solved = both.solve(parameters)
-    expected = collocate_rows_dense(both.rows(parameters), both.believed(parameters))
+    expected = collocate_rows_dense(both.rows(parameters), both.prior_rows(parameters))
     asked = pose_rows(both, parameters, np.arange(5, len(both.trajectory), 50))
     pose, spread = solved.predict(*asked)
     dense, dense_spread = expected.predict(*asked)
@@ -271,7 +271,7 @@ def test_a_likelihood_changes_smoothly_with_any_kind_of_control(with_heights):
     near = [replace(parameters, drift_scale=(1.0 + h) * parameters.drift_scale) for h in (1e-3, 0)]
     fast = both.likelihoods(near, parameters, both.weigh(parameters))
     dense = [
-        collocate_rows_dense(both.rows(each), both.believed(each)).log_likelihood for each in near
+        collocate_rows_dense(both.rows(each), both.prior_rows(each)).log_likelihood for each in near
     ]
     assert fast[0] - fast[1] == pytest.approx(dense[0] - dense[1], rel=0.01)
 

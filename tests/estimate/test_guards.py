@@ -1,4 +1,4 @@
-"""What control points can't tell is said, with times and numbers."""
+"""Statements on parameters that control points do not determine, with times and numbers."""
 
 from types import SimpleNamespace
 
@@ -122,7 +122,7 @@ def test_without_redundancy_there_is_no_global_test():
 
 
 def test_the_global_test_is_that_of_least_squares_without_signals():
-    "Where all the variance is noise it is the weighted sum of squares of all redundant misclosures"
+    "With noise only, it is the weighted sum of squares of all redundant misclosures"
     adjustment = smooth_case(13, n=7).adjustment()
     test = _global_test(adjustment, None)
     assert test.redundancy == pytest.approx(3 * 7 - 3 * (adjustment.order + 1))

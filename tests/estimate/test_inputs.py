@@ -111,7 +111,7 @@ def test_zeros_everywhere_are_no_column(column):
 
 @pytest.mark.parametrize("axis", range(3))
 def test_one_axis_of_zero_is_filled_with_the_others(axis):
-    "Where height alone is zero the whole epoch is taken from beside"
+    "If only the height sigma is zero, the whole epoch is filled from its neighbors"
     sigma = np.full((len(EPOCHS), 3), 0.03)
     sigma[100:105, axis] = 0.0
     filled, (note,) = checked(sigma)

@@ -7,9 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from mlscorr.estimate import (
-    believed_mounting,
     calibration_with_ties,
     estimate_mounting,
+    prior_mounting,
     with_scanner_errors,
 )
 from mlscorr.frames import scanner_position
@@ -52,7 +52,7 @@ def alone(sites):
 
 
 def test_sentences_of_two_mountings_are_those_that_both_share(joint):
-    "What this geometry can't tell of a mounting stands with the calibration of that scanner"
+    "Undetermined parameters of one mounting are stated in the calibration of that scanner"
     for calibration in joint:
         assert calibration.warnings == calibration.shared_warnings
         assert not calibration.determined.all()
@@ -74,7 +74,7 @@ def test_one_scanner_beside_the_other_is_found_to_millidegrees(joint):
     turn = (turns[1] * turns[0].inv()).as_rotvec()
     truth = np.append(LACKS[1, :3] - LACKS[0, :3], turn)
     for calibration in joint:
-        lacks, sigma = calibration.lsc.beside_first(1)
+        lacks, sigma = calibration.lsc.relative_to_first(1)
         error = np.abs(lacks - truth)
         assert (error < 3 * sigma).all()
         assert (UNITS * error < np.repeat([1e-3, 3e-3], 3)).all()
@@ -87,7 +87,7 @@ def test_together_they_are_better_than_alone(joint, alone):
     errors = {"joint": [], "alone": []}
     for both, parts in zip(joint, alone, strict=True):
         sigma = np.sqrt(sum(part.lsc.sigma**2 for part in parts))
-        assert (both.lsc.beside_first(1)[1] < np.repeat([0.5, 0.9], 3) * sigma).all()
+        assert (both.lsc.relative_to_first(1)[1] < np.repeat([0.5, 0.9], 3) * sigma).all()
         for name, estimates in (
             ("joint", both.lsc.correction.reshape(2, 6)),
             ("alone", np.array([part.lsc.correction for part in parts])),
@@ -133,10 +133,10 @@ def test_planes_that_both_saw_on_one_pass_tell_the_one_beside_the_other_alone(si
     site = sites[0]
     none = site.matched[[]]
     ties = site.ties[site.ties.scanner[:, 0] != site.ties.scanner[:, 1]]
-    start = believed_mounting(site.trajectory, RECORDED, none)
+    start = prior_mounting(site.trajectory, RECORDED, none)
     both = calibration_with_ties(start, none, ties)
     assert not both.determined[[2, 8]].any()
-    _, sigma = both.lsc.beside_first(1)
+    _, sigma = both.lsc.relative_to_first(1)
     assert (sigma < np.repeat([0.005, np.radians(0.01)], 3)).all()
     assert (both.lsc.sigma.reshape(2, 6)[:, :3] > 0.05).all()  # m
 

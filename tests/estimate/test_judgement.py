@@ -89,7 +89,7 @@ def test_two_lone_deviations_of_twenty_are_blunders_rather():
 
 
 def test_a_target_beside_one_that_is_right_is_wrong():
-    "What was seen within a second drifted with it: a lone deviation there is no drift"
+    "Observations within a second share their drift: a lone deviation there is no drift"
     times = np.sort(np.append(even(20)[:-1], even(20)[1:18:4] + 0.6))
     case, _ = bumped_case(0, times)
     names = []

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 import mlscorr
 from mlscorr.effects import make_effect
-from mlscorr.estimate import believed_mounting, estimate_mounting
+from mlscorr.estimate import estimate_mounting, prior_mounting
 from mlscorr.estimate.mounting import prior_sigma
 from mlscorr.evaluate import misclosures
 from mlscorr.frames import (
@@ -388,7 +388,7 @@ def test_sigmas_without_a_correlation_were_measured():
 
 @pytest.mark.parametrize("correlation", [False, True])
 def test_a_changed_part_leaves_no_sigma_of_the_one_before(correlation, tmp_path):
-    "What a tape measured of the other part holds; a calibration's sigmas go with either"
+    "The other part keeps a measured sigma; sigmas of a calibration are dropped with either part"
     old = tmp_path / "survey.toml"
     new = tmp_path / "new.toml"
     lines = "lever_arm_sigma = [0.01, 0.01, 0.01]\nboresight_sigma = [0.1, 0.1, 0.1]\n"
@@ -589,7 +589,7 @@ def test_no_target_makes_a_mounting_worse_than_it_is_without_any(count):
     One target leaves nothing to judge the noise by: what is stated of it holds.
     """
     site = Site(5)
-    estimate = believed_mounting(site.recorded, [RECORDED], site.matched[np.arange(count)]).ls
+    estimate = prior_mounting(site.recorded, [RECORDED], site.matched[np.arange(count)]).ls
     assert (estimate.sigma <= prior_sigma(RECORDED) * (1 + 1e-9)).all()
     assert np.allclose(estimate.covariance, estimate.covariance.T)
     assert (np.linalg.eigvalsh(estimate.covariance) > 0.0).all()

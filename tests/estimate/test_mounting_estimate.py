@@ -1,4 +1,4 @@
-"What recorded mountings lack, together and each by itself."
+"Corrections of recorded mountings, together and each by itself"
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ def estimate():
 
 def test_what_both_have_in_common_is_no_part_of_the_difference(estimate):
     "The sigma of one beside the other is that of what each lacks by itself, of both together"
-    lacks, sigma = estimate.beside_first(1)
+    lacks, sigma = estimate.relative_to_first(1)
     assert np.allclose(sigma, np.sqrt(2) * OWN, rtol=1e-6)
     assert np.allclose(lacks[:3], LACKS[1, :3] - LACKS[0, :3])
     moved = corrected_mountings(RECORDED, LACKS.ravel())

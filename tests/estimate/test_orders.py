@@ -61,7 +61,7 @@ def test_orders_and_families_are_set_side_by_side():
 
 @pytest.mark.long
 def test_a_shift_needs_no_slope():
-    "Where only a constant is wrong, order 0 is more probable than order 1"
+    "With a constant error, order 0 is more probable than order 1"
     rng = np.random.default_rng(5)
     stated = np.full((len(EPOCHS), 3), 0.01)
     estimate = Case(EPOCHS, CONSTANT, even(12), rng, stated).estimate()

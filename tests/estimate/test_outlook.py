@@ -1,4 +1,4 @@
-"""What further targets would leave of the variance along a drive."""
+"""Remaining variance along a drive after further targets."""
 
 from dataclasses import replace
 

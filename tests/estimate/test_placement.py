@@ -1,4 +1,4 @@
-"""Where the next control point belongs, and that it does what is promised of it."""
+"""Best position of the next control point, and the sigma it is promised to give."""
 
 from dataclasses import replace
 

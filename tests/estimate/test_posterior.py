@@ -55,7 +55,7 @@ def test_parameters_and_logarithms_are_each_others_inverse(objective):
 
 
 def test_fixed_parameters_stay_at_their_start(objective):
-    "Those that are not free have the prior's start value, wherever the others go"
+    "Fixed parameters keep the prior's start value, whatever the others are"
     parameters = objective.parameters("matern32", drawn(objective))
     fixed = set(range(len(NAMES))) - set(objective.prior.free) - {NAMES.index("attitude_time")}
     for i in fixed:
@@ -139,7 +139,7 @@ def test_a_search_that_starts_at_the_modes_stays_there(adjustment):
 
 
 def test_weights_and_probabilities_sum_to_one(posterior):
-    "Those of families, and those of points; the most probable family has the most points"
+    "Probabilities of families and weights of points; the most probable family has most points"
     assert sum(share for _, share in posterior.modes) == pytest.approx(1.0)
     assert sum(weight for _, weight in posterior.points) == pytest.approx(1.0)
     shares = [share for _, share in posterior.modes]
@@ -241,7 +241,7 @@ def test_large_surveys_are_cut_into_blocks_of_time():
 
 
 def test_a_calibration_frees_the_attitude_time():
-    "Where the attitude doesn't follow the drift, its time is what its own logarithm says"
+    "If attitude does not follow the drift, its time is that of its own logarithm"
     case = smooth_case(7, n=6)
     adjustment = position_adjustment(case.recorded, case.matched, Pos(), 0, mounting_prior)
     objective = Objective.of(adjustment)

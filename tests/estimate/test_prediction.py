@@ -56,7 +56,7 @@ def test_at_a_target_it_is_what_the_target_says(adjustment, parameters):
 
 
 def test_one_set_of_parameters_predicts_itself(adjustment, parameters):
-    "Where nothing else is possible the average is that prediction, with its covariance"
+    "With a single set of parameters the average is its prediction, with its covariance"
     mean, covariance = predict_pose_error(adjustment, sure((parameters, 1.0)))
     expected, spread = predict_under(adjustment, parameters)
     np.testing.assert_allclose(mean, expected, atol=1e-9)
@@ -90,8 +90,9 @@ def test_doubt_about_parameters_widens_the_sigma(adjustment, parameters):
 
 
 def test_the_last_epoch_of_an_outage_has_its_own_sigma():
-    """Where sigma(t) falls at once and the path doesn't step, the epoch before it has the average
-    over all parameters, not half of what holds once GNSS is back.
+    """If sigma(t) falls at once and the path has no step, the epoch before has the average.
+
+    It is taken over all parameters, and is not half of the value after re-acquisition.
     """
     rng = np.random.default_rng(3)
     sigma = filtered_outage(rng)[1]
@@ -133,7 +134,7 @@ def test_parameters_of_no_weight_are_not_worked_out(adjustment, parameters):
 
 
 def test_solutions_that_others_made_predict_the_same(adjustment, posterior):
-    "What the tests of targets solved serves the prediction to the last bit, and isn't solved again"
+    "Solutions of the target tests give the same prediction to the last bit, without solving again"
     known = GridPredictions(adjustment)
     all_tests(adjustment, posterior, known.add)
     assert set(known.poses) == {parameters for parameters, _ in posterior.mixture}
@@ -146,7 +147,7 @@ def test_solutions_that_others_made_predict_the_same(adjustment, posterior):
 
 
 def test_the_most_probable_solution_is_handed_on_once(adjustment, posterior):
-    "What a test of targets solved last is taken as it is; asked again, it is solved anew, alike"
+    "The last solution of a target test is reused once; a second request solves it again"
     mode = posterior.mixture[0][0]
     known = GridPredictions(adjustment, mode=mode)
     all_tests(adjustment, posterior, known.add)

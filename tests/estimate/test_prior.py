@@ -1,4 +1,4 @@
-"""What is believed of correlation times and scales follows from the drive."""
+"""Priors of correlation times and scales follow from the drive."""
 
 from dataclasses import replace
 

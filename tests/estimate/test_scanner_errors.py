@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from mlscorr.estimate import (
-    believed_mounting,
     calibration_with_ties,
     estimate_mounting,
+    prior_mounting,
     with_scanner_errors,
 )
 from mlscorr.frames import georeference, scanner_partials, to_scanner
@@ -83,7 +83,7 @@ def test_an_encoder_that_looks_like_a_boresight_leaves_it_undetermined():
     matched, _ = distorted(site, 0.0, 0.03)
     beam = to_scanner(site.trajectory, RECORDED, matched.observations.position, matched.gps_time)
     one_way = matched[np.arctan2(beam[:, 1], beam[:, 0]) > np.radians(165.0)]
-    known = believed_mounting(site.trajectory, [RECORDED], one_way)
+    known = prior_mounting(site.trajectory, [RECORDED], one_way)
     assert known.determined[3:].all()
     freed = with_scanner_errors(known, one_way)
     assert freed.scanner.significant[1]

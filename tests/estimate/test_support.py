@@ -1,18 +1,18 @@
-"""Which part of a drive control points hold."""
+"""Parts of a drive that control points constrain."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from mlscorr.estimate import Support, WeakStretch, estimate_correction, place_control
+from mlscorr.estimate import Support, WeakInterval, estimate_correction, place_control
 from mlscorr.evaluate import largest_sigma
 from mlscorr.survey import Pos
 from tests.beds.lying_pos import START, TIME, survey, walk
 
 EVEN = np.linspace(3.0, 237.0, 16)
 EARLY = "before the first"
-LATE = "past the last"
+LATE = "after the last"
 
 
 def support_of(seed, outage, times):
@@ -24,15 +24,15 @@ def support_of(seed, outage, times):
 
 
 def weak_times(support):
-    "Whether each epoch (2400,) is extrapolated"
+    "Flags (2400,) of extrapolated epochs"
     return support.contains(START + TIME)
 
 
 def test_between_control_points_a_drive_is_held():
     "Without an outage only the first 2 s and the last 2 s are extrapolated, 20 m each"
     support, _ = support_of(1, (300.0, 300.0), EVEN)
-    assert [stretch.why.partition(" control")[0] for stretch in support.weak] == [EARLY, LATE]
-    assert [round(stretch.length_m) for stretch in support.weak] == [19, 18]
+    assert [interval.why.partition(" control")[0] for interval in support.weak] == [EARLY, LATE]
+    assert [round(interval.length_m) for interval in support.weak] == [19, 18]
     assert support.outages == support.steps == ()
 
 
@@ -50,11 +50,11 @@ def test_an_outage_without_control_is_extrapolated_until_gnss_returns():
     support, estimate = support_of(1, (80.0, 140.0), EVEN[(EVEN < 80.0) | (EVEN > 140.0)])
     assert support.steps == pytest.approx([START + 140.0], abs=0.2)
     assert support.outages[0][1] == pytest.approx(START + 140.0, abs=0.2)
-    (stretch,) = (stretch for stretch in support.weak if "outage" in stretch.why)
-    assert [stretch.start - START, stretch.end - START] == pytest.approx([66.5, 139.9], abs=15.0)
-    assert stretch.sigma > 0.2
+    (interval,) = (interval for interval in support.weak if "outage" in interval.why)
+    assert [interval.start - START, interval.end - START] == pytest.approx([66.5, 139.9], abs=15.0)
+    assert interval.sigma > 0.2
     sigma = np.linalg.norm(estimate.correction.corrected.position_sigma, axis=1)
-    assert sigma[~weak_times(support)].max() < 0.5 * stretch.sigma
+    assert sigma[~weak_times(support)].max() < 0.5 * interval.sigma
 
 
 @pytest.mark.long
@@ -90,7 +90,7 @@ def test_times_at_which_nothing_was_scanned_are_not_extrapolated():
     trajectory, matched = survey(rng, walk(rng, 300.0, 300.0), np.linspace(102.0, 178.0, 12))
     trajectory = trajectory.scanned_at(scanned_from(100, 180))
     estimate = estimate_correction(trajectory, matched, Pos(position_sigma=0.5))
-    spans = [(stretch.start - START, stretch.end - START) for stretch in estimate.support.weak]
+    spans = [(interval.start - START, interval.end - START) for interval in estimate.support.weak]
     assert np.ravel(spans) == pytest.approx([99.9, 101.0, 179.0, 180.0], abs=0.15)
     assert "extrapolated" not in [warning.key for warning in estimate.statements]
     assert estimate.guards.gap[1] - estimate.guards.gap[0] < 8.0
@@ -116,7 +116,7 @@ def test_no_control_is_asked_for_in_a_pause_of_the_scanner():
 
 def test_times_are_counted_once_at_the_edges():
     "Within a stretch, ends included; not before, between or after"
-    weak = tuple(WeakStretch(a, b, 1.0, 0.1, "") for a, b in ((0.0, 1.0), (3.0, 4.0)))
+    weak = tuple(WeakInterval(a, b, 1.0, 0.1, "") for a, b in ((0.0, 1.0), (3.0, 4.0)))
     times = np.array([-0.1, 0.0, 1.0, 2.0, 3.5, 4.1])
     assert Support(weak).contains(times).tolist() == [False, True, True, False, True, False]
     assert not Support().contains(times).any()

@@ -1,4 +1,4 @@
-"""What control points and ties each bring."""
+"""Information from control points and from ties."""
 
 import numpy as np
 import pytest

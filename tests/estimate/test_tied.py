@@ -7,9 +7,9 @@ import pytest
 
 from mlscorr.estimate import (
     TieResiduals,
-    believed_correction,
     estimate_correction,
     previewed_correction,
+    prior_correction,
     tie_factor,
     with_ties,
 )
@@ -55,7 +55,7 @@ def test_ties_help_the_pass_that_has_control(clean):
 
 
 def test_residuals_are_those_of_the_noise(clean):
-    "What is left of ties is their noise of 4 mm, and none is refused but by chance"
+    "Residuals of ties are their noise of 4 mm, and ties are refused only by chance"
     _, _, tied = clean
     assert tied.ties.used.mean() > 0.98
     assert np.sqrt(np.mean(tied.ties.after[tied.ties.used] ** 2)) == pytest.approx(0.004, rel=0.2)
@@ -76,7 +76,7 @@ def test_wrong_ties_are_refused(clean):
 def test_without_control_passes_agree_and_nothing_more_is_claimed():
     "Ties alone: passes agree to millimetres, the sigmas are still those of the POS"
     survey = tied_passes(2, control=())
-    tied = with_ties(believed_correction(survey.trajectory), survey.ties)
+    tied = with_ties(prior_correction(survey.trajectory), survey.ties)
     assert np.median(np.abs(survey.ties.misclosure)) > 0.1  # m
     assert np.median(np.abs(tied.ties.after)) < 0.005  # m
     sigma = np.linalg.norm(tied.correction.corrected.position_sigma, axis=1)
@@ -114,7 +114,7 @@ def test_a_wrong_control_point_among_three_is_named_and_used():
 
 @pytest.mark.long
 def test_ties_that_contradict_each_other_are_not_used():
-    "Where more than half are wrong by up to metres, control alone decides, and it is said"
+    "If more than half are wrong by up to meters, control alone decides, with a statement"
     survey = tied_passes(4, wrong=0.8, apart=3.0)
     alone, tied = corrected(survey)
     moved = tied.correction.corrected.position - alone.correction.corrected.position
@@ -203,9 +203,9 @@ def test_without_control_a_shift_of_all_passes_stays_in_sigma():
     elapsed = survey.trajectory.gps_time - survey.trajectory.gps_time[0]
     raised = np.isin(elapsed // 10.0, (2.0, 19.0))[:, None]  # for 10 s of each pass
     sigma = np.where(raised, 1.0, [0.02, 0.02, 0.03])
-    believed = believed_correction(replace(survey.trajectory, position_sigma=sigma))
+    prior = prior_correction(replace(survey.trajectory, position_sigma=sigma))
     noise = 0.004 * np.random.default_rng(2).standard_normal(len(survey.ties))
-    tied = with_ties(believed, replace(survey.ties, misclosure=noise))
+    tied = with_ties(prior, replace(survey.ties, misclosure=noise))
     held = tied.correction.corrected.position_sigma[~raised[:, 0]]
     assert np.median(held, axis=0).min() > 0.02  # m
     assert tied.outliers == () and len(tied.adjustment.names) == 0

@@ -90,7 +90,7 @@ def test_what_the_second_scanner_lacks_beside_the_first_is_estimated(tied):
 
 
 def test_what_follows_an_estimate_knows_its_mountings(survey, tied):
-    "Where the next target belongs, what holds the drive and other orders are found as ever"
+    "The next target, the support of the drive and other orders are still found"
     estimate = tied[0]
     places = place_control(estimate)
     assert places and all(place.drive_after < place.drive_before for place in places)

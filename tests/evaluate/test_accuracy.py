@@ -7,7 +7,7 @@ from mlscorr.evaluate._accuracy import accuracy_statements, positional_accuracy
 
 
 def keys(found):
-    "What the sentences on an accuracy say"
+    "Keys of the statements on an accuracy"
     return [statement.key for statement in accuracy_statements(found)]
 
 

@@ -102,7 +102,7 @@ def test_heights_of_another_datum_are_found():
 
 
 def test_a_default_sigma_is_called_assumed():
-    "Where nobody stated the sigma of the POS, it is among the values of the statement"
+    "A default sigma of the POS is among the values of the statement"
 
     def lower(place):
         return place - [0.0, 0.0, 0.5]
@@ -168,7 +168,7 @@ ALONE = {  # values that no other term has
 
 @pytest.mark.parametrize("term", TERMS)
 def test_each_term_is_a_statement_and_a_row(term):
-    "What, how large, how sure, and beside what of the map; and the same as numbers"
+    "Name, size, sigma and the map's term, as a statement and as numbers"
     count = {"shift": 2, "tilt": 2}.get(term, 1)
     ground = map_factors(CENTRAL, DRIVE.position[0])
     size = np.full(count, 4e-4)

@@ -12,7 +12,7 @@ from tests.beds.missing_times import write_survey
 
 @pytest.mark.parametrize("late", [0, 200])
 def test_points_without_a_time_are_not_outside_the_trajectory(late, tmp_path):
-    "Where 1 % of the points have -1 that is said; points past the trajectory's end are, too"
+    "1 % of points with time -1 are reported, and so are points after the trajectory's end"
     times = write_survey(tmp_path, -1.0, step=31)
     las = laspy.read(tmp_path / "pass.las")
     las.gps_time = np.where(

@@ -65,7 +65,7 @@ def test_components_are_named(section):
 
 
 def test_one_target_left_out_is_not_corrected():
-    "What is believed of the POS alone tests it: its whole misclosure of 0.4, 0.3 and 0.2 m remains"
+    "The prior of the POS alone tests it: its whole misclosure of 0.4, 0.3 and 0.2 m remains"
     section = model_section(Case(EPOCHS, CONSTANT, [100.0], np.random.default_rng(1)).estimate())
     (test,) = section["tests"]
     assert test["statistic"] > 0.0 and np.isfinite(test["w"]).all()

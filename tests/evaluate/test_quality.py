@@ -65,7 +65,7 @@ def test_a_gate_compares_the_quantity_that_it_names(quantity, value):
 
 
 def test_a_failure_names_the_axis_in_full_with_its_value():
-    "Who meant the horizontal error by h sees that it is the height"
+    "A gate on h reports that it is the height, not the horizontal error"
     (failure,) = failed([read_gate("check.rmse_h > 0.03")], REPORT)
     assert failure.key == "exceeded"
     assert failure.values["what"] == "rmse of check points in height (m)"

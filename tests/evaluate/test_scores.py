@@ -1,4 +1,4 @@
-"""What remains is surveyed less corrected, for anything that corrects."""
+"""Residuals are surveyed minus corrected, for any method of correction."""
 
 from dataclasses import replace
 

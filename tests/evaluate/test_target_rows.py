@@ -74,7 +74,7 @@ def survey_of(matched):
 
 
 def candidates(unplaced=None):
-    "What was read of a cloud: points without a pose, and nothing else"
+    "Candidates of a cloud: points without a pose, and nothing else"
     return Candidates(NO_POINTS, np.zeros(0, int), NO_POINTS if unplaced is None else unplaced, {})
 
 

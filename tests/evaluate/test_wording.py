@@ -256,13 +256,13 @@ CATALOGUE = [
 
 @pytest.mark.parametrize(("wordings", "key", "values", "sentence"), CATALOGUE)
 def test_each_statement_has_its_sentence(wordings, key, values, sentence):
-    "What, how many, numbers with units, the likely cause and the way out"
+    "Each sentence gives name, number, units, likely cause and remedy"
     assert Statement(key, values=values).sentence(wordings) == sentence
 
 
 @pytest.mark.parametrize("wordings", [REASONS, DATUM, BEAMS, ACCURACY, GATES])
 def test_no_sentence_is_missing_from_the_catalogue(wordings):
-    "Those of the matching are in the catalogue of that room"
+    "Sentences of the matching are in the catalogue of that room"
     listed = {key for known, key, _, _ in CATALOGUE if known is wordings}
     assert listed == wordings.keys() - MATCHING.keys()
 

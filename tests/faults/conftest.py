@@ -1,4 +1,4 @@
-"""What the tests of faults share: their tally, and a process in which calls fail."""
+"""Common parts of the tests of faults: their count, and a process in which calls fail."""
 
 import shutil
 import subprocess
@@ -16,7 +16,7 @@ NEAR = 1.5  # m from a control point: what is left of the cloud
 
 
 def pytest_terminal_summary(terminalreporter):
-    "What was tried and what came out of it, for docs/faults.md"
+    "Number and outcome of the tested faults, for docs/faults.md"
     for report in terminalreporter.getreports("passed") if IS_FULL else ():
         for what, outcome in report.user_properties:
             terminalreporter.write_line(f"{what}: {outcome}")

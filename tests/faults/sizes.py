@@ -1,4 +1,4 @@
-"""How many faults are tried: some in ``make test``, all of them in ``make faults``.
+"""Number of tested faults: some in ``make test``, all of them in ``make faults``.
 
 MLSCORR_FAULTS is the share of the full numbers, 1 in ``make faults``; without it time is not judged
 either, as other tests may run beside these.

@@ -45,7 +45,7 @@ for line in sys.stdin:
 
 @dataclass(frozen=True)
 class Ended:
-    """How a run ended: exit code (below zero by a signal), stderr, and what it left."""
+    """End of a run: exit code (negative for a signal), stderr, and the remaining files."""
 
     code: int
     stderr: str
@@ -53,7 +53,7 @@ class Ended:
 
     @property
     def is_told(self):
-        "Whether an error was said in one sentence with its cause"
+        "True if an error was reported in one sentence with its cause"
         lines = [line for line in self.stderr.splitlines() if line.startswith("Error: ")]
         return len(lines) == 1 and "Traceback" not in self.stderr
 

@@ -1,4 +1,4 @@
-"""What a check passes is corrected: the matrix of faults, each by both commands.
+"""A survey that passes the check is corrected: the matrix of faults, by both commands.
 
 ``make faults`` tries all of it.
 """

@@ -221,7 +221,7 @@ def checked(folder):
 
 @pytest.mark.skipif(not IS_FULL, reason="in make faults")
 def test_a_check_names_them_before(tiny, tmp_path, record_property):
-    "What a correction says of a file's meaning, a check says too, or the cause in its own words"
+    "A check reports the same as a correction on the meaning of a file, or the cause in its words"
     rng = np.random.default_rng(19)
     number = 0
     unnamed = Counter()

@@ -74,7 +74,7 @@ def mutated(whole, rng, ways):
 
 
 def outcome(path, read):
-    "What a reader gives, or None where it refuses the file in our own words and in time"
+    "Result of a reader, or None if it refuses the file in time with a message of the package"
     start = time.process_time()
     try:
         with warnings.catch_warnings(action="ignore"):

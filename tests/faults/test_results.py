@@ -20,7 +20,7 @@ from tests.beds.places import ROOT
 
 
 def write(out, text, overwrite=False, names=("a.txt", "sub/b.txt")):
-    "What a run writes, in small"
+    "Write a small result like a run"
     with output_folder(out, overwrite=overwrite) as folder:
         (folder / "sub").mkdir()
         for name in names:
@@ -120,7 +120,7 @@ def test_a_link_to_another_disk_is_a_folder_like_any_other(linked, tmp_path):
 
 
 def test_a_mount_point_takes_the_results_file_by_file(tmp_path, monkeypatch):
-    "Where a folder beside the output is on another disk, what isn't whole yet stands inside"
+    "If a folder next to the output is on another disk, incomplete files are kept inside"
     out = tmp_path / "out"
     out.mkdir()
     monkeypatch.setattr(output, "_place", lambda path: path.resolve())

@@ -27,7 +27,7 @@ TEXTS = (
 
 
 def fate(path, read):
-    "What comes of a file: refused or warned of in our own words, or read"
+    "Outcome of a file: refused or warned of with a message of the package, or read"
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         try:

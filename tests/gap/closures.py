@@ -16,7 +16,7 @@ from tests.gap.inference import surveyed
 
 
 def noise_of_positions(g, effect, rng):
-    "What noise of the recorded positions makes of rows of one time (m,)"
+    "Noise of rows of one time (m,) that follows from noise of the recorded positions"
     trajectory = g.survey.trajectory
     rows = g.rows
     moved = effect.apply(trajectory, rows.reference, rng).position - trajectory.position

@@ -41,8 +41,8 @@ def dense(g, model):
     lag = np.subtract.outer(bg.gps_time, bg.gps_time)
     smooth = Covariance(model.family, tau)
     anew = smooth(np.subtract.outer(bg.clock, bg.clock))
-    if model.raised:
-        growth = np.array([*model.raised, 1.0])[bg.raised]
+    if model.increased:
+        growth = np.array([*model.increased, 1.0])[bg.increased]
     else:
         growth = 1.0
     position = np.reshape(growth, (-1, 1)) * bg.position

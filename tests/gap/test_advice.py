@@ -1,4 +1,4 @@
-"""What is said of a verdict, and what to do about it."""
+"""Advice that follows from a verdict."""
 
 from dataclasses import replace
 
@@ -28,12 +28,12 @@ def keys(advice):
     return [statement.key for statement in advice]
 
 
-def inference(label="none", whole=0.1, labels=("none",), lead=""):
+def inference(label="none", whole=0.1, labels=("none",), hint=""):
     "Of a verdict, with the gap (mm) of all rows together"
     none = np.zeros(0)
     empty = np.zeros((0, 2))
     where = Where(whole, whole, BAND, (), none, none, empty, none)
-    verdict = GapVerdict(label, 0.34, labels, 0.6, lead, False)
+    verdict = GapVerdict(label, 0.34, labels, 0.6, hint, False)
     cause = Cause(label, 0.34, (), (), np.zeros(3))
     return Inference(verdict, (cause,), (), where, None, {label: 0.34}, None, None)
 
@@ -81,7 +81,7 @@ def test_nothing_needs_to_be_done_where_all_is_as_stated(whole, before, over, rm
 
 
 def test_nothing_is_larger_than_a_default():
-    "Where nobody stated the sigma of the POS, 9 cm and 7 sigmas are no excess, but drift"
+    "With a default sigma of the POS, 9 cm and 7 sigma are drift, and no excess"
     found = inference()
     closed = closure(over=7.3)
     far = [Agreement("target", 9, 91.6, 20.6)]
@@ -101,7 +101,7 @@ def test_where_something_is_to_be_measured_something_needs_to_be_done():
 
 def test_the_nearest_effect_is_advised_against_by_its_share():
     "Its share of the squared gap is a value beside its name"
-    found = inference("unknown", labels=("unknown",), lead="easting error")
+    found = inference("unknown", labels=("unknown",), hint="easting error")
     first, second = advice_of(found, closure("range_scale", 9.0, 0.6, 0.9952), [], "")
     assert first == Statement("unknown error", values={"lead": "easting error"})
     assert second.values == {"effect": "range_scale", "share": 0.9952}
@@ -109,7 +109,7 @@ def test_the_nearest_effect_is_advised_against_by_its_share():
 
 def test_what_no_judged_effect_explains_may_be_one_that_needs_a_mounting():
     "Two of three effects lack [mounting]: to state it comes first, and no effect is ruled out"
-    found = inference("unknown", labels=("unknown",), lead="error to the right")
+    found = inference("unknown", labels=("unknown",), hint="error to the right")
     mounting = Statement("no mounting", "warning", {"stage": "mounting"})
     left_out = {"lever_arm": mounting, "boresight": mounting, "range": Statement("no row")}
     first, second = advice_of(found, closure(), [], "", left_out=left_out)
@@ -120,7 +120,7 @@ def test_what_no_judged_effect_explains_may_be_one_that_needs_a_mounting():
 
 def test_what_chance_makes_is_not_closed():
     "Of a gap of 0.5 mm where chance makes up to 0.7 mm no share is told; lost returns count below"
-    found = inference("unknown", labels=("unknown",), lead="easting error")
+    found = inference("unknown", labels=("unknown",), hint="easting error")
     within = closure("range_scale", 0.5, -0.9, -1.0)
     assert within.is_within_noise and not closure("range_scale", 0.8, 0.1, 0.9).is_within_noise
     assert not closure("none", 0.5, 0.5).is_within_noise

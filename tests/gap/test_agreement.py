@@ -1,4 +1,4 @@
-"""How far observed things lie from where they belong, beside what is stated."""
+"""Distances of observations from their surveyed positions, relative to the stated sigma."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What gap.json says of a survey, its effects and their separability."""
+"""Contents of gap.json on a survey, its effects and their separability."""
 
 import json
 from dataclasses import replace
@@ -46,7 +46,7 @@ def test_an_event_is_told_no_farther_than_the_drive_reaches():
     cause = Cause("position_noise", 1.0, (), (), np.zeros(6), model=model)
     (window,) = windows_document(cause, survey)
     assert (window["start"], window["end"]) == (first, last)
-    assert cause.stretches(survey.trajectory) == (("position_noise", first, last),)
+    assert cause.intervals(survey.trajectory) == (("position_noise", first, last),)
 
 
 def test_an_effect_is_told_as_a_scenario_names_it():

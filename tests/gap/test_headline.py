@@ -1,4 +1,4 @@
-"""Where most of the gap lies, in a sentence."""
+"""Location of most of the gap, in a sentence."""
 
 from dataclasses import replace
 
@@ -56,9 +56,9 @@ def test_a_time_is_that_of_the_survey():
 
 
 def test_an_unknown_error_is_located_by_what_it_looks_like():
-    "Where it grows with speed, speed; where nobody knows, the bins that exceed their null band"
-    lead = "height error that grows with speed squared"
-    assert "at speeds of 8.0" in headline(where(BRIGHT, FAST), "unknown", lead, START)
+    "By speed if it grows with speed; otherwise by the bins that exceed their null band"
+    hint = "height error that grows with speed squared"
+    assert "at speeds of 8.0" in headline(where(BRIGHT, FAST), "unknown", hint, START)
     said = headline(where(BRIGHT, FAST), "an_effect_of_mine", "", START)
     assert said.startswith("No part of the survey is conspicuous.")
     loud = replace(FAST, before=np.full(8, 9.0), share=np.array([0.65, *[0.05] * 7]))

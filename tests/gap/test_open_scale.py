@@ -1,4 +1,4 @@
-"""How far a POS errs whose sigma nobody stated."""
+"""Estimated scale of a POS without stated sigmas."""
 
 from dataclasses import replace
 
@@ -53,8 +53,8 @@ def test_a_pos_of_another_grade_is_recognised(bed):
     rows = drift(g, 10.0)
     scale = scale_of(bed, rows)
     assert abs(np.log(scale / 10.0)) < 1.5 * np.log(STEP)
-    believed = replace(survey, pos=with_scale(survey.pos, scale, SIGMAS))
-    given = background(rows, believed), believed, signs, np.random.default_rng(0)
+    assumed = replace(survey, pos=with_scale(survey.pos, scale, SIGMAS))
+    given = background(rows, assumed), assumed, signs, np.random.default_rng(0)
     score = weigh_labels(rows, *given, 0).score
     assert max(score, key=lambda name: score[name][0]) == "none"
 

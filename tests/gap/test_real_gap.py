@@ -1,4 +1,4 @@
-"""What the studies on real data claim: a POS that loses GNSS, two passes that don't meet."""
+"""Claims of the studies on real data: a POS that loses GNSS, two passes with misclosures."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""What is learned from records is right as often as it says."""
+"""Probabilities learned from records are calibrated."""
 
 import json
 from importlib.resources import files

@@ -33,7 +33,7 @@ def test_a_bad_sky_raises_the_stated_sigma(world):
     "Some looks lie in a stretch where sigma is raised, most don't"
     _, background, survey = world.errors(np.random.default_rng(1))
     assert not world.is_open
-    assert 0 < np.mean(background.raised >= 0) < 0.6
+    assert 0 < np.mean(background.increased >= 0) < 0.6
     sigma = np.linalg.norm(survey.trajectory.position_sigma, axis=1)
     assert sigma.max() > 2 * np.percentile(sigma, 5)
 

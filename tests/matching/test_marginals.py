@@ -47,7 +47,7 @@ def drift(along, size=3.0, rng=None):
 
 
 def is_right(found, seen):
-    "Whether each matched observation is the target that was seen there"
+    "True for each matched observation of the target that was measured there"
     at = {tuple(ORIGIN + row): i for i, row in enumerate(seen)}
     return [
         name == f"T{at[tuple(position)] + 1:02d}"
@@ -124,7 +124,7 @@ def test_two_visits_of_one_target_are_both_used():
 
 
 def test_drift_that_ends_abruptly_costs_no_target():
-    "When satellites return 2 m of drift vanish at once: targets before and after keep their names"
+    "At GNSS re-acquisition 2 m of drift vanish: targets before and after keep their names"
     places = street()
     grown = np.where(places[:, 1] < 400.0, places[:, 1] / 400.0 * 2.0, 0.0)
     seen = places + np.outer(grown, [0.8, -0.6, 0.0])

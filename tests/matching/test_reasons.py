@@ -1,4 +1,4 @@
-"""What stays without a name has a sentence with numbers."""
+"""Unmatched observations have a sentence with numbers."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ from tests.matching.test_marginals import drift, street
 
 
 def test_the_sentence_of_an_ambiguity_gives_the_numbers():
-    "Which points, how far apart, at what time, within what radius"
+    "The sentence gives points, distance, time and search radius"
     places = np.array([[5.0, 50.0, 1.0], [5.0, 50.31, 1.0]])
     found = match(
         observations(places[:1] + np.array([0, 0.15, 0])), control_points(places), trajectory()

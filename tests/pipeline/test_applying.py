@@ -1,4 +1,4 @@
-"""What was found wrong, taken out of clouds, trajectory and survey.toml."""
+"""Removal of a found error from clouds, trajectory and survey.toml."""
 
 import json
 import shutil
@@ -95,7 +95,7 @@ def test_what_was_found_is_read_from_documents(tmp_path):
 
 
 def calibration():
-    "What apply reads of a calibration.json: lever arm forward not determined"
+    "Contents of a calibration.json for apply, without a forward lever arm"
     lsc = {
         "lever_arm": {"correction": [0, 0.1, 0], "sigma": [0.01, 0.03, 0.02]},
         "boresight": {"correction": [0, 0, 0.2], "sigma": [0.01, 0.02, 0.03]},

@@ -30,7 +30,7 @@ def test_areas_cover_a_city_once(seed):
 
 
 def test_areas_are_wider_than_their_margins():
-    "Where 20 000 places lie within 150 m no area is cut that would be all margin"
+    "With 20 000 places within 150 m no area is cut that would consist of its margin"
     places = PLACE + np.random.default_rng(0).uniform(0, 150.0, size=(20_000, 3))
     assert len(areas_of(places, 3_000, MARGIN)) == 1
     assert len(areas_of(places, 20_000, 1.0)) == 1

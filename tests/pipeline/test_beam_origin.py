@@ -1,4 +1,4 @@
-"""Where beams come from when no mounting is given: by the cloud alone."""
+"""Origin of beams without a given mounting, from the cloud alone."""
 
 import re
 import shutil

@@ -140,7 +140,7 @@ def test_a_quick_look_tells_heights_and_radii(column, change, words, survey):
 
 @pytest.mark.parametrize("lines", [0, 1], ids=["empty", "header"])
 def test_a_survey_without_control_points_has_a_fault(lines, survey):
-    "What stops a correction is said before it, in the same sentence"
+    "A fault that stops a correction is reported before it, in the same sentence"
     text = (survey / "control.csv").read_text().splitlines(keepends=True)
     (survey / "control.csv").write_text("".join(text[:lines]))
     checked = mlscorr.check(survey)

@@ -72,7 +72,7 @@ def test_epochs_of_one_result_alone_are_counted(pair):
 
 
 def test_gaps_are_not_crossed(pair):
-    "Where the second has a gap of a second nothing is interpolated"
+    "Nothing is interpolated across a gap of a second in the second result"
     keep = np.r_[0:301, 400:801]
     rewritten(pair[1], moved(0.0, rows=keep))
     section = mlscorr.compare_results(*pair).document["trajectory"]

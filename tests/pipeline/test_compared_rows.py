@@ -39,7 +39,7 @@ def made(folder, offset=0.0, seed=3, **scanner):
 
 @pytest.fixture(scope="module")
 def folders(tmp_path_factory):
-    "What was recorded with a late clock, its simulation, and that of 18 of 20 ms"
+    "Survey with a late clock, its simulation, and a simulation with 18 of 20 ms"
     path = tmp_path_factory.mktemp("own")
     real = made(path / "real", OFFSET)
     first = made(path / "first")
@@ -122,7 +122,7 @@ def test_half_of_their_points_is_no_noise(tmp_path, seed):
     assert diagnosed.inference.verdict.label == "time_offset"
     rows = diagnosed.rows.select(diagnosed.rows.channel == "roughness")
     assert len(rows) > 500
-    assert abs(np.corrcoef(rows.residual, np.log(rows.believed))[0, 1]) < 0.1
+    assert abs(np.corrcoef(rows.residual, np.log(rows.assumed))[0, 1]) < 0.1
 
 
 def test_clouds_of_another_drive_are_refused(folders, tmp_path):

@@ -15,7 +15,7 @@ from mlscorr.cli import app
 from mlscorr.effects import make_effect
 from mlscorr.gap.evidence import Cause, Costs, ErrorModel
 from mlscorr.gap.evidence.labels import kind_of
-from mlscorr.gap.signatures import Signature, as_believed, with_cause
+from mlscorr.gap.signatures import Signature, as_assumed, with_cause
 from mlscorr.io.clouds import read_chunks
 from mlscorr.pipeline import read_effects
 from mlscorr.simulate import Scenario, beliefs_of, read_simulator, simulate, write_simulator
@@ -48,7 +48,7 @@ def decoded():
 
 @pytest.fixture(scope="module")
 def diagnosed(late, decoded, tmp_path_factory):
-    "What the command writes for it"
+    "Output of the command for it"
     out = tmp_path_factory.mktemp("diagnosed") / "out"
 
     def counted(file):
@@ -132,8 +132,8 @@ def test_a_mounting_that_differs_in_the_simulator_is_an_effect(late):
     survey = mlscorr.read_survey(late)
     simulator = beliefs_of(survey)
     arm = simulator.mounting.lever_arm + np.array([0.09, 0.0, 0.0])
-    believed = replace(simulator, mounting=replace(simulator.mounting, lever_arm=arm))
-    _, (effect,) = as_believed(survey, believed)
+    assumed = replace(simulator, mounting=replace(simulator.mounting, lever_arm=arm))
+    _, (effect,) = as_assumed(survey, assumed)
     assert effect.name == "lever_arm"
     assert np.allclose(effect.magnitude, [0.09, 0.0, 0.0], atol=1e-9)
 
@@ -159,7 +159,7 @@ def test_a_cause_that_the_simulator_has_already_is_joined_with_it(late, tmp_path
     assert improved.pos.windows == (window,)
     write_simulator(improved, tmp_path / "simulator.toml")
     assert read_simulator(tmp_path / "simulator.toml").pos.windows == (window,)
-    assert as_believed(survey, improved)[0].pos.windows == (window,)
+    assert as_assumed(survey, improved)[0].pos.windows == (window,)
     bare = replace(simulator, pos=replace(simulator.pos, assumed=("position_sigma",)))
     assert with_cause(bare, survey, worse).pos.assumed == ()  # twice the default was found
     assert with_cause(bare, survey, outage).pos.assumed == ("position_sigma",)
@@ -269,7 +269,7 @@ def test_a_moved_control_point_is_named_with_its_size(sound, tmp_path):
 
 @pytest.mark.long
 def test_nothing_wrong_is_not_said_of_what_was_not_seen(sound, tmp_path):
-    "Where two stretches lie 3 m from their surveyed targets the verdict isn't none, and says where"
+    "With two intervals 3 m from their surveyed targets the verdict is not none, and gives them"
     away = ("T04", "T05", "T06", "T10", "T11")
     survey = _with_control_moved(sound, tmp_path / "outages", away, 3.0)
     diagnosed = mlscorr.diagnose(survey)
@@ -295,7 +295,7 @@ def test_costs_that_are_none_are_refused_before_anything_is_read(late, tmp_path,
 
 @pytest.mark.long
 def test_costs_choose_the_label(late, tmp_path):
-    "Where a false alarm costs more than any odds, no cause is named for a clock that is surely off"
+    "If a false alarm costs more than any odds, no cause is named even for a clock surely off"
     command = ["diagnose", str(late), "-o", str(tmp_path / "out"), "--costs", "1e30,1,0.9"]
     assert CliRunner().invoke(app, command).exit_code == 0
     told = json.loads((tmp_path / "out" / "gap.json").read_text())

@@ -12,7 +12,7 @@ pytestmark = pytest.mark.long
 
 @pytest.mark.parametrize("name", ["none", "time_offset", "lever_arm", "position_bump"])
 def test_surveys_of_another_simulator_are_told_rightly(name):
-    "What another simulator put into a survey is named, with its size"
+    "Effects that another simulator put into a survey are named, with their size"
     folder = shared("surveys", f"practice_{name}")
     told = mlscorr.diagnose(mlscorr.read_survey(folder)).document
     assert told["verdict"]["label"] == name

@@ -153,7 +153,7 @@ def flat_plate(rng, size=0.6, scale=1.0, middle=(0.0, 6.0, 1.5), points=900):
 
 
 def objects(chunks, trajectory, shapes=(("square", None),)):
-    "What the search of some chunks finds"
+    "Objects that the search of some chunks finds"
     survey = Survey("street", None, None, (), trajectory, None, NO_POINTS, NO_POINTS)
     results = search_targets(chunks, survey, shapes, np.random.default_rng(0))
     return distinct([target for _, found in results for target in found])

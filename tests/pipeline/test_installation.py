@@ -1,4 +1,4 @@
-"""What doctor finds on this machine, whatever that is, and the lines that install the rest."""
+"""Findings of doctor on any machine, and the commands that install missing parts."""
 
 import json
 import platform
@@ -30,7 +30,7 @@ def examined():
 
 
 def test_a_python_that_cannot_be_started_draws_no_picture():
-    "Where the interpreter is part of another program doctor says so, and goes on"
+    "Doctor reports an interpreter that is part of another program, and continues"
     code = "import sys, mlscorr; sys.executable = ''; print(*mlscorr.doctor().parts, sep='\\n')"
     told = subprocess.check_output([sys.executable, "-c", code], text=True, cwd=ROOT)
     assert "'off-screen picture', ok=False" in told
@@ -94,7 +94,7 @@ def test_what_is_missing_comes_with_the_line_that_installs_it(examined):
 
 
 def test_nothing_is_missing_nothing_is_to_be_installed():
-    "What is there needs no line, even if it knows one"
+    "Present parts have no command, even if it is known"
     assert remedy([InstalledPart("libGL.so.1", True, "found", "apt-get install -y libgl1")]) == []
 
 

@@ -66,7 +66,7 @@ def elsewhere(drive, seconds=0.0, way=bed.SHIFT * 0):
 
 
 def added(corrected):
-    "What the correction adds to the position (n, 3). Units: m"
+    "Increment of the correction to the position (n, 3). Units: m"
     return corrected.trajectory.position - corrected.survey.trajectory.position
 
 
@@ -88,12 +88,14 @@ def test_times_of_a_drive_stay_its_own(together, drives):
         first, last = drive.survey.trajectory.gps_time[[0, -1]]
         times = [row.gps_time for row in corrected.targets if row.gps_time is not None]
         times += [
-            t for stretch in corrected.estimate.support.weak for t in (stretch.start, stretch.end)
+            t
+            for interval in corrected.estimate.support.weak
+            for t in (interval.start, interval.end)
         ]
         times += [*corrected.estimate.span, *(place.gps_time for place in corrected.next_control)]
         assert all(first <= time <= last for time in times)
         assert corrected.estimate.guards.gap[1] <= last
-        assert all(stretch.chainage >= 0 for stretch in corrected.estimate.support.weak)
+        assert all(interval.chainage >= 0 for interval in corrected.estimate.support.weak)
 
 
 def test_two_vehicles_may_drive_at_the_same_time(drives, together):
@@ -218,7 +220,7 @@ def test_an_area_where_nothing_was_seen_corrects_nothing(drives):
     bare = replace(drive, features=drive.features[[]])
     ((corrected, state),) = drives_by_areas([bare], areas, 1, ORIGIN)
     assert state.state == "uncorrected" and np.abs(added(corrected)).max() < 1e-9
-    assert {stretch.why for stretch in corrected.held[1].weak} == {"pass without control point"}
+    assert {interval.why for interval in corrected.held[1].weak} == {"pass without control point"}
 
 
 def test_nothing_corrects_a_drive_elsewhere(drives):
@@ -228,7 +230,7 @@ def test_nothing_corrects_a_drive_elsewhere(drives):
     corrected, state = apart["second"]
     assert state.state == "uncorrected" and not state.tied_with
     assert np.abs(added(corrected)).max() < 1e-9
-    assert {stretch.why for stretch in corrected.held[1].weak} == {"pass without control point"}
+    assert {interval.why for interval in corrected.held[1].weak} == {"pass without control point"}
     alone = results([first])["first"][0]
     assert np.array_equal(added(apart["first"][0]), added(alone))
     assert apart["first"][1].state == "controlled"

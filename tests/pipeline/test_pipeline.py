@@ -470,7 +470,7 @@ def full(tmp_path):
 
 
 def write_new(out):
-    "What a run writes, in small"
+    "Write a small result like a run"
     with output_folder(out, overwrite=True) as folder:
         (folder / "pictures").mkdir()
         for name in ("pass-1.laz", "pictures/map.png", "report.json", "targets.csv"):
@@ -482,7 +482,7 @@ def texts(out):
 
 
 def test_overwriting_replaces_files_of_the_same_name_only(full):
-    "What else lies in the folder, and in its pictures, stays"
+    "Other files in the folder, and in its pictures, are kept"
     write_new(full)
     new = ("pass-1.laz", "pictures/map.png", "report.json", "targets.csv")
     old = ("notes.txt", "pictures/mine.png")
@@ -544,7 +544,7 @@ def test_effects_of_another_simulator_are_corrected(effect):
 def test_a_drive_that_is_known_to_millimetres_is_not_called_extrapolated():
     "practice_lever_arm: 16 control points and ties hold nine tenths of it, drift or bias alike"
     support = correct_shared("practice_lever_arm").estimate.support
-    assert sum(stretch.seconds for stretch in support.weak) < 0.1 * 104.0  # s
+    assert sum(interval.seconds for interval in support.weak) < 0.1 * 104.0  # s
 
 
 @pytest.mark.long

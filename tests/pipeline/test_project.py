@@ -58,7 +58,7 @@ def outputs(out):
 
 
 def moved(project, out, drive):
-    "What was added to the points of a drive (n, 3). Units: m"
+    "Increment of the points of a drive (n, 3). Units: m"
     return np.concatenate(
         [
             laspy.read(out / drive / path.name).xyz - laspy.read(path).xyz

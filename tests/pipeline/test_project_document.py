@@ -1,4 +1,4 @@
-"""What a project says first of its drives."""
+"""First statements of a project on its drives."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Who works on tasks: workers that end in the middle, and a cluster of other processes."""
+"""Workers of tasks: some that end in the middle, and a cluster of other processes."""
 
 import os
 import signal
@@ -48,7 +48,7 @@ def end_at_first(path, number):
 
 
 def span(number):
-    "When a call of half a second begins and ends. Units: s"
+    "Start and end of a call of half a second. Units: s"
     start = time.time()
     time.sleep(0.5)
     return start, time.time()
@@ -161,7 +161,7 @@ def test_parts_that_are_needed_together_fail_by_name(tmp_path):
 
 
 def test_long_tasks_are_begun_first(tmp_path):
-    "What has most points, or most near targets, begins first; alike ones keep their order"
+    "Tasks with most points, or most near targets, start first; equal ones keep their order"
     begun = []
     points = {1: (5, 0.0), 2: (7, 0.0), 3: (5, 3.5), 4: (5, 0.0)}
 
@@ -238,7 +238,7 @@ def test_a_scheduler_that_is_started_again_is_given_the_rest(tmp_path, cluster, 
                 process.kill()
             processes.extend(start_cluster(address))
 
-    with engine(scheduler=address, tell=said.append) as chosen:
+    with engine(scheduler=address, notify=said.append) as chosen:
         run = Run(TaskStore(tmp_path), chosen, kill_once, said.append)
         assert len(run.results([task(n, span) for n in range(8)])) == 8
         assert chosen.lost == 1 and not run.faults
@@ -296,7 +296,7 @@ def test_a_cluster_works_on_tasks(tmp_path):
 
 def test_what_can_not_work_is_said(tmp_path):
     "Workers of two kinds, and a scheduler that is not there"
-    with pytest.raises(ValueError, match="give one"):
+    with pytest.raises(ValueError, match="Give only one"):
         check_engine(2, "tcp://127.0.0.1:1")
 
 

@@ -1,4 +1,4 @@
-"""What status says of a run by what it keeps: failures that stand, and whether it is at work."""
+"""Status of a run from its stored results: lasting failures, and whether it still works."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""How results are written: clouds, tables, document and pages, in this order, or nothing."""
+"""Results are written as clouds, tables, document and pages, in this order, or not at all."""
 
 import json
 from dataclasses import dataclass

@@ -79,7 +79,7 @@ def test_what_no_known_effect_explains_closes_nothing(survey):
     inference = first.inference
     closure = first.closure
     cause = replace(inference.cause, effect="unknown", parameters=())
-    verdict = replace(inference.verdict, label="unknown", lead="height error")
+    verdict = replace(inference.verdict, label="unknown", hint="height error")
     inference = replace(inference, verdict=verdict, causes=(cause,))
     unknown = replace(first, inference=inference)
     known, found = DiagnosedRounds((first, unknown), ()).document["ablation"]["rounds"]

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 import mlscorr
 from mlscorr.cli import app
 from mlscorr.correction import PointSigma
-from mlscorr.estimate import believed_correction, corrected_mounting
+from mlscorr.estimate import corrected_mounting, prior_correction
 from mlscorr.evaluate import BeamCheck
 from mlscorr.io.clouds import read_chunks
 from mlscorr.surfaces import FeatureCollector
@@ -46,7 +46,7 @@ def site(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def survey(site):
-    "That street as it is read"
+    "The street as it is read"
     return mlscorr.read_survey(site)
 
 
@@ -221,7 +221,7 @@ def test_two_scanners_tie_a_pass_to_itself(commanded):
     for file in survey.clouds:
         for chunk in read_chunks(file):
             collector.add(file, chunk[chunk.gps_time < there])
-    believed = believed_correction(survey.trajectory, survey.pos)
+    believed = prior_correction(survey.trajectory, survey.pos)
     tied = tie_passes(survey, believed, collector.features()).ties
     assert tied.used.sum() > 20
     assert (np.sort(tied.ties.scanner) == [0, 1]).all()

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import mlscorr
-from mlscorr.estimate import believed_correction
+from mlscorr.estimate import prior_correction
 from mlscorr.simulate import Scenario, simulate
 from mlscorr.survey import Pos
 from mlscorr.ties import tie_passes
@@ -150,7 +150,7 @@ def test_one_pass_of_a_scanner_that_spins_is_tied_to_itself(tmp_path):
 def tied_street(features):
     "The bed's street with some TieFeatures, under what its POS states"
     recorded = street_bed.survey()
-    return tie_passes(recorded, believed_correction(recorded.trajectory), features)
+    return tie_passes(recorded, prior_correction(recorded.trajectory), features)
 
 
 def of_second(features, values):
@@ -200,9 +200,9 @@ def test_a_tunnel_names_the_direction_that_nobody_holds():
 
 
 def apart_on_road(features, shift):
-    "What is left (3,) of a shift between both passes of the painted road. Units: m"
+    "Residual shift (3,) between both passes of the painted road. Units: m"
     recorded = replace(road_bed.survey(), pos=Pos(position_sigma=0.1))
-    start = believed_correction(recorded.trajectory, recorded.pos)
+    start = prior_correction(recorded.trajectory, recorded.pos)
     correction = tie_passes(recorded, start, features).correction
     change = correction.corrected.position - recorded.trajectory.position
     back = recorded.trajectory.gps_time > road_bed.START + road_bed.PAUSE / 2

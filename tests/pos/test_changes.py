@@ -1,4 +1,4 @@
-"""What sigma(t) states, free of the noise of epochs and in time with the path."""
+"""Stated sigma(t) free of the noise of epochs, and synchronized with the path."""
 
 import numpy as np
 import pytest

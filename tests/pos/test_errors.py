@@ -1,4 +1,4 @@
-"""What a POS may err by along a drive, as everybody asks it."""
+"""Error model of a POS along a drive, in the form that all rooms use."""
 
 import pickle
 

@@ -1,4 +1,4 @@
-"""When drift starts anew, and when it is said to grow."""
+"""Restarts of drift, and the times at which its growth is stated."""
 
 import numpy as np
 import pytest
@@ -127,7 +127,7 @@ def test_gnss_that_is_not_fixed_holds_the_pos_to_what_it_states():
     history = drift_history(drive(0.02 + grown(3.0) + 0.48 * floated))
     assert history.returns == pytest.approx([START + 120.0, START + 160.0], abs=0.11)
     assert np.isinf(history.starts[1:]).all()
-    level = history.level[[600, 1000, 1400, 1800], 0]
+    level = history.solution_sigma[[600, 1000, 1400, 1800], 0]
     assert level == pytest.approx([0.02, 0.02, 0.5, 0.02], abs=0.01)  # m
 
 
@@ -137,7 +137,7 @@ def test_what_falls_within_some_epochs_is_another_solution():
     sigma[TIME < 119.9] = (0.02 + grown(1.0))[TIME < 119.9]
     history = drift_history(drive(sigma))
     assert history.turns == pytest.approx([START + 120.0, START + 121.0], abs=0.11)
-    assert history.level[1205, 0] == pytest.approx(0.3)  # m
+    assert history.solution_sigma[1205, 0] == pytest.approx(0.3)  # m
     assert history.starts[0] == pytest.approx(START + 80.0, abs=5.0) and np.isinf(history.starts[1])
 
 
@@ -146,7 +146,7 @@ def test_drift_grows_from_what_is_held():
     floated = 0.28 * (TIME >= 60.0)
     history = drift_history(drive(0.02 + floated + grown(3.0)))
     assert history.starts[0] == pytest.approx(START + 60.0, abs=0.11)
-    assert history.level[1000, 0] == pytest.approx(0.3)  # m
+    assert history.solution_sigma[1000, 0] == pytest.approx(0.3)  # m
 
 
 def test_sigma_that_converges_after_its_fall_is_no_drift():
@@ -164,5 +164,5 @@ def test_heights_that_vary_less_are_held_like_the_rest():
         START + TIME, CORNER + np.outer(TIME, [0.0, 10.0, 0.0]), Rotation.identity(len(TIME)), sigma
     )
     stated = stated_sigma(trajectory, Pos())
-    assert stated.held[0] == pytest.approx([0.02, 0.02, 0.04])  # m
+    assert stated.known_gnss[0] == pytest.approx([0.02, 0.02, 0.04])  # m
     assert stated.gnss[0] == pytest.approx([0.02, 0.02, 0.04])

@@ -1,4 +1,4 @@
-"""What is believed of the POS: stated where it states it, from survey.toml where it doesn't."""
+"""Prior sigmas of the POS: stated ones, and those of survey.toml where none are stated."""
 
 import numpy as np
 import pytest
@@ -29,23 +29,23 @@ def test_beliefs_stand_in_for_sigmas_that_are_not_stated():
     stated = stated_sigma(drive(), POS, [START + 5.0, START + 50.0])
     assert stated.position == pytest.approx(0.5)  # m
     assert stated.angles == pytest.approx(np.tile(POS.attitude_sigma, (2, 1)))
-    assert stated.drift == pytest.approx(0.5) and not stated.held.any()
+    assert stated.drift == pytest.approx(0.5) and not stated.known_gnss.any()
 
 
 def test_sigma_that_grows_is_split_into_what_stays_and_what_grows():
     "2 cm all the time and 40 cm grown from 60 s on: jitter 2 cm, drift with it 40 cm by squares"
     stated = stated_sigma(drive(lambda t: 0.02 + 0.01 * np.maximum(t - 60.0, 0.0)), POS)
-    assert stated.held == pytest.approx(0.02)  # m
+    assert stated.known_gnss == pytest.approx(0.02)  # m
     assert stated.drift[-1] == pytest.approx(np.sqrt(0.419**2 - 0.02**2))
     later = stated.gps_time > stated.gps_time[0] + 62.0
-    whole = (stated.drift**2 + stated.held**2)[later]
+    whole = (stated.drift**2 + stated.known_gnss**2)[later]
     assert whole == pytest.approx(stated.position[later] ** 2)
     assert not stated.drift[0].any()
 
 
 def test_constant_sigma_tells_nothing_of_when_drift_grows():
-    "Where sigma(t) never doubles no part of it is taken for what GNSS holds"
-    assert not stated_sigma(drive(lambda t: 0.02 + 0.0001 * t), POS).held.any()
+    "If sigma(t) never doubles, no part of it is attributed to GNSS"
+    assert not stated_sigma(drive(lambda t: 0.02 + 0.0001 * t), POS).known_gnss.any()
 
 
 def test_roll_turns_about_the_way_of_a_vehicle_that_drives_east():

@@ -86,7 +86,7 @@ def test_time_stamps_that_jitter_make_no_steps():
 
 
 def test_passes_are_looked_at_apart():
-    "What a vehicle drove in a gap of the trajectory is no step"
+    "Motion of a vehicle in a gap of the trajectory is no step"
     time, path = city_drive(10.0)
     apart = np.where(time > 150.0, time + 500.0, time)
     assert len(find_steps(recorded(apart, path + np.where(time > 150.0, 300.0, 0.0)[:, None]))) == 0
@@ -134,7 +134,7 @@ def test_a_drone_that_turns_on_its_way_makes_no_steps():
 
 @pytest.mark.parametrize("row", [1, 2, -2, -1])
 def test_a_step_in_the_outermost_epochs_is_no_half_step_beside_them(row):
-    "What moves at the first or last epoch of a pass is not told from what moves beside it"
+    "A step at the first or last epoch of a pass is not separable from one next to it"
     path = CORNER + np.outer(np.arange(600) * 0.1, [0.0, 10.0, 0.0])
     path[row:] += [1.5, 0.0, 0.0]
     trajectory = Trajectory(START + np.arange(600) * 0.1, path, Rotation.identity(600))

@@ -1,4 +1,4 @@
-"""What the report shows of the cloud."""
+"""Views of the cloud in a report."""
 
 from dataclasses import replace
 

@@ -143,7 +143,7 @@ def test_what_failed_stands_on_the_first_screen():
     ],
 )
 def test_what_other_methods_leave_out_is_stated(details, key, values):
-    "How many ties correct used, or why none; a document without that method says nothing of ties"
+    "Number of ties that correct used, or the reason for none; nothing without that method"
     document = fake({"raw": 0.5, "lsc": 0.03, "correct": 0.02})
     document["methods"][-1]["details"] = details
     (said,) = said_of(document, "Ties")

@@ -41,7 +41,7 @@ def test_report_json_tells_the_accuracy_and_the_files(commanded):
 
 
 def test_rows_come_back_from_the_document():
-    "What report.json says of a target is read as the same row, unknown numbers too"
+    "A target in report.json is read as the same row, with its unknown numbers"
     rows = fabricate(drive())[2].targets
     rows.append(
         TargetRow.unobserved("LOST", 2, "check", ORIGIN, because("no returns within 0.5 m"))

@@ -118,7 +118,7 @@ def pages(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def opened(pages):
-    "What Chromium found in every page: (results by page and frame, lines of its console)"
+    "Findings of Chromium in every page: (results by page and frame, lines of its console)"
     frames = [
         (path.stem, label, PAPER.get(path.stem, width) if label == "print" else width)
         for path in pages

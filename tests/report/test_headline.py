@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.cli.correct import tell
-from mlscorr.estimate import DRIFT, REASONS, Support, WeakStretch
+from mlscorr.cli.correct import report_result
+from mlscorr.estimate import DRIFT, REASONS, Support, WeakInterval
 from mlscorr.estimate.support import NO_CONTROL
 from mlscorr.evaluate import DatumDifference, TargetRow
 from mlscorr.report import first_screen
@@ -114,7 +114,7 @@ def test_what_was_found_half_a_metre_off_is_not_said_to_be_unseen():
 
 def test_an_extrapolated_part_is_told_with_its_length_and_the_error_to_expect():
     "Seconds, metres, share of the points, and the largest sigma"
-    weak = WeakStretch(0.0, 20.0, 100.0, 0.4, "a"), WeakStretch(50.0, 61.5, 60.0, 1.25, "b")
+    weak = WeakInterval(0.0, 20.0, 100.0, 0.4, "a"), WeakInterval(50.0, 61.5, 60.0, 1.25, "b")
     report = replace(fabricate(drive())[2], support=Support(weak))
     values = said(report, "Extrapolated")["extrapolated"].values
     assert (values["seconds"], values["metres"], values["sigma"]) == (31.5, 160.0, 1.25)
@@ -151,7 +151,7 @@ def test_page_report_and_terminal_begin_with_the_same_statements(tmp_path, capsy
     report = replace(report, targets=[*rows, lost("C7")])
     content = {**first_screen(report), **report.document()}
     html = page(tmp_path, survey, correction, report)
-    tell(content, tmp_path, as_json=False)
+    report_result(content, tmp_path, as_json=False)
     terminal = " ".join(capsys.readouterr().err.split())
     text = words(html)
     for row in content["statements"]:
@@ -179,8 +179,8 @@ def test_a_weak_stretch_is_named_by_time_and_way_and_is_amber_where_it_exceeds_w
     report = fabricate(drive())[2]
     for sigma, rating in ((0.4, "amber"), (0.0001, "green")):
         weak = (
-            WeakStretch(10.0, 20.0, 50.0, sigma / 2, "a"),
-            WeakStretch(50.0, 61.5, 60.0, sigma, "b", 300.0),
+            WeakInterval(10.0, 20.0, 50.0, sigma / 2, "a"),
+            WeakInterval(50.0, 61.5, 60.0, sigma, "b", 300.0),
         )
         row = next(
             row
@@ -192,10 +192,10 @@ def test_a_weak_stretch_is_named_by_time_and_way_and_is_amber_where_it_exceeds_w
 
 
 def test_a_correction_that_is_extrapolated_everywhere_is_never_green():
-    "Where ties alone make it, a sigma below the misclosures says nothing of where the cloud lies"
+    "A correction by ties alone has no known position, even with a sigma below the misclosures"
     report = fabricate(drive())[2]
     everywhere = replace(report.coverage, points_extrapolated=report.coverage.points_corrected)
-    weak = Support((WeakStretch(0.0, 60.0, 300.0, 0.0001, "a"),))
+    weak = Support((WeakInterval(0.0, 60.0, 300.0, 0.0001, "a"),))
     rows = statements(replace(report, coverage=everywhere, support=weak))
     (row,) = (row for row in rows if row.what == "Extrapolated")
     assert row.rating == "amber" and row.statements[0].values["share"] == 1.0
@@ -227,7 +227,7 @@ def test_a_sigma_that_nobody_stated_is_called_assumed():
 
 
 def test_a_drive_without_control_of_its_own_is_not_held_by_it():
-    "What other drives carry to it through ties is said as that"
+    "Constraints through ties with other drives are reported as such"
     report = fabricate(drive())[2]
     rows = [row for row in report.targets if row.role == "check"]
     report = replace(report, targets=rows, support=Support())
@@ -235,7 +235,7 @@ def test_a_drive_without_control_of_its_own_is_not_held_by_it():
     assert (fact.key, fact.severity) == ("held by other drives", "warning")
 
 
-@pytest.mark.parametrize("weak", [(), (WeakStretch(0.0, 9.0, 45.0, 0.02, REASONS[DRIFT]),)])
+@pytest.mark.parametrize("weak", [(), (WeakInterval(0.0, 9.0, 45.0, 0.02, REASONS[DRIFT]),)])
 def test_a_drive_that_others_hold_is_nowhere_said_to_stand_on_the_pos_alone(weak):
     "Without control of its own, and with a part of which theirs tells little, it is not red"
     report = fabricate(drive())[2]
@@ -244,7 +244,7 @@ def test_a_drive_that_others_hold_is_nowhere_said_to_stand_on_the_pos_alone(weak
     (fact,) = said(report, "Control points").values()
     assert (fact.key, fact.severity) == ("control of other drives", "warning")
     assert headline(report).startswith("2 of 2 surveyed check points were found")
-    alone = Support((WeakStretch(0.0, 9.0, 45.0, 0.02, REASONS[NO_CONTROL]),))
+    alone = Support((WeakInterval(0.0, 9.0, 45.0, 0.02, REASONS[NO_CONTROL]),))
     assert list(said(replace(report, support=alone), "Control points")) == ["no control point"]
 
 

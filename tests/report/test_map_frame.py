@@ -1,4 +1,4 @@
-"""What all maps share."""
+"""Frame common to all maps."""
 
 import numpy as np
 from matplotlib.figure import Figure

@@ -34,7 +34,7 @@ def test_names_on_the_map_do_not_cover_one_another():
 
 
 def test_names_on_the_map_go_to_the_other_side_of_a_star():
-    "Where a control point is needed right beside a target, its name stays, and can be read"
+    "A name stays legible if a control point is needed right next to its target"
     _, correction, report = fabricate(drive(), 6)
     row = report.targets[0]
     beside = 12.0 * np.array([-1.0 if row.before[0] > 0 else 1.0, 0.0])  # m

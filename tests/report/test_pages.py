@@ -1,4 +1,4 @@
-"""What all pages share."""
+"""Frame common to all pages."""
 
 import re
 
@@ -36,7 +36,7 @@ def test_sections_stand_in_their_order_and_are_linked():
 
 
 def test_styles_and_scripts_lie_in_the_page():
-    "Those that all pages have, and those of one"
+    "Styles and scripts of all pages, and those of one"
     assert "tr.best" not in made() and ".js .pair" in made()
     html = made(styles=("compare.css",), scripts=("slide.js",))
     assert "tr.best" in html and "const handles" in html
@@ -56,6 +56,6 @@ def test_a_page_says_when_and_by_what_it_was_written():
 
 
 def test_values_are_shown_in_words():
-    "What is not a number is not determined; numbers have four figures"
+    "A value that is not a number is not determined; numbers have four figures"
     assert show(float("nan")) == "not determined" and show(1 / 3) == "0.3333"
     assert data_uri(b"a", "png") == "data:image/png;base64,YQ=="

@@ -133,7 +133,7 @@ async function run() {
 
 @pytest.fixture(scope="module")
 def opened(commanded, tmp_path_factory):
-    "What Chromium found in the street's report: (results by frame, lines of its console, report)"
+    "Findings of Chromium in the report: (results by frame, lines of its console, report)"
     need_browser()
     folder = tmp_path_factory.mktemp("browser")
     shutil.copy(commanded[1] / "report.html", folder)
@@ -144,7 +144,7 @@ def opened(commanded, tmp_path_factory):
 
 @pytest.fixture(params=["narrow", "wide"])
 def frame(request, opened):
-    "What was found at 400 px and at 1600 px width"
+    "Findings at 400 px and at 1600 px width"
     return opened[0][request.param]
 
 

@@ -1,4 +1,4 @@
-"""What a correction was made of."""
+"""Inputs and outputs of a correction."""
 
 from dataclasses import replace
 
@@ -59,7 +59,7 @@ def test_the_coverage_is_told_in_seconds_and_points():
 
 
 def test_files_stand_with_size_and_hash():
-    "What was read before what was written; clouds in points, others in bytes"
+    "Inputs come before outputs; clouds are in points, other files in bytes"
     report = replace(fabricate(drive())[2], inputs=(FileRow("a.csv", "cd", "control", bytes=4000),))
     rows = files(report)
     assert rows["Read"] == [("control", "a.csv", "4 000 bytes", "cd")]

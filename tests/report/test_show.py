@@ -37,7 +37,7 @@ def no_display(monkeypatch):
 
 
 def read(path):
-    "What a page lists: pairs (name, words), its layers, its origin (m), its text"
+    "Contents of a page: pairs (name, words), its layers, its origin (m), its text"
     text = path.read_text(encoding="utf-8")
     scene = json.loads(re.search(r'id="scene">(.*?)</script>', text, re.S)[1])
     entries = re.findall(r"<b>(.*?)</b> <span>(.*?)</span>", text)
@@ -47,7 +47,7 @@ def read(path):
 
 
 def places(layer, origin):
-    "Where the points of a layer are in the map (n, 3), in m"
+    "Positions of the points of a layer on the map (n, 3), in m"
     return unpacked(layer["places"]).reshape(-1, 3) + origin
 
 

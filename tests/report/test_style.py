@@ -1,4 +1,4 @@
-"""What all figures share."""
+"""Style common to all figures."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What is said of ties between passes."""
+"""Statements on ties between passes."""
 
 import pytest
 

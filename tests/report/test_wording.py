@@ -2,7 +2,7 @@
 
 import pytest
 
-from mlscorr.report.wording import SENTENCES, assumed_in_words, stretch_in_words
+from mlscorr.report.wording import SENTENCES, assumed_in_words, interval_in_words
 from mlscorr.survey import Statement
 
 OFF = {"before": 0.775, "after": 0.08}
@@ -611,7 +611,7 @@ def test_no_sentence_is_missing_from_the_catalogue():
 
 def test_an_extrapolated_part_is_named_by_time_and_way():
     "And what it is, with its sigma"
-    assert stretch_in_words(50.0, 61.5, 300.0, 60.0, "no control", 1.25) == (
+    assert interval_in_words(50.0, 61.5, 300.0, 60.0, "no control", 1.25) == (
         "50.0 to 61.5 s, chainage 300 to 360 m",
         "no control; sigma up to 1.25 m",
     )

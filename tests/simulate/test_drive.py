@@ -38,7 +38,7 @@ def turned(a, b):
 
 
 def heading_off_course(trajectory, faster=0.5):
-    "How far the heading is off the course where the vehicle moves. Units: deg"
+    "Difference of heading and course while the vehicle moves. Units: deg"
     speed, course = speed_and_course(trajectory)
     heading = angles_from_attitude(trajectory.attitude)[2][:-1]
     return turned(heading, course)[speed > faster]
@@ -313,7 +313,7 @@ def own_csv(path, gap=0.0, speed=8.0):
 
 
 def test_a_csv_keeps_its_attitude(tmp_path):
-    "Where the convention is known, roll, pitch and heading are taken as they stand"
+    "With a known convention roll, pitch and heading are used as given"
     path = own_csv(tmp_path / "own.csv")
     _, _, (trajectory,) = followed(path)
     poses = read_poses(path)

@@ -80,7 +80,7 @@ def test_is_linear_in_its_size_and_the_same_each_time(seen, direction):
 
 
 def test_a_part_of_a_survey_moves_as_the_whole_does(seen):
-    "What is seen in chunks moves as what is seen at once, to a nanometre"
+    "Chunks move like the whole survey, to a nanometer"
     half = RecordedPoints(
         seen.gps_time[:100], seen.xyz[:100], seen.scanner_xyz[:100], seen.trajectory, MOUNTING
     )

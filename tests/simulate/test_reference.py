@@ -40,7 +40,7 @@ def folders(tmp_path_factory):
 
 
 def distance(triangles, points):
-    "How far points (n, 3) are from triangles, both about one origin. m"
+    "Distance of points (n, 3) from triangles, both about one origin. Units: m"
     near = ray_caster(triangles).compute_closest_points(points.astype(np.float32))
     return np.linalg.norm(near["points"].numpy() - points, axis=1)
 

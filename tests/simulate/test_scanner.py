@@ -46,7 +46,7 @@ def with_(scanner, **changes):
 
 def drive(seconds=2.0, rate=100.0, swing=1.0, speed=5.0):
     "A drive through the room's middle that rolls, pitches and turns"
-    elapsed = np.arange(round((seconds + 2 * SETTINGS.lead) * rate) + 1) / rate
+    elapsed = np.arange(round((seconds + 2 * SETTINGS.trajectory_margin) * rate) + 1) / rate
     wave = swing * np.sin(elapsed[:, None] / [0.7, 1.1, 1.3])
     position = ORIGIN + np.column_stack([wave[:, 0], speed * elapsed, 0.1 * wave[:, 1]])
     return Trajectory(START + elapsed, position, attitude_from_angles(*(0.2 * wave).T))
@@ -64,7 +64,7 @@ def scan(mesh, trajectory, mounting, scanner, seed=1, **options):
 
 
 def same(one, other, but=()):
-    "That two Pulses are equal bit for bit, but for some fields, which aren't"
+    "Check that two Pulses are bit-equal except in some fields, which differ"
     for field in fields(MeasuredPulses):
         a = getattr(one, field.name)
         b = getattr(other, field.name)

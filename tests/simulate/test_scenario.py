@@ -132,7 +132,7 @@ def test_what_can_not_be_is_refused_in_a_sentence(write, text, message):
 
 
 def test_all_faults_come_at_once(write):
-    "Who mistyped three keys hears of three, and of no fault that only follows from these"
+    "One error lists all three mistyped keys, and no fault that only follows from these"
     text = "nam = 'a'\n[drive]\nspead = 1\n[[scanner]]\nrang_noise = 1\n"
     with pytest.raises(ValueError, match="unknown key") as error:
         read_scenario(write(text))

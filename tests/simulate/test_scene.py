@@ -81,7 +81,7 @@ def in_scan_plane(trajectory, place):
 
 
 def free(scene, start, end):
-    "Whether nothing of the scene stands between points (n, 3) and (n, 3), to 3 cm"
+    "Flags of pairs of points (n, 3) with nothing of the scene between them, to 3 cm"
     rays = np.hstack([start, end - start]).astype(np.float32)
     reach = ray_caster(scene.mesh.triangles).cast_rays(rays)["t_hit"].numpy()
     return reach * np.linalg.norm(end - start, axis=1) > np.linalg.norm(end - start, axis=1) - 0.03
@@ -518,7 +518,7 @@ def test_targets_without_room_beside_the_drive_are_refused(tmp_path):
 
 
 def test_targets_without_room_are_left_out_and_counted():
-    "Where a boat turns round on a river some targets find no free sight; the others stand"
+    "On a river where a boat turns round, some targets have no free sight; the others are placed"
     drive_ = DriveScenario(u_turn=True, speed=4.0)
     scenario = Scenario(scene={"kind": "river"}, drive=drive_)
     wanted = scenario.targets.control + scenario.targets.check

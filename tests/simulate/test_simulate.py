@@ -394,7 +394,7 @@ def test_a_written_survey_can_be_corrected(tmp_path):
 
 
 def test_a_survey_without_any_noise_can_be_read(tmp_path):
-    "Where nothing is uncertain, sigmas are left out or at their rounding, as readers want some"
+    "Without noise, sigmas are omitted or at their rounding, as some readers require them"
     quiet = with_(SCANNER, range_noise=0.0, angle_noise=0.0)
     exact = TargetScenario(control=2, check=0, survey_sigma=(0.0, 0.0))
     survey = make(with_(SHORT, scanner=(quiet,), targets=exact))
@@ -405,7 +405,7 @@ def test_a_survey_without_any_noise_can_be_read(tmp_path):
 
 
 def test_progress_counts_every_pulse_that_is_fired(pair, tmp_path):
-    "What is announced is what is done, in steps of a block, so that the time left is right"
+    "The announced work is done in steps of a block, so the remaining time is right"
     bars = []
 
     def progress(title, total):

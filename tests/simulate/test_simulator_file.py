@@ -75,7 +75,7 @@ def test_a_boresight_of_any_digits_comes_back(tmp_path):
 
 
 def test_the_beliefs_of_a_survey_are_its_file(street, tmp_path):
-    "What survey.toml says of mounting, scanner and POS, in the same words, and no effect"
+    "Mounting, scanner and POS as in survey.toml, in the same words, without effects"
     survey = read_survey(street)
     beliefs = beliefs_of(survey)
     assert beliefs.effects == ()
@@ -136,7 +136,7 @@ def test_effects_act_in_their_order_however_they_are_listed(tmp_path):
             r"mounting\.lever_arm_sigma is an unknown key",
         ),
         ("[mounting]\nlever_arm = [0, 0, 0]", r"mounting\.boresight is missing\."),
-        ("[pos]\ncorrelation_time = 0", r"pos\.correlation_time = 0 can't be used"),
+        ("[pos]\ncorrelation_time = 0", r"pos\.correlation_time = 0 is invalid"),
         (
             "[[effects]]\nname = 'boresite'\nmagnitude = 1",
             r"effects\.0: 'boresite' is an unknown effect; the nearest known one is boresight\.",

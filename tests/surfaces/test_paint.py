@@ -1,4 +1,4 @@
-"""Where scan lines cross paint."""
+"""Crossings of scan lines with paint."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ def crossings(paint=road.on_paint, seed=1, change=None):
 
 
 def lifted(height):
-    "What lifts the points of a cloud by a function of their places along and left. Units: m"
+    "Change that lifts points by a function of their places along and left. Units: m"
 
     def change(cloud):
         up = height(*road.along_and_left(cloud.xyz).T)
@@ -71,7 +71,7 @@ def test_paint_lies_on_level_ground(height):
 
 
 def test_points_in_no_order_tell_no_paint():
-    "Where points come in no order of scan lines nothing is crossed"
+    "Points that are not in the order of scan lines give no crossings"
     rng = np.random.default_rng(2)
     assert len(crossings(change=lambda cloud: cloud[rng.permutation(len(cloud))])[0]) == 0
 

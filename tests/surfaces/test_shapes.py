@@ -119,8 +119,9 @@ def test_what_is_no_plane_or_pole_is_refused(shape):
 
 @pytest.mark.parametrize("sides", [(0.0,), (-0.05, 0.0, 0.05)])
 def test_one_scan_line_is_no_post(sides):
-    """What one scan line meets, as the edge of a house, has no width: where it stands is open by
-    the step between lines. Three lines 5 cm apart tell a post to 1.5 cm
+    """A post on one scan line has no width, so its position is open by the step between lines.
+
+    Three lines 5 cm apart locate a post to 1.5 cm.
     """
     rng = np.random.default_rng(2)
     n = 300

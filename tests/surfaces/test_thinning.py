@@ -1,4 +1,4 @@
-"""Which of many features stay."""
+"""Selection of some of many features."""
 
 from dataclasses import replace
 

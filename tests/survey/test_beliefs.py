@@ -1,4 +1,4 @@
-"""What is believed of instruments that nobody described."""
+"""Assumed properties of instruments without a description."""
 
 import numpy as np
 import pytest

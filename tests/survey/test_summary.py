@@ -1,4 +1,4 @@
-"""What a notebook shows of a survey: its parts and their sizes in a few words."""
+"""Summary of a survey in a notebook: its parts and their sizes in a few words."""
 
 from dataclasses import dataclass
 from pathlib import Path

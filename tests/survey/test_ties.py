@@ -29,7 +29,7 @@ def wall():
 
 @pytest.mark.parametrize("pair", [(0, 1), (1, 0)])
 def test_the_misclosure_is_later_less_earlier(wall, pair):
-    "What place 1 must move by, against place 2, whatever the order in the pair"
+    "Shift that place 1 needs relative to place 2, whatever the order in the pair"
     ties = Ties.between(wall, np.array([pair]), EAST[None], np.array([4e-6]))
     assert np.isclose(ties.misclosure[0], 0.3, atol=1e-9)
     assert np.array_equal(ties.pass_number, [[1, 2]])

@@ -35,7 +35,7 @@ def test_search_radius_is_the_surveys_and_a_diagonal():
 
 
 def near(survey, read):
-    "What collect hands on: Candidates, and points and pass numbers about each surveyed point"
+    "Output of collect: Candidates, and points and pass numbers about each surveyed point"
     handed_on = {}
     parts = []
     since = []

@@ -61,7 +61,7 @@ def test_every_kind_is_found_to_millimetres_and_nothing_else(look):
 
 @pytest.mark.parametrize("look", ["disc", "hole", "board"])
 def test_a_target_that_is_known_is_not_fitted_again(look):
-    "Where it was fitted well; a poor fit, or one a metre off, keeps nothing from being fitted"
+    "A good fit is not repeated; a poor fit, or one 1 m off, does not prevent another"
     kind = TARGETS[look][0]
     repeats = []
     for seen in views(look):

@@ -1,4 +1,4 @@
-"""Where the scanner was: what the trajectory says, at and between its epochs."""
+"""Positions of the scanner from the trajectory, at and between its epochs."""
 
 import numpy as np
 import pytest

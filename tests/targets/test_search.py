@@ -45,7 +45,7 @@ def cloud():
 
 
 def found(chunks, survey, shapes=(("circle", 0.5),)):
-    "What a search of chunks finds, each target once"
+    "Targets that a search of chunks finds, each once"
     rng = np.random.default_rng(3)
     results = list(search_targets(chunks, survey, shapes, rng))
     return distinct([target for _, targets in results for target in targets])
@@ -87,7 +87,7 @@ def test_sizes_and_kinds_need_not_be_known(cloud, survey):
 
 
 def test_points_without_a_pose_are_left_out(cloud, survey):
-    "Where the drive was not recorded nothing is found, elsewhere the same"
+    "Nothing is found outside the trajectory, elsewhere the same"
     drive = survey.trajectory
     keep = (drive.gps_time < START + 1.8) | (drive.gps_time > START + 3.8)
     broken = Trajectory(drive.gps_time[keep], drive.position[keep], drive.attitude[keep])

@@ -58,7 +58,7 @@ def test_a_seed_of_a_disc_knows_its_extent_and_threshold():
 
 
 def test_a_saturated_disc_may_be_larger():
-    "Where more than half of its points have the largest count it is told, else not"
+    "A disc with more than half of its points at the largest count is saturated"
     echoes = wall(disc, RNG(1))
     clipped = type(echoes)(
         echoes.xyz, echoes.gps_time, np.minimum(echoes.intensity, 10_000.0), echoes.path, TOLERANCE

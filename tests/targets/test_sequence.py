@@ -15,7 +15,7 @@ def test_points_fill_the_cube_more_evenly_than_random_ones(dimensions):
 
 
 def test_points_are_those_of_another_implementation():
-    "Those of scipy from its second point on, to the last bit, in the fourth block of 500"
+    "Points equal those of scipy from its second on, to the last bit, in the fourth block of 500"
     halton = qmc.Halton(5, scramble=False)
     halton.fast_forward(1 + 3 * 500)
     assert np.array_equal(quasi_random(500, 5, 3), halton.random(500))

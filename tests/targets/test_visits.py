@@ -66,7 +66,7 @@ def test_a_gap_of_the_trajectory_parts_visits():
 
 
 def test_a_turn_before_the_first_point_parts_nothing():
-    "What was scanned after a turn alone is one visit, that of a single point too, of none none"
+    "Points after a turn are one visit; a single point is one, and no points are none"
     time, place = drive((4, 5), (4, -5))
     for seen in (np.arange(81, 160), np.array([159])):
         assert visits(time, place, seen) == [seen.tolist()]

@@ -12,8 +12,8 @@ from mlscorr.ties import (
     group_by_time,
     information,
     pair_features,
-    unheld_directions,
-    unheld_sentence,
+    unconstrained_directions,
+    unconstrained_sentence,
     weigh_by_time,
 )
 from tests.beds import tie_streets as street
@@ -61,12 +61,12 @@ def test_ties_without_neighbours_are_kept():
 def test_noise_of_normals_holds_no_tunnel():
     "Without walls across the way its direction is unheld, however many noisy normals there are"
     ties, _ = ties_of(street.features())
-    assert list(unheld_directions(ties)) == []
+    assert list(unconstrained_directions(ties)) == []
     tunnel = ties[(np.abs(ties.direction[:, 0]) < 0.1) & (ties.kind == "plane")]
-    ((part, axis),) = unheld_directions(tunnel)
+    ((part, axis),) = unconstrained_directions(tunnel)
     assert len(part) == len(tunnel)
     assert abs(axis[0]) > np.cos(np.radians(3.0))
-    assert "passes 1 and 2" in unheld_sentence(part, axis)
+    assert "passes 1 and 2" in unconstrained_sentence(part, axis)
 
 
 def later(ties, stretches, azimuth=0.0):
@@ -81,11 +81,14 @@ def test_a_wall_in_one_place_holds_no_tunnel():
     ties, _ = ties_of(street.features())
     tunnel = ties[(np.abs(ties.direction[:, 0]) < 0.1) & (ties.kind == "plane")]
     parts = [later(tunnel, number) for number in range(1, 5)]
-    ((part, axis),) = unheld_directions(type(ties).concatenate([ties, *parts]))
+    ((part, axis),) = unconstrained_directions(type(ties).concatenate([ties, *parts]))
     assert len(part) == 4 * len(tunnel)
     assert abs(axis[0]) > np.cos(np.radians(3.0))
     parts = [later(ties, number) for number in range(1, 3)]
-    assert list(unheld_directions(type(ties).concatenate([ties, *parts, later(tunnel, 3)]))) == []
+    assert (
+        list(unconstrained_directions(type(ties).concatenate([ties, *parts, later(tunnel, 3)])))
+        == []
+    )
 
 
 def test_a_bend_holds_no_tunnel():
@@ -93,7 +96,7 @@ def test_a_bend_holds_no_tunnel():
     ties, _ = ties_of(street.features())
     tunnel = ties[(np.abs(ties.direction[:, 0]) < 0.1) & (ties.kind == "plane")]
     bent = type(ties).concatenate([later(tunnel, n, 15.0 * (n - 2)) for n in range(5)])
-    ((part, axis),) = unheld_directions(bent)
+    ((part, axis),) = unconstrained_directions(bent)
     assert len(part) == len(bent)
     assert abs(axis[0]) > np.cos(np.radians(3.0))
 

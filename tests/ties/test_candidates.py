@@ -64,7 +64,7 @@ def all_pairs(features, place, sigma, radius, shift):
 @pytest.mark.parametrize("way", [0.0, 3.0])
 @pytest.mark.parametrize(("sigma", "radius"), [(0.05, 1.0), (0.5, 2.0)])
 def test_all_pairs_within_the_gates_are_candidates(sigma, radius, way):
-    "Where fewer are near than are weighed, they are all pairs within the gates, displaced or not"
+    "With few features nearby they are all pairs within the gates, displaced or not"
     rng = np.random.default_rng(1)
     features = crowd(rng, 600)
     sigmas = rng.uniform(0.5, 1, 600) * sigma

@@ -1,4 +1,4 @@
-"""Which features are the same thing."""
+"""Pairing of features that are the same object."""
 
 from dataclasses import replace
 
@@ -180,7 +180,7 @@ def test_directions_are_parallel_within_the_angle(degrees, count):
 
 
 def test_one_pass_has_no_ties():
-    "What a single pass sees once is tied to nothing"
+    "Features measured once in a single pass have no ties"
     assert len(pair(street.features(1, 1), 1.0)) == 0
 
 
@@ -217,7 +217,7 @@ def test_a_pole_ties_both_directions_across_it():
 
 @pytest.mark.parametrize(("kind", "count"), [("pole", 2), ("plane", 0)])
 def test_a_gate_is_no_narrower_than_the_noise(kind, count):
-    "Where places are known to 3 mm, poles of 2 cm are a pair 5 cm apart, walls of 1 mm are none"
+    "At a sigma of 3 mm, poles of 2 cm pair up at 5 cm, walls of 1 mm do not"
     features = walls([[10, 5, 1], [10.05, 5, 1]], [1, 2], [0.0, 0.0, 1.0])
     features = replace(features, kind=np.full(2, kind))
     if kind == "pole":

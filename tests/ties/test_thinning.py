@@ -1,4 +1,4 @@
-"""Which of many ties stay."""
+"""Selection of some of many ties."""
 
 from dataclasses import replace
 

@@ -16,7 +16,7 @@ class Settings:
     target_pulses: int = 40_000  # around a target, nearest in time: vehicles stop; guard
     delivered: float = 0.7  # of all pauses are of one pulse: fewer indicate a thinned cloud
     line_pulses: int = 100  # that show the sequence of pulses
-    level: float = 0.01  # rad: elevations of one scan plane
+    plane_elevation: float = 0.01  # rad: elevations of one scan plane
     worst: float = 3.0  # times the sigma of a row, above which a simulated target is ignored
     least_worst: float = 0.003  # m: best accuracy of a simulated target
     extent: float = 0.6  # of a target's extent, from expected center to farthest point

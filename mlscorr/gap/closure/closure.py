@@ -132,12 +132,12 @@ def close_gap(
         probability = cause.probability
     ruler = _Ruler.of(kind, case, probability)
     folds = make_folds(case, whole, ruler.observations, ruler.model, simulated, rng, progress)
-    held = ruler.compare(folds, rng)
+    compared = ruler.compare(folds, rng)
     fitted = replace(folds, fold=np.where(used, 0, -1), predicted=(whole,))
-    gap = _gap(held, unit)
+    gap = _gap(compared, unit)
     if cause.effect == "none":
         gap = replace(gap, after=gap.before)
-        held = replace(held, gone=0.0, interval=(0.0, 0.0))
+        compared = replace(compared, gone=0.0, interval=(0.0, 0.0))
     in_sample = _gap(ruler.compare(fitted, rng, used), unit)
     return Closure(
         cause.effect,
@@ -146,12 +146,12 @@ def close_gap(
         unit,
         gap.before,
         gap.after,
-        held.gone,
-        held.interval,
+        compared.gone,
+        compared.interval,
         gap.null_band,
         folds.held_out,
         folds.is_held_out,
-        signed_root(held.folds, unit),
+        signed_root(compared.folds, unit),
         in_sample,
         errors_over_sigma(rows, ruler.observations, folds, rng),
     )
@@ -247,13 +247,17 @@ class _Ruler:
         drawn = np.sqrt(rows.noise)[:, None] * rng.standard_normal((len(rows), replicas))
         before = np.column_stack([rows.residual, drawn])
         if self.kind == "scatter":
-            held = Predicted(nothing.shift, folds.held("growth"), nothing.extra)
-            grown = np.column_stack([rows.residual, np.log1p(held.growth)[:, None] + drawn])
-            of_kind &= ~_outliers(rows.residual, np.log1p(held.growth), rows.noise, of_kind)
+            out_of_sample = Predicted(nothing.shift, folds.out_of_fold("growth"), nothing.extra)
+            grown = np.column_stack(
+                [rows.residual, np.log1p(out_of_sample.growth)[:, None] + drawn]
+            )
+            of_kind &= ~_outliers(
+                rows.residual, np.log1p(out_of_sample.growth), rows.noise, of_kind
+            )
             before = scatter_terms(rows, nothing, before)
-            after = scatter_terms(rows, held, grown)
+            after = scatter_terms(rows, out_of_sample, grown)
         else:
-            after = np.column_stack([rows.residual - folds.held("shift"), drawn])
+            after = np.column_stack([rows.residual - folds.out_of_fold("shift"), drawn])
         before = before[of_kind]
         after = after[of_kind]
         place = np.flatnonzero(of_kind)
@@ -343,7 +347,7 @@ def errors_over_sigma(
     o = observations
     after = folds.whole
     residual = rows.residual[:, None]
-    shift = folds.held("shift")[:, None]
+    shift = folds.out_of_fold("shift")[:, None]
     nothing = Predicted.nothing(rows)
     scaled = [
         o.columns(values) / _sigma(o, predicted)[:, None]

@@ -125,7 +125,7 @@ class Folds:
         """Index of `predicted` (m,) that is compared with each row, if one is required."""
         return np.clip(self.fold, 0, len(self.predicted) - 1)
 
-    def held(self, name: str) -> np.ndarray:
+    def out_of_fold(self, name: str) -> np.ndarray:
         """Return a column (m,) of Predicted by name, for each row from its own fold."""
         each = np.array([getattr(predicted, name) for predicted in self.predicted])
         return each[self.of_rows, np.arange(len(self.fold))]

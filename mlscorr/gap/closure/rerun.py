@@ -82,7 +82,7 @@ def _as_seen(residual, rows, beams, views, run, dither, speckle, fit_rng):
     patches = _Patches.of(beams, xyz, kept, np.isfinite(met.range))
     for channel, values in zip(ON_PATCHES, (_shared, _roughness, _return_rate), strict=True):
         on = np.flatnonzero(rows.channel == channel)
-        residual[on] = values(patches, views[on], rows.believed[on])
+        residual[on] = values(patches, views[on], rows.assumed[on])
     simulated = xyz, kept, met, run.beams, boards
     refit_targets(residual, rows, run.survey, beams, views, simulated, fit_rng)
     return patches
@@ -218,22 +218,22 @@ class _Patches:
         return cls(centre, normal, variance, points, fired)
 
 
-def _shared(patches, views, _believed):
+def _shared(patches, views, _assumed):
     first, second = views.T
     normal = patches.normal[first] + patches.normal[second]
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    apart = patches.centre[first] - patches.centre[second]
-    return np.where((views >= 0).all(axis=1), np.einsum("mi,mi->m", normal, apart), np.nan)
+    separation = patches.centre[first] - patches.centre[second]
+    return np.where((views >= 0).all(axis=1), np.einsum("mi,mi->m", normal, separation), np.nan)
 
 
-def _roughness(patches, views, believed):
+def _roughness(patches, views, assumed):
     view = views[:, 0]
     variance = np.maximum(patches.variance[view], 1e-12)
-    ratio, _ = log_roughness(variance, believed, patches.points[view])
+    ratio, _ = log_roughness(variance, assumed, patches.points[view])
     return np.where(view >= 0, ratio, np.nan)
 
 
-def _return_rate(patches, views, _believed):
+def _return_rate(patches, views, _assumed):
     view = views[:, 0]
     share = patches.points[view] / np.maximum(patches.fired[view], 1)
     return np.where((view >= 0) & (patches.fired[view] > 0), share - 1.0, np.nan)
@@ -350,14 +350,14 @@ def _fitted(cloud, shape, survey, place, bright, rng):
     Points brighter than half way from background to paint are tried first, which usually suffices.
     """
     kind, size = shape
-    apart = np.linalg.norm(cloud.xyz - place, axis=1)
-    if (apart <= SETTINGS.largest_offset * size).sum() < TARGETS.smallest_count:
+    distance = np.linalg.norm(cloud.xyz - place, axis=1)
+    if (distance <= SETTINGS.largest_offset * size).sum() < TARGETS.smallest_count:
         return None
     path = ScannerPath.of(survey, cloud.gps_time)
-    beside = cloud.intensity[apart > SETTINGS.background * size]
-    dark = np.percentile(beside, 90) if len(beside) else 0.0
+    surroundings = cloud.intensity[distance > SETTINGS.background * size]
+    dark = np.percentile(surroundings, 90) if len(surroundings) else 0.0
     spot = BrightRegion(place, SETTINGS.extent * diameter(kind, size), (bright + dark) / 2)
-    lit = (cloud.intensity >= spot.threshold) & (apart <= spot.radius)
+    lit = (cloud.intensity >= spot.threshold) & (distance <= spot.radius)
     if kind in BY_EDGES or lit.sum() < TARGETS.smallest_count:
         spots = [None]
     else:

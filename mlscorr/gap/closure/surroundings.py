@@ -290,9 +290,9 @@ def _scanned(target):
     return time.min() - OBSERVE.moment, time.max() + OBSERVE.moment
 
 
-def _extent(target, apart):
+def _extent(target, separation):
     """Distance from a target within which beams matter, given its offset from the survey. m."""
-    return SETTINGS.around * target.size + SETTINGS.search_margin + apart
+    return SETTINGS.around * target.size + SETTINGS.search_margin + separation
 
 
 @loop
@@ -319,9 +319,9 @@ def _passing_any(start, end, place, squared_extent):
 
 def _first_returns(pulses):
     """Pulses in order of time without later echoes, which have the same time and direction."""
-    apart = np.abs(np.diff(pulses.angle)) + np.abs(np.diff(pulses.elevation))
+    separation = np.abs(np.diff(pulses.angle)) + np.abs(np.diff(pulses.elevation))
     same = (np.diff(pulses.gps_time) == 0) & (
-        apart * np.minimum(pulses.range[1:], pulses.range[:-1]) < 5e-3
+        separation * np.minimum(pulses.range[1:], pulses.range[:-1]) < 5e-3
     )
     group = np.append(0, np.cumsum(~same))
     order = np.lexsort((pulses.range, group))
@@ -347,7 +347,7 @@ def unreturned(pulses: RecordedPulses, span: tuple[float, float], opening: float
     none = pulses[:0]
     start = pulses.gps_time[0]
     pause = np.diff(pulses.gps_time)
-    if len(pause) < SETTINGS.line_pulses or np.ptp(pulses.elevation) > SETTINGS.level:
+    if len(pause) < SETTINGS.line_pulses or np.ptp(pulses.elevation) > SETTINGS.plane_elevation:
         return none
     step = np.percentile(pause, 25)
     single = np.abs(pause - step) < 0.1 * step
@@ -370,8 +370,8 @@ def unreturned(pulses: RecordedPulses, span: tuple[float, float], opening: float
     ends = np.ceil((np.array(span) - start - first) / step).astype(int)
     every = _each_turn(zero - middle, rate + more, width, ends)
     angle = np.mod(zero + (rate + more) * every + np.pi, 2 * np.pi) - np.pi
-    beside = np.abs(np.mod(angle - middle + np.pi, 2 * np.pi) - np.pi) <= width
-    lost = np.flatnonzero(beside & ~np.isin(every, number))
+    is_adjacent = np.abs(np.mod(angle - middle + np.pi, 2 * np.pi) - np.pi) <= width
+    lost = np.flatnonzero(is_adjacent & ~np.isin(every, number))
     n = len(lost)
     return RecordedPulses(
         gps_time=start + first + step * every[lost],

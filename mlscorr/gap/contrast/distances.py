@@ -247,9 +247,9 @@ def _of_draws(channel, figures, pairs, number, rng):
 def _pairwise(simulated) -> dict[str, Callable]:
     """Energy distance and MMD, with the median distance in the simulation as bandwidth."""
     some = simulated[:: max(1, len(simulated) // SETTINGS.drawn)]
-    apart = pdist(some)
-    apart = apart[apart > 0]
-    bandwidth = float(np.median(apart)) if len(apart) else 1.0
+    pairwise = pdist(some)
+    pairwise = pairwise[pairwise > 0]
+    bandwidth = float(np.median(pairwise)) if len(pairwise) else 1.0
     return {
         "energy_distance": energy_distance,
         "mmd": lambda x, y: maximum_mean_discrepancy(x, y, bandwidth),

@@ -93,9 +93,9 @@ def _spacing_of(times: Sequence[float]) -> float:
     >>> _spacing_of([3.0, 1.0, 5.0])
     2.0
     """
-    apart = np.diff(np.unique(times))
-    if len(apart):
-        return float(np.median(apart))
+    intervals = np.diff(np.unique(times))
+    if len(intervals):
+        return float(np.median(intervals))
     return SIGNATURES.step_spacing
 
 
@@ -154,10 +154,10 @@ class _Search:
             score = np.array([tried[i][0] for i in order]) + np.log(length[order])
             at = int(np.argmax(score))
             best = order[at]
-            beside = {(best + other) // 2 for other in (*order[:at][-1:], *order[at + 1 :][:1])}
-            if beside <= tried.keys():
+            neighbors = {(best + other) // 2 for other in (*order[:at][-1:], *order[at + 1 :][:1])}
+            if neighbors <= tried.keys():
                 break
-            tried |= {i: self._at(event, middle[i]) for i in beside - tried.keys()}
+            tried |= {i: self._at(event, middle[i]) for i in neighbors - tried.keys()}
         gain, table, event = tried[best]
         off = (middle[order] - middle[best]) ** 2 + length[order] ** 2 / 12
         return event, gain, table, {"time": float(np.sqrt(shares(score) @ off))}

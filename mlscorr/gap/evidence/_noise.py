@@ -282,13 +282,13 @@ def detectable_size(
         return np.log(max(evidence / bias_evidence, np.finfo(float).tiny))
 
     at = excess(doublings := 0)
-    way = -1 if at > 0 else 1
-    while ((after := excess(doublings + way)) > 0) == (at > 0):
+    direction = -1 if at > 0 else 1
+    while ((after := excess(doublings + direction)) > 0) == (at > 0):
         at = after
-        doublings = doublings + way
+        doublings = doublings + direction
         if abs(doublings) == DOUBLINGS:
             return np.nan
-    return float(kind.typical[0] * 2.0 ** (doublings + way * at / (at - after)))
+    return float(kind.typical[0] * 2.0 ** (doublings + direction * at / (at - after)))
 
 
 def _channels(rows, _observations, kind, size):

@@ -129,7 +129,7 @@ def _bank(gps_time):
     ]
     count = [np.diff(np.searchsorted(moment, [w.start, w.end]))[0] for w in windows]
     # three moments inside and three outside separate a window from a single outlier
-    return [w for w, held in zip(windows, count, strict=True) if 3 <= held <= len(moment) - 3]
+    return [w for w, inside in zip(windows, count, strict=True) if 3 <= inside <= len(moment) - 3]
 
 
 def _excess(observations, residual, windows, bank):
@@ -177,11 +177,11 @@ class _Search:
         evidence = self.score(base, windows) + prior
         while True:
             score = _excess(self.observations, self.left, windows, self.bank)[:, 0]
-            beside = [self.bank[i] for i in np.argsort(-score, kind="stable")]
-            beside = [w for w in beside if not w.overlaps(windows)][: SETTINGS.shortlist]
+            candidates = [self.bank[i] for i in np.argsort(-score, kind="stable")]
+            candidates = [w for w in candidates if not w.overlaps(windows)][: SETTINGS.shortlist]
             tries = [
                 (*windows, window._replace(factor=factor, shape=shape))
-                for window, factor, shape in product(beside, factors, EXCURSIONS)
+                for window, factor, shape in product(candidates, factors, EXCURSIONS)
             ]
             if not tries:
                 break
@@ -210,9 +210,11 @@ class _Search:
         excess = _excess(self.observations, self.left, (), self.bank)[:, 0]
         results = []
         for length in SETTINGS.window_lengths:
-            held = [i for i, window in enumerate(self.bank) if window.length == length]
-            for shape in shapes if held else ():
-                windows = (self.bank[max(held, key=lambda i: excess[i])]._replace(shape=shape),)
+            of_length = [i for i, window in enumerate(self.bank) if window.length == length]
+            for shape in shapes if of_length else ():
+                windows = (
+                    self.bank[max(of_length, key=lambda i: excess[i])]._replace(shape=shape),
+                )
                 base = self._base(windows)
                 windows = self._refined(base, windows)
                 results.append((self.score(base, windows), base, windows))

@@ -82,7 +82,7 @@ class Cause:
         """Return the Effects for the simulator. Raises ValueError if a size is impossible."""
         return tuple(signature.effect(estimate) for signature, estimate in self.parts)
 
-    def stretches(self, trajectory: Trajectory) -> tuple[tuple[str, float, float], ...]:
+    def intervals(self, trajectory: Trajectory) -> tuple[tuple[str, float, float], ...]:
         """Name, start and end of each event and window, limited to the drive.
 
         An event lasts while it is at least half of its maximum.
@@ -92,7 +92,7 @@ class Cause:
         trajectory : Trajectory
             Recorded trajectory.
         """
-        stretches = []
+        intervals = []
         for part, _ in self.parts:
             if part.kind.moment():
                 time = trajectory.gps_time[0] + part.fixed["time"]
@@ -101,11 +101,11 @@ class Cause:
                     end = time + half
                 else:
                     end = trajectory.passes[trajectory.segment(time)][1]
-                stretches.append((part.name, float(time - half), float(end)))
+                intervals.append((part.name, float(time - half), float(end)))
         for start, length, *_ in self.model.windows:
-            stretches.append((PositionNoise.name, start, start + length))
+            intervals.append((PositionNoise.name, start, start + length))
         first, last = trajectory.gps_time[[0, -1]].tolist()
-        return tuple((name, max(start, first), min(end, last)) for name, start, end in stretches)
+        return tuple((name, max(start, first), min(end, last)) for name, start, end in intervals)
 
 
 @dataclass(frozen=True)
@@ -199,7 +199,7 @@ def infer_causes(
     left = rows.residual - best.shift
     models = _likely_models(evidence, left, rng, max(replicas, 20), best.model.windows)
     if len(best.parts) < 2:
-        acts = best.stretches(survey.trajectory)
+        acts = best.intervals(survey.trajectory)
     else:
         acts = ()
     acts = acts[0][1:] if len(acts) == 1 else None  # several do not form one interval
@@ -301,7 +301,7 @@ def _with_noise(cause, rows, signatures, evidence, name):
 def _unknown_shift(rows, evidence):
     """Effect of the leading unknown block on the residuals (m,)."""
     observations = evidence.observations
-    columns = evidence.table.columns[:, evidence.lead()[1]]
+    columns = evidence.table.columns[:, evidence.hint()[1]]
     residual = observations.columns(rows.residual[:, None])[:, 0]
     weight = evidence.blocks.none[:, 0]
     models = evidence.blocks.models
@@ -352,8 +352,8 @@ def fit_amplitudes(
         means.append(covariance @ normal[:p, p])
         covariances.append(covariance)
     mean = weight @ np.array(means)
-    apart = np.array(means) - mean
-    spread = np.einsum("s,sp,sq->pq", weight, apart, apart)
+    deviation = np.array(means) - mean
+    spread = np.einsum("s,sp,sq->pq", weight, deviation, deviation)
     covariance = np.tensordot(weight, np.array(covariances), 1) + spread
     return _AmplitudeFit(mean, covariance, information)
 

@@ -239,7 +239,7 @@ class GapVerdict:
         Smallest set of labels with 95 % probability.
     p_value : float
         p-value of none, from replicas of this survey, calibrated without effects.
-    lead : str
+    hint : str
         Hint of unknown, such as "height error that grows with speed squared"; otherwise empty.
     is_hidden : bool
         True if only targets without a residual indicate unknown, and no row does.
@@ -249,7 +249,7 @@ class GapVerdict:
     probability: float
     set: tuple[str, ...]
     p_value: float
-    lead: str
+    hint: str
     is_hidden: bool = False
 
 
@@ -300,18 +300,18 @@ def decide(
     if absence is not None:
         probability = with_absence(by_rows, absence)
         is_hidden = bool(absence.runs) and by_rows["none"] > by_rows["unknown"]
-    held = np.cumsum(list(probability.values()))
-    number = int(np.searchsorted(held, SETTINGS.confidence)) + 1
+    cumulative = np.cumsum(list(probability.values()))
+    number = int(np.searchsorted(cumulative, SETTINGS.confidence)) + 1
     label = cheapest(probability, evidence.noisy, costs or Costs())
     if is_hidden and label == "none":
         label = "unknown"
-    lead = evidence.lead()[0] if label == "unknown" else ""
+    hint = evidence.hint()[0] if label == "unknown" else ""
     is_hidden &= label == "unknown"
     if is_hidden:
-        lead = absence.runs[0].lead
+        hint = absence.runs[0].hint
     labels = tuple(dict.fromkeys((*tuple(probability)[:number], label)))
     p_value = learned().calibrated(evidence.p_value)
-    return GapVerdict(label, probability[label], labels, p_value, lead, is_hidden)
+    return GapVerdict(label, probability[label], labels, p_value, hint, is_hidden)
 
 
 def calibration_error(stated: np.ndarray, hit: np.ndarray) -> float:

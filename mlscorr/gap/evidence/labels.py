@@ -49,7 +49,7 @@ class LabelEvidence:
     ----------
     observations : Observations
     table : ColumnTable
-    leads : tuple of str
+    hints : tuple of str
         Hint of each unknown block, in words.
     blocks : BlockEvidence
         Evidence of the residuals (first column) and of replicas without any effect.
@@ -66,7 +66,7 @@ class LabelEvidence:
 
     observations: Observations
     table: ColumnTable
-    leads: tuple[str, ...]
+    hints: tuple[str, ...]
     blocks: BlockEvidence
     noise: tuple[NoiseEvidence, ...]
     refined: dict[str, RefinedEvent]
@@ -88,10 +88,10 @@ class LabelEvidence:
         known = (self.refined.get(key) for key in (label, name))
         return next((each for each in known if each and each.signature.name == name), None)
 
-    def lead(self) -> tuple[str, np.ndarray]:
+    def hint(self) -> tuple[str, np.ndarray]:
         """Return the hint of the best unknown block, in words, and its column indices."""
         block = self.table.blocks[self.best("unknown")]
-        return self.leads[block.member], block.columns
+        return self.hints[block.member], block.columns
 
     def likely_model(self, label: str) -> ErrorModel:
         """Return the most probable ErrorModel when a label, or the first of two, acts."""
@@ -133,7 +133,7 @@ def weigh_labels(
     observations = Observations.of(rows, background)
     unknown = unknown_blocks(rows, survey)
     table = column_table(rows, signatures, unknown, observations.sigma)
-    leads = tuple(block.lead for block in unknown)
+    hints = tuple(block.hint for block in unknown)
     del unknown  # their columns are in the table
     table = without_known(observations, table)
     observations, tail = without_tails(observations, rows, steady_columns(observations, table))
@@ -150,7 +150,7 @@ def weigh_labels(
     for label, event in refined.items():
         prior = np.log(dict(SETTINGS.prior)["effect"] / len(table.effects))
         score[label][0] = np.logaddexp(score[label][0], prior + event.gain)
-    return LabelEvidence(observations, table, leads, blocks, noise, refined, score, p, tail)
+    return LabelEvidence(observations, table, hints, blocks, noise, refined, score, p, tail)
 
 
 def _replicas(observations, models, residual, rng, number):
@@ -344,16 +344,16 @@ def _accepted(evidence, score, best):
 def _facts(rows, evidence, best):
     """Properties of the survey that matter for the weight of evidence."""
     observations = evidence.observations
-    raised = observations.errors.raised >= 0
+    increased = observations.errors.increased >= 0
     is_event = best is not None and bool(effect_class(best).moment())
-    moved = np.zeros(len(raised))
+    moved = np.zeros(len(increased))
     if is_event:
         moved = (_best_columns(evidence, best)[observations.row] ** 2).sum(axis=1)
     return {
         "rough": float((rows.channel == "roughness").any()),
-        "raised": float(raised.mean()),
+        "raised": float(increased.mean()),
         "event": float(is_event),
-        "event in raised": float(moved[raised].sum() / max(moved.sum(), 1e-300)),
+        "event in raised": float(moved[increased].sum() / max(moved.sum(), 1e-300)),
         "scale": float(np.log(evidence.likely_model("none").scale)),
         "size": float(np.log(len(observations))),
         "odd": len(evidence.tail) / len(observations),

@@ -181,8 +181,8 @@ def scatter_terms(rows: Rows, predicted: Predicted, residual: np.ndarray) -> np.
         Units: m^2.
     """
     rough = (rows.channel == "roughness")[:, None]
-    believed = np.where(rough, rows.believed[:, None], 0.0)
-    return believed * (np.exp(np.where(rough, residual, 0.0)) - 1 - predicted.growth[:, None])
+    assumed = np.where(rough, rows.assumed[:, None], 0.0)
+    return assumed * (np.exp(np.where(rough, residual, 0.0)) - 1 - predicted.growth[:, None])
 
 
 def simulated_variance(
@@ -198,7 +198,7 @@ def simulated_variance(
         Variance added to the rows' own noise. Units: m^2.
     """
     e = observations.errors
-    position = (e.raised_position(model.raised) ** 2).sum(axis=1)
+    position = (e.scaled_position(model.increased) ** 2).sum(axis=1)
     growth = np.hypot(window_growth(model.windows, e.gps_time), e.growth)[:, 0]
     variance = model.scale**2 * position + growth**2 * (e.position**2).sum(axis=1)
     variance += model.attitude[0] ** 2 * (e.attitude**2).sum(axis=1)

@@ -41,7 +41,7 @@ class ErrorModel:
         On its correlation time.
     attitude : tuple of (scale, family, time)
         The same of the attitude.
-    raised : tuple of float
+    increased : tuple of float
         Further factor on the position's sigma in each interval in which it is increased; one in
         intervals not listed.
     noise : float
@@ -59,7 +59,7 @@ class ErrorModel:
     family: str = "matern32"
     time: float = 1.0
     attitude: tuple[float, str, float] = (1.0, "matern32", 1.0)
-    raised: tuple[float, ...] = ()
+    increased: tuple[float, ...] = ()
     noise: float = 1.0
     fixes: float = 0.0
     weight: float = 1.0
@@ -126,14 +126,14 @@ def shaped_models(scale: float = 1.0, fixes: float = 0.0) -> list[ErrorModel]:
     ]
 
 
-def _varied_models(stretches: int) -> Iterator[Callable]:
+def _varied_models(intervals: int) -> Iterator[Callable]:
     """Yield functions that vary a model: attitude, noise, increased sigmas, and finer steps.
 
     Each takes the current best model and returns models to try.
 
     Parameters
     ----------
-    stretches : int
+    intervals : int
         Number of intervals with increased sigma.
     """
     yield lambda best: [
@@ -144,18 +144,18 @@ def _varied_models(stretches: int) -> Iterator[Callable]:
         replace(best, noise=noise, weight=best.weight * share)
         for noise, share in SETTINGS.noise_scales
     ]
-    for number in range(stretches):
+    for number in range(intervals):
         yield lambda best, number=number: [
             replace(
                 best,
-                raised=(
-                    *(*best.raised, *[1.0] * number)[:number],
+                increased=(
+                    *(*best.increased, *[1.0] * number)[:number],
                     factor,
-                    *best.raised[number + 1 :],
+                    *best.increased[number + 1 :],
                 ),
                 weight=best.weight * share,
             )
-            for factor, share in POS.raised_scales
+            for factor, share in POS.increased_scales
         ]
     yield _nearby_models
 
@@ -196,7 +196,7 @@ class Errors(Columns):
         Prior correlation time. Units: s.
     growth : (n, 1) array
         Factor added by prior windows; see ``window_growth``.
-    raised : (n,) int array
+    increased : (n,) int array
         Interval with increased stated sigma; -1 outside.
     """
 
@@ -208,14 +208,14 @@ class Errors(Columns):
     place: np.ndarray
     correlation_time: float
     growth: np.ndarray
-    raised: np.ndarray
+    increased: np.ndarray
 
     @property
     def position_variance(self) -> np.ndarray:
         """Stated variance from the POS position: (n,), m^2."""
         return (self.position**2).sum(axis=1)
 
-    def raised_position(self, factors: tuple[float, ...]) -> np.ndarray:
+    def scaled_position(self, factors: tuple[float, ...]) -> np.ndarray:
         """Mixing (n, 3) of the position with a factor on each interval of increased sigma.
 
         Parameters
@@ -223,9 +223,9 @@ class Errors(Columns):
         factors : tuple of float
             For the first intervals; one for others.
         """
-        known = np.ones(max(self.raised.max(initial=-1) + 1, len(factors)) + 1)
+        known = np.ones(max(self.increased.max(initial=-1) + 1, len(factors)) + 1)
         known[: len(factors)] = factors
-        return self.position * known[self.raised][:, None]  # -1, the last, is outside of them
+        return self.position * known[self.increased][:, None]  # -1, the last, is outside of them
 
 
 @dataclass(frozen=True, repr=False)
@@ -301,7 +301,9 @@ class Observations(Columns):
             place=partials[:, :3],
             correlation_time=background.correlation_time,
             growth=window_growth(background.windows, time),
-            raised=np.full(len(leg), -1) if background.raised is None else background.raised[leg],
+            increased=np.full(len(leg), -1)
+            if background.increased is None
+            else background.increased[leg],
         )
         survey = survey[:, np.flatnonzero(often)].toarray()
         shared = np.hstack([survey, _plane_heights(row, double, first)])
@@ -376,7 +378,7 @@ def _factored(errors, model):
 def _factor(errors, model, extra=0.0):
     """Whitener of V0, of signals and own noise."""
     growth = np.hypot(window_growth(model.windows, errors.gps_time), errors.growth)
-    position = errors.raised_position(model.raised)
+    position = errors.scaled_position(model.increased)
     turn_scale, turn_family, turn_time = model.attitude
     tau = errors.correlation_time
     signals = [
@@ -442,9 +444,9 @@ def relevant_models(
         ]
 
     known = {model: scores(model, range(len(cases))) for model in models}
-    stretches = observations.errors.raised.max(initial=-1) + 1
+    intervals = observations.errors.increased.max(initial=-1) + 1
     for number in range(len(cases)):
-        for variation in _varied_models(int(stretches)):
+        for variation in _varied_models(int(intervals)):
             for model in variation(max(known, key=lambda model: known[model][number])):
                 if model not in known or known[model][number] == -np.inf:
                     known[model] = np.maximum(scores(model, [number]), known.get(model, -np.inf))

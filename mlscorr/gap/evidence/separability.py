@@ -66,13 +66,13 @@ class Separability:
         if number == 0:
             return (effect,)
         if estimate is None:
-            ways = np.eye(number)
+            directions = np.eye(number)
         else:
-            ways = np.asarray(estimate, float)[None]
+            directions = np.asarray(estimate, float)[None]
         return tuple(
             name
             for name in dict.fromkeys(self.effects)
-            if any(self.share(effect, way, name) > SETTINGS.same for way in ways)
+            if any(self.share(effect, direction, name) > SETTINGS.same for direction in directions)
         )
 
     def share(self, effect: str, estimate: np.ndarray, other: str) -> float:

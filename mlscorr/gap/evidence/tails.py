@@ -123,9 +123,9 @@ def _fit(columns, variance, density, smallest, first, largest):
     for j in range(k):
         offset = 0.0
         share = first
-        held = 0.0
+        total_weight = 0.0
         for _ in range(3):  # the shares of so few odd values hardly change
-            held = 0.0
+            total_weight = 0.0
             pulled = 0.0
             total_odd = 0.0
             for i in range(q):
@@ -133,15 +133,15 @@ def _fit(columns, variance, density, smallest, first, largest):
                 regular = (1 - share) * scale[i] * np.exp(-0.5 * away * away * weight[i])
                 part = regular / (regular + share * density)
                 total_odd += 1 - part
-                held += part * weight[i]
+                total_weight += part * weight[i]
                 pulled += part * weight[i] * columns[j, i]
-            held = max(held, weight[0] * smallest)  # not all can be odd
-            offset = pulled / held
+            total_weight = max(total_weight, weight[0] * smallest)  # not all can be odd
+            offset = pulled / total_weight
             share = min(max(total_odd / q, smallest), largest)
         total = 0.0
         for i in range(q):
             away = columns[j, i] - offset
             regular = (1 - share) * scale[i] * np.exp(-0.5 * away * away * weight[i])
             total += np.log(regular + share * density)
-        fitted[j] = total, offset, held, share
+        fitted[j] = total, offset, total_weight, share
     return fitted

@@ -86,7 +86,7 @@ class UnknownBlock:
     is_drift is True if the POS's own drift may appear the same.
     """
 
-    lead: str
+    hint: str
     columns: np.ndarray
     is_drift: bool
 

@@ -114,8 +114,8 @@ def _largest(compared, names):
     """Largest squared correlation between parameters of different effects among names."""
     effects = np.array(compared.effects)
     named = np.isin(effects, names)
-    apart = named[:, None] & named & (effects[:, None] != effects)
-    return float((compared.correlation[apart] ** 2).max(initial=0.0))
+    is_other = named[:, None] & named & (effects[:, None] != effects)
+    return float((compared.correlation[is_other] ** 2).max(initial=0.0))
 
 
 def _another_pass(rows, survey, backwards=False, faster=1.0):
@@ -244,7 +244,7 @@ def _placed(once, survey, anew, place, survey_item):
         survey.trajectory.segment(time) + 1,
         survey_item=survey_item,
         survey_factor=factor,
-        believed=once.believed,
+        assumed=once.assumed,
     )
 
 

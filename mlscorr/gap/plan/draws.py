@@ -115,27 +115,27 @@ def draw_effect(
         return None
     sign = signature(Bench(ruler.rows, ruler.survey), kind, fixed, rng)
     if kind.random:
-        way = _random(ruler, sign, mdb)
+        vector = _random(ruler, sign, mdb)
     else:
-        way = _systematic(ruler, sign, mdb, rng)
-    if way is None:
+        vector = _systematic(ruler, sign, mdb, rng)
+    if vector is None:
         return None
-    way, size = _credible(sign, way, mdb)
+    vector, size = _credible(sign, vector, mdb)
     if size < min(LEAST_SIZE, mdb):
         return None
-    parameters = dict(zip(sign.parameters, map(float, way), strict=True))
+    parameters = dict(zip(sign.parameters, map(float, vector), strict=True))
     parameters |= {key: sign.fixed[key] for key in kind.moment()}
-    shift = sign.jacobian @ way
-    return SizedEffect(sign.effect(way), parameters, size, shift, ruler.normal(sign.jacobian))
+    shift = sign.jacobian @ vector
+    return SizedEffect(sign.effect(vector), parameters, size, shift, ruler.normal(sign.jacobian))
 
 
 def _systematic(ruler, sign, mdb, rng):
     """Parameters (p,) in a random direction."""
-    way = rng.standard_normal(len(sign.typical)) * sign.typical
-    unit = ruler.size(sign.jacobian @ way)
+    vector = rng.standard_normal(len(sign.typical)) * sign.typical
+    unit = ruler.size(sign.jacobian @ vector)
     if unit == 0.0:
         return None
-    return way * mdb / unit
+    return vector * mdb / unit
 
 
 def _random(ruler, sign, mdb):
@@ -146,16 +146,16 @@ def _random(ruler, sign, mdb):
     return None
 
 
-def _credible(sign, way, mdb):
+def _credible(sign, vector, mdb):
     """Parameters within the largest credible value, and the resulting size."""
     quantities = sign.kind.quantities()
     largest = quantities["magnitude"].largest * (1 - 1e-3)  # rounding cannot exceed it
     if sign.kind.is_wave():
-        size = np.hypot(*way)
+        size = np.hypot(*vector)
     else:
-        size = np.abs(way).max()
+        size = np.abs(vector).max()
     share = min(1.0, largest / size)
-    return way * share, mdb * share
+    return vector * share, mdb * share
 
 
 def _fixed(kind, ruler, rng):

@@ -3,7 +3,7 @@
 from mlscorr.gap.residuals._surfaces import gate
 from mlscorr.gap.residuals.absence import Absence, find_absence
 from mlscorr.gap.residuals.channels import (
-    beside_seen_noise,
+    limited_noise,
     log_roughness,
     rounding_sigma,
     with_loss_variance,

@@ -85,7 +85,7 @@ def gate(survey: Survey, gps_time: np.ndarray) -> np.ndarray:
         Units: m.
     """
     sigma = PosErrors.stated(survey.trajectory, survey.pos).at(gps_time)
-    size = SETTINGS.surface_gate_sigmas * np.linalg.norm(sigma.drift + sigma.held, axis=1)
+    size = SETTINGS.surface_gate_sigmas * np.linalg.norm(sigma.drift + sigma.known_gnss, axis=1)
     return np.clip(size, SETTINGS.least_surface_gate, SEARCH_RADIUS)
 
 
@@ -188,7 +188,7 @@ def shared_rows(
     there, early, late, normal, between, residual = max(tried, key=lambda pair: support(pair[-1]))
     first = patches[early]
     second = patches[late]
-    apart = np.linalg.norm(between, axis=1)
+    separation = np.linalg.norm(between, axis=1)
     kept = np.flatnonzero(np.abs(residual) <= gate(there, first.gps_time))
     kept = kept[consistent(first.gps_time[kept], normal[kept], residual[kept])]
     residual = np.einsum("ni,ni->n", normal, first.centre - second.centre)
@@ -199,7 +199,7 @@ def shared_rows(
     first = first[kept]
     second = second[kept]
     normal = normal[kept]
-    apart = apart[kept]
+    separation = separation[kept]
     residual = residual[kept]
     item = np.arange(len(kept))
     pulses = [patch_pulses(survey, first, item), patch_pulses(survey, second, item, -1.0)]
@@ -211,7 +211,7 @@ def shared_rows(
         (first.centre + second.centre) / 2,
         normal,
         residual,
-        plane_noise(first, second, apart**2),
+        plane_noise(first, second, separation**2),
         np.minimum(first.points, second.points),
         SamplePulses.concatenate(pulses),
         first.pass_number,
@@ -374,9 +374,9 @@ def _compare(survey, patches, mesh, origin):
 def _elsewhere(survey, patches, mesh, origin):
     """Sentence on a reference surface away from the cloud."""
     centre = (patches.centre - origin).astype(np.float32)
-    apart = mesh.caster.compute_closest_points(centre)["points"].numpy() - centre
-    distance = np.median(np.linalg.norm(apart, axis=1))
-    up = np.median(apart[:, 2])
+    nearest_offset = mesh.caster.compute_closest_points(centre)["points"].numpy() - centre
+    distance = np.median(np.linalg.norm(nearest_offset, axis=1))
+    up = np.median(nearest_offset[:, 2])
     if abs(up) > 0.9 * distance:
         what = "in another height datum"
     else:

@@ -34,7 +34,7 @@ class AbsentRun:
         return list(dict.fromkeys(self.name))
 
     @property
-    def lead(self) -> str:
+    def hint(self) -> str:
         """Description of the run in words."""
         return (
             f"interval from {self.gps_time[0]:.1f} to {self.gps_time[-1]:.1f} s in which the "
@@ -88,7 +88,7 @@ class Absence:
     def warnings(self) -> tuple[str, ...]:
         """Return a sentence on each run, with all reasons."""
         return tuple(
-            f"No residual describes the {run.lead}: "
+            f"No residual describes the {run.hint}: "
             + " ".join(
                 f"{name} ({time:.1f} s): {reason}"
                 for name, time, reason in zip(run.name, run.gps_time, run.reason, strict=True)

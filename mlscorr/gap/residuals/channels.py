@@ -20,7 +20,7 @@ def rounding_sigma() -> float:
     return SETTINGS.file_step / np.sqrt(12)
 
 
-def _believed_variance(survey, patches):
+def _assumed_variance(survey, patches):
     """Variance (p,) about the plane expected from range and angle noise. Units: m^2."""
     p, samples = patches.time.shape
     time = patches.time.ravel()
@@ -46,7 +46,7 @@ def _sweep(survey, sight, time):
 
 
 def log_roughness(
-    variance: np.ndarray, believed: np.ndarray, points: np.ndarray
+    variance: np.ndarray, assumed: np.ndarray, points: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Unbiased log of a variance about a plane over the assumed one, and its variance.
 
@@ -54,13 +54,13 @@ def log_roughness(
 
     Parameters
     ----------
-    variance, believed : (p,) array
+    variance, assumed : (p,) array
         Units: m^2.
     points : (p,) array
         On each plane.
     """
     freedom = degrees_of_freedom(points)
-    return np.log(variance / believed) + 1 / freedom, 2 / freedom
+    return np.log(variance / assumed) + 1 / freedom, 2 / freedom
 
 
 def roughness(
@@ -79,13 +79,13 @@ def roughness(
         Log variance ratio, its variance, the assumed variance (m^2), and flags of patches that
         count: curved ones never do, and none do if the scanner's noise is a default.
     """
-    believed = _believed_variance(survey, patches)
-    ratio, variance = log_roughness(patches.variance, believed, patches.points)
+    assumed = _assumed_variance(survey, patches)
+    ratio, variance = log_roughness(patches.variance, assumed, patches.points)
     flat = patches.ripple <= SETTINGS.largest_ripple
-    return ratio, variance, believed, flat & (not survey.scanner.assumed)
+    return ratio, variance, assumed, flat & (not survey.scanner.assumed)
 
 
-def beside_seen_noise(rows: Rows) -> tuple[Rows, tuple[str, ...]]:
+def limited_noise(rows: Rows) -> tuple[Rows, tuple[str, ...]]:
     """Rows for a scanner that is not noisier than the cloud, and a sentence if it was.
 
     Noise only adds: no effect makes a scanner quieter if its assumed noise is too large.
@@ -104,7 +104,7 @@ def beside_seen_noise(rows: Rows) -> tuple[Rows, tuple[str, ...]]:
     quiet = replace(
         rows,
         residual=np.where(rough, rows.residual - offset, rows.residual),
-        believed=np.where(rough, rows.believed * np.exp(offset), rows.believed),
+        assumed=np.where(rough, rows.assumed * np.exp(offset), rows.assumed),
     )
     return quiet, (
         f"Flat surfaces scatter {np.exp(-offset / 2):.1f} times less than simulated: the range "

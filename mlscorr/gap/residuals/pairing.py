@@ -261,7 +261,7 @@ def patch_rows(survey: Survey, patches: Patches, surface: OnReference | None = N
     surface : OnReference, optional
         Of all of them.
     """
-    rough, rough_noise, believed, flat = roughness(survey, patches)
+    rough, rough_noise, assumed, flat = roughness(survey, patches)
     lost, lost_noise, counted = return_rate(patches)
     flat = np.flatnonzero(flat)
     counted = np.flatnonzero(counted)
@@ -286,5 +286,5 @@ def patch_rows(survey: Survey, patches: Patches, surface: OnReference | None = N
         np.concatenate(points),
         patch_pulses(survey, patches, np.arange(p)),
         patches.pass_number[item],
-        believed=np.concatenate([np.full(len(on), np.nan), believed[flat], np.ones(len(counted))]),
+        assumed=np.concatenate([np.full(len(on), np.nan), assumed[flat], np.ones(len(counted))]),
     )

@@ -87,7 +87,7 @@ class Rows:
         vectors; ``survey`` is their squared length. Units: m.
     points : (m,) int array
         Number of returns behind the row.
-    believed : (m,) array
+    assumed : (m,) array
         Variance about the plane (m^2) or share of returns assumed by the simulator; NaN for the
         others.
     partials, partials_2 : (m, 6) array
@@ -118,7 +118,7 @@ class Rows:
     survey: np.ndarray
     survey_factor: np.ndarray
     points: np.ndarray
-    believed: np.ndarray
+    assumed: np.ndarray
     partials: np.ndarray
     partials_2: np.ndarray
     covariates: dict[str, np.ndarray]
@@ -214,7 +214,7 @@ class Background:
         Intervals in which it is assumed to be worse; see Pos.
     clock : (l,) array, optional
         Clock of the position error, which jumps where it restarts; gps_time by default. Units: s.
-    raised : (l,) int array, optional
+    increased : (l,) int array, optional
         Index of the interval with increased stated sigma, from 0; -1, the default, outside.
     """
 
@@ -225,7 +225,7 @@ class Background:
     correlation_time: float
     windows: tuple = ()
     clock: np.ndarray | None = None
-    raised: np.ndarray | None = None
+    increased: np.ndarray | None = None
 
 
 def background(rows: Rows, survey: Survey) -> Background:
@@ -251,7 +251,7 @@ def background(rows: Rows, survey: Survey) -> Background:
         survey.pos.correlation_time,
         survey.pos.windows,
         sigma.clock,
-        sigma.history.raised(gps_time),
+        sigma.history.increase(gps_time),
     )
 
 
@@ -384,10 +384,10 @@ def _motion(trajectory, gps_time):
     """Speed (m/s), rate of heading to the right (rad/s) and heading (rad) at times (m,)."""
     before, after = poses_about(trajectory, gps_time, SETTINGS.motion_step)
     duration = after.gps_time - before.gps_time
-    way = np.linalg.norm(after.position - before.position, axis=1)
+    distance = np.linalg.norm(after.position - before.position, axis=1)
     turn = (after.attitude * before.attitude.inv()).as_rotvec()[:, 2]
     heading = angles_from_attitude(trajectory.at(gps_time).attitude)[2]
-    return way / duration, -turn / duration, heading
+    return distance / duration, -turn / duration, heading
 
 
 def _location(trajectory, gps_time, position):
@@ -398,12 +398,12 @@ def _location(trajectory, gps_time, position):
     steps = np.linalg.norm(np.diff(trajectory.position, axis=0, prepend=np.nan), axis=1)
     segment = trajectory.segment(trajectory.gps_time)
     steps[np.append(True, np.diff(segment) != 0)] = 0.0
-    way = np.cumsum(steps)
-    way -= way[np.searchsorted(segment, segment)]
+    chainage = np.cumsum(steps)
+    chainage -= chainage[np.searchsorted(segment, segment)]
     first = np.flatnonzero(segment == 0)
     distance, nearest = cKDTree(trajectory.position[first]).query(position)
-    own = np.interp(gps_time, trajectory.gps_time, way)
-    return np.where(distance <= SETTINGS.beside, way[first][nearest], own)
+    own = np.interp(gps_time, trajectory.gps_time, chainage)
+    return np.where(distance <= SETTINGS.location_reach, chainage[first][nearest], own)
 
 
 def assemble(
@@ -421,7 +421,7 @@ def assemble(
     gps_time_2: np.ndarray | None = None,
     survey_item: np.ndarray | None = None,
     survey_factor: np.ndarray | None = None,
-    believed: np.ndarray | None = None,
+    assumed: np.ndarray | None = None,
 ) -> Rows:
     """Assemble rows of a survey, with partials and covariates.
 
@@ -455,7 +455,7 @@ def assemble(
         survey=np.sum(survey_factor**2, axis=1),
         survey_factor=survey_factor,
         points=points,
-        believed=np.full(m, np.nan) if believed is None else believed,
+        assumed=np.full(m, np.nan) if assumed is None else assumed,
         partials=_partials(survey, position, gps_time, direction),
         partials_2=partials_2,
         covariates=covariates(survey, gps_time, position, pulses, item, pass_number, direction),

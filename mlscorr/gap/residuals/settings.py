@@ -49,7 +49,7 @@ class Settings:
     fired: int = 20  # pulses between points of a patch, to compute a share of them
     thinned: float = 0.6  # median share of returns: below it the cloud was thinned
     # covariates
-    beside: float = 50.0  # m from the first pass, up to which it defines the location
+    location_reach: float = 50.0  # m from the first pass, up to which it defines the location
     motion_step: float = 0.25  # s to each side, over which speed and turn rate are computed
     on_target: float = 0.45  # of a target's size from its center: on a disc, and on a plate
 

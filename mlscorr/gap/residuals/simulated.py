@@ -58,9 +58,9 @@ class SimulatedBeams:
             return
         after = np.searchsorted(self._time, chunk.gps_time)
         near = np.clip(np.stack([after - 1, after]), 0, len(self._time) - 1)
-        apart = np.abs(self._time[near] - chunk.gps_time)
-        row = near[apart.argmin(axis=0), np.arange(len(chunk))]
-        same = np.flatnonzero(apart.min(axis=0) <= SETTINGS.same_time)
+        lag = np.abs(self._time[near] - chunk.gps_time)
+        row = near[lag.argmin(axis=0), np.arange(len(chunk))]
+        same = np.flatnonzero(lag.min(axis=0) <= SETTINGS.same_time)
         place = self._place[row[same]]
         xyz = chunk.xyz[same]
         distance = self._distance(xyz, place)
@@ -71,12 +71,12 @@ class SimulatedBeams:
 
     def _distance(self, xyz, place):
         """Distance of points (n, 3) from the observed, or corrected, ones at a position."""
-        apart = xyz - self._observed[place]
+        offset = xyz - self._observed[place]
         moved = self._moved[place]
-        return np.minimum(*(np.linalg.norm(each, axis=1) for each in (apart, apart - moved)))
+        return np.minimum(*(np.linalg.norm(each, axis=1) for each in (offset, offset - moved)))
 
     @property
-    def apart(self) -> np.ndarray:
+    def offset(self) -> np.ndarray:
         """Offset of simulated points from the observed ones (n, 3); NaN without one. m."""
         return self._observed - self.xyz
 
@@ -166,7 +166,7 @@ def rows_against(
         f"{simulated.name}: {targets} of {len(matched)} observed targets were paired, and "
         f"{by_beams + by_place} of {number} patches ({by_beams} by pulses of the same time, "
         f"{by_place} by position){'.' if is_whole else '; the rest is not compared.'}"
-        f"{elsewhere * is_elsewhere}{_beside(survey, simulated.matched) if targets else ''}"
+        f"{elsewhere * is_elsewhere}{_shifted(survey, simulated.matched) if targets else ''}"
     )
 
 
@@ -202,10 +202,10 @@ def _against_targets(survey, matched, candidates, simulated):
     noise = rows.noise.copy()
     for i in range(len(matched)):
         same = np.flatnonzero(np.array(other.name, dtype=object) == matched.name[i])
-        apart = np.abs(other.gps_time[same] - matched.gps_time[i])
-        if len(same) == 0 or apart.min() > SETTINGS.pause:
+        lag = np.abs(other.gps_time[same] - matched.gps_time[i])
+        if len(same) == 0 or lag.min() > SETTINGS.pause:
             continue
-        j = same[np.argmin(apart)]
+        j = same[np.argmin(lag)]
         on = np.flatnonzero(rows.item == i)
         axes = rows.direction[on]
         residual[on] = axes @ (matched.position[i] - other.position[j])
@@ -219,7 +219,7 @@ def _by_beams(survey, patches, near, beams):
     """
     normal = patches.normal
     p = len(patches)
-    along = np.einsum("ni,ni->n", beams.apart, normal[beams.patch])
+    along = np.einsum("ni,ni->n", beams.offset, normal[beams.patch])
     residual = np.full(p, np.nan)
     noise = np.ones(p)
     ends = np.searchsorted(beams.patch, np.arange(p + 1))
@@ -277,7 +277,7 @@ def _against_channels(rows, survey, simulated, other):
     """Roughness and return rates minus those of the simulated patches; NaN without one."""
     residual = rows.residual.copy()
     noise = rows.noise.copy()
-    believed = rows.believed.copy()
+    assumed = rows.assumed.copy()
     channels = np.isin(rows.channel, ("roughness", "return_rate"))
     if simulated is None:
         return replace(rows, residual=np.where(channels, np.nan, residual))
@@ -295,11 +295,11 @@ def _against_channels(rows, survey, simulated, other):
         if channel == "roughness" and has.any():
             # a patch's own rate would be correlated with the residual, which would then indicate
             # noise
-            believed[on] *= np.exp(np.median(value[pair[has]]))
-    return replace(rows, residual=residual, noise=noise, believed=believed)
+            assumed[on] *= np.exp(np.median(value[pair[has]]))
+    return replace(rows, residual=residual, noise=noise, assumed=assumed)
 
 
-def _beside(survey, matched):
+def _shifted(survey, matched):
     """Sentence on the offset of simulated targets from their surveyed positions."""
     misclosure = Matched.by_name(matched, survey.surveyed).misclosure
     middle = "/".join(f"{v:+.3f}" for v in -np.median(misclosure, axis=0))

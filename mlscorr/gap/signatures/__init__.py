@@ -12,4 +12,4 @@ from mlscorr.gap.signatures._signatures import (
 )
 from mlscorr.gap.signatures.changes import Bench, check_mounting
 from mlscorr.gap.signatures.settings import SETTINGS
-from mlscorr.gap.signatures.simulators import as_believed, joined, with_cause
+from mlscorr.gap.signatures.simulators import as_assumed, joined, with_cause

@@ -255,9 +255,9 @@ def _is_seen(rows, fixed):
     determine the size.
     """
     times = np.concatenate([rows.gps_time[rows.metric], rows.gps_time_2[rows.two_times]])
-    apart = np.abs(times - rows.reference.start - fixed.get("time", 0.0))
+    lag = np.abs(times - rows.reference.start - fixed.get("time", 0.0))
     half = np.sqrt(2 * np.log(2)) * fixed.get("width", np.inf)
-    return bool(apart.min(initial=np.inf) <= half)
+    return bool(lag.min(initial=np.inf) <= half)
 
 
 def _tries(kind, size, fixed):

@@ -124,7 +124,7 @@ class Bench:
         if mounting is not None:
             body = mounting.boresight.apply(self._pulses.scanner_xyz) + mounting.lever_arm
         if returns is not None and not self._same(returns, "gps_time"):
-            pose = self.survey.trajectory.at(self._held(returns.gps_time))
+            pose = self.survey.trajectory.at(self._within_passes(returns.gps_time))
         return pose.attitude.apply(body) + (pose.position - self._pulses.xyz)
 
     def _same(self, returns, *names):
@@ -138,7 +138,7 @@ class Bench:
             [flat * np.cos(returns.angle), flat * np.sin(returns.angle), returns.range * sine]
         )
 
-    def _held(self, gps_time):
+    def _within_passes(self, gps_time):
         """Times (k,) limited to the passes of the pulses, which they may leave at the ends."""
         trajectory = self.survey.trajectory
         starts, ends = trajectory.passes.T
@@ -198,7 +198,7 @@ class Bench:
             along = np.einsum("mi,mj->mij", rows.direction, rows.direction).reshape(-1, 9)
             variance += np.einsum("mi,mi->m", along, squares)
         rough = rows.channel == "roughness"
-        growth = np.where(rough, along_normal / np.where(rough, rows.believed, 1.0), 0.0)
+        growth = np.where(rough, along_normal / np.where(rough, rows.assumed, 1.0), 0.0)
         return variance / np.maximum(rows.points, 1), growth
 
     def _lost(self, effect, rng):
@@ -208,7 +208,7 @@ class Bench:
             effect.apply(self.returns, self.rows.reference, rng).kept for _ in range(replicas)
         )
         share = self._mean(kept / replicas)
-        return np.where(self.rows.channel == "return_rate", self.rows.believed * (share - 1.0), 0.0)
+        return np.where(self.rows.channel == "return_rate", self.rows.assumed * (share - 1.0), 0.0)
 
     @cached_property
     def _trajectory(self):

@@ -12,7 +12,7 @@ from mlscorr.simulate import Simulator, beliefs_of
 from mlscorr.survey import Survey, SurveyFileError
 
 
-def as_believed(survey: Survey, simulator: Simulator) -> tuple[Survey, tuple[Effect, ...]]:
+def as_assumed(survey: Survey, simulator: Simulator) -> tuple[Survey, tuple[Effect, ...]]:
     """Return a survey with a simulator's scanner and POS, and the simulator's effects.
 
     A mounting in the simulator that differs from the survey's is treated as the true one: the
@@ -30,16 +30,16 @@ def as_believed(survey: Survey, simulator: Simulator) -> tuple[Survey, tuple[Eff
         If mountings differ by an impossible amount, or only the simulator has a mounting.
     """
     recorded = survey.mounting
-    believed = simulator.mounting
+    assumed = simulator.mounting
     effects = list(simulator.effects)
-    if believed is not None and recorded is None:
+    if assumed is not None and recorded is None:
         raise SurveyFileError(
             f"The simulator has a [mounting] and {survey.path} has none. Add it there, so that "
             "the beams are known."
         )
-    if believed is not None:
-        arm = believed.lever_arm - recorded.lever_arm
-        turn = (believed.boresight * recorded.boresight.inv()).as_rotvec()
+    if assumed is not None:
+        arm = assumed.lever_arm - recorded.lever_arm
+        turn = (assumed.boresight * recorded.boresight.inv()).as_rotvec()
         if np.abs(arm).max() > 1e-9:
             effects.append(LeverArm(magnitude=arm.tolist()))
         if np.abs(turn).max() > 1e-9:
@@ -54,8 +54,8 @@ def as_believed(survey: Survey, simulator: Simulator) -> tuple[Survey, tuple[Eff
     stated = {name: getattr(trajectory, name) for name in scales}
     scaled = {n: sigma * scales[n] for n, sigma in stated.items() if sigma is not None}
     trajectory = replace(trajectory, **scaled)
-    believed = replace(survey, trajectory=trajectory, scanner=simulator.scanner, pos=new)
-    return believed, in_order(effects)
+    assumed = replace(survey, trajectory=trajectory, scanner=simulator.scanner, pos=new)
+    return assumed, in_order(effects)
 
 
 def with_cause(simulator: Simulator, survey: Survey, cause: Any) -> Simulator:
@@ -75,7 +75,7 @@ def with_cause(simulator: Simulator, survey: Survey, cause: Any) -> Simulator:
     """
     added = cause.effects
     if simulator.mounting is not None:  # differences of the mounting have become effects
-        added += as_believed(survey, replace(simulator, effects=()))[1]
+        added += as_assumed(survey, replace(simulator, effects=()))[1]
     effects = reduce(joined, added, list(simulator.effects))
     scale = cause.model.scale
     pos = simulator.pos

@@ -19,7 +19,7 @@ from mlscorr.io.clouds.las import (
     counted_noise,
     read_chunks,
     read_cloud,
-    read_windows,
+    read_intervals,
     sample_gps_times,
     sha256,
     spread_records,

@@ -181,13 +181,13 @@ def _convert(source, target, limit):
     return Converted(target, source, count, limit is not None, note)
 
 
-def _check_extent(path, way):
+def _check_extent(path, offset):
     """Refuse points (n, 3; m) too far from the first one for the integers of a LAS."""
     limit = RESOLUTION * (INTEGER_LIMIT - 1 / RESOLUTION)  # the header's offset is in whole meters
-    if count := int((np.abs(way) > limit).any(axis=1).sum()):
+    if count := int((np.abs(offset) > limit).any(axis=1).sum()):
         raise ValueError(
             f"{path} has {count} points more than {limit / 1e3:.0f} km from its first one, up to "
-            f"{np.abs(way).max() / 1e3:.0f} km; one may be a pulse without echo, as at 0, 0, 0. "
+            f"{np.abs(offset).max() / 1e3:.0f} km; one may be a pulse without echo, as at 0, 0, 0. "
             "Export it in meters without such points."
         )
 

@@ -163,7 +163,7 @@ def read_cloud(
         )
 
 
-def read_windows(
+def read_intervals(
     file: CloudFile, spans: np.ndarray, limit: int = SETTINGS.chunk_points
 ) -> Iterator[PointCloud]:
     """Read points of a file measured within some intervals of time; all of a short file.

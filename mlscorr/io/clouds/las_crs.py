@@ -116,16 +116,16 @@ def _other_place(layout, stated, survey_crs):
     middle = cloud_box(layout).mean(axis=0)[:2]
     try:
         transformer = Transformer.from_crs(stated.to_2d(), survey_crs.to_2d(), always_xy=True)
-        apart = float(np.hypot(*np.subtract(transformer.transform(*middle), middle)))
+        distance = float(np.hypot(*np.subtract(transformer.transform(*middle), middle)))
     except ProjError:
-        apart = np.inf
-    if apart <= SETTINGS.same_place:
+        distance = np.inf
+    if distance <= SETTINGS.same_place:
         return ""
-    if apart >= 1e3:
-        length = f"{apart / 1e3:.1f} km"
+    if distance >= 1e3:
+        length = f"{distance / 1e3:.1f} km"
     else:
-        length = f"{apart:.2f} m"
-    if not np.isfinite(apart):
+        length = f"{distance:.2f} m"
+    if not np.isfinite(distance):
         return "the center of the cloud is outside one of them"
     return f"they place the center of the cloud {length} apart"
 

@@ -513,7 +513,7 @@ class _ChunkedPoints:
         self._firsts = np.cumsum(points) - points  # indices of the chunks' first points
         self._starts = file.tell() + np.cumsum(sizes) - sizes
         self._next = 0
-        self._held = np.empty(0, np.uint8)
+        self._buffer = np.empty(0, np.uint8)
 
     def seek(self, point: int) -> None:
         """Continue with a point.
@@ -525,7 +525,7 @@ class _ChunkedPoints:
         """
         self._next = int(np.searchsorted(self._firsts, point, side="right")) - 1
         before = point - int(self._firsts[self._next])
-        self._held = self._decoded(1)[before * self._length :]
+        self._buffer = self._decoded(1)[before * self._length :]
 
     def decompress_many(self, buffer: bytearray | np.ndarray) -> None:
         """Fill a buffer with the next points.
@@ -541,12 +541,12 @@ class _ChunkedPoints:
         """
         rest = np.frombuffer(buffer, np.uint8)
         while len(rest):
-            if not len(self._held):
-                self._held = self._decoded(len(rest) // self._length)
-            taken = min(len(rest), len(self._held))
-            rest[:taken] = self._held[:taken]
+            if not len(self._buffer):
+                self._buffer = self._decoded(len(rest) // self._length)
+            taken = min(len(rest), len(self._buffer))
+            rest[:taken] = self._buffer[:taken]
             rest = rest[taken:]
-            self._held = self._held[taken:]
+            self._buffer = self._buffer[taken:]
 
     def _decoded(self, points):
         """Bytes of the next chunks with at least a given number of points, if there are as many."""

@@ -34,7 +34,6 @@ from mlscorr.io.store.publishing import (
 from mlscorr.io.store.spool import NpzWriter, Spool, check_space, telling_space
 from mlscorr.io.store.storage import (
     as_path,
-    beside,
     file_state,
     files_like,
     folders_below,
@@ -46,6 +45,7 @@ from mlscorr.io.store.storage import (
     read_bytes,
     read_doubles,
     resolved,
+    sibling,
 )
 from mlscorr.io.store.task_store import TaskStore, digest
 from mlscorr.io.store.text_files import (

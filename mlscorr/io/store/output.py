@@ -73,9 +73,9 @@ def check_output(
     places = [(path.resolve().parent, path.parent.resolve()) for path in files]
     own = {(out / name).resolve(): Path(name) for name in (*folders, "")}
     pairs = zip(files, places, strict=True)
-    held = [str(own[where] / path.name) for path, two in pairs for where in two if where in own]
+    inside = [str(own[where] / path.name) for path, two in pairs for where in two if where in own]
     present = [] if overwrite else _entries(out)
-    check_contents(out, held, present)
+    check_contents(out, inside, present)
     _place(out)
 
 

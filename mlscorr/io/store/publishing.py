@@ -122,17 +122,17 @@ def check_store_output(
         )
     present = names_in(out)
     own = {out: Path(), **{out / name: Path(name) for name in folders}}
-    held = [str(own[p.parent] / p.name) for p in inputs if is_remote(p) and p.parent in own]
-    check_contents(out, held, [] if overwrite else present)
+    inside = [str(own[p.parent] / p.name) for p in inputs if is_remote(p) and p.parent in own]
+    check_contents(out, inside, [] if overwrite else present)
 
 
-def check_contents(out: Path, held: Sequence[str], present: Sequence[str]) -> None:
+def check_contents(out: Path, inside: Sequence[str], present: Sequence[str]) -> None:
     """Refuse an output folder because of its contents.
 
     Parameters
     ----------
     out : Path
-    held : sequence of str
+    inside : sequence of str
         Names of the inputs in it, or in its subfolders.
     present : sequence of str
         Names that may not be replaced.
@@ -142,9 +142,9 @@ def check_contents(out: Path, held: Sequence[str], present: Sequence[str]) -> No
     ValueError
         If there are any.
     """
-    if held:
+    if inside:
         raise ValueError(
-            f"The output folder {out} contains the input {held[0]}, which must not be changed. "
+            f"The output folder {out} contains the input {inside[0]}, which must not be changed. "
             "Choose another folder."
         )
     if present:

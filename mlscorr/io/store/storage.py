@@ -99,7 +99,7 @@ def as_path(name: str | Path) -> Path:
     return cast(Path, path)
 
 
-def beside(path: Path, name: str) -> Path:
+def sibling(path: Path, name: str) -> Path:
     """Path of a file that another file names: a URL, or a path relative to its folder.
 
     Parameters

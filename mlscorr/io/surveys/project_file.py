@@ -14,13 +14,13 @@ from mlscorr.io.clouds import find_copies
 from mlscorr.io.store import (
     TomlSection,
     as_path,
-    beside,
     input_file,
     is_folder,
     is_there,
     read_bytes,
     read_toml,
     resolved,
+    sibling,
 )
 from mlscorr.io.surveys import survey_sections
 from mlscorr.io.surveys.survey_file import (
@@ -313,7 +313,7 @@ def _stated(path, settings, name, section):
         given = {"name": name, "crs": settings.crs, "cloud": files} | given | own
         whole = SurveyFile(trajectory=section.trajectory, **given)
     else:
-        toml = survey_toml(beside(path, section.survey))
+        toml = survey_toml(sibling(path, section.survey))
         key = "cloud.files"
         whole = read_survey_file(toml)
         if whole.control is not None:
@@ -417,8 +417,9 @@ def _with_beliefs(path, drives):
 
 def _everywhere(drives):
     """Trajectory with an epoch each second that covers all positions of some drives."""
-    ways = [drive.trajectory for drive in drives]
-    rows = [np.unique(np.floor(way.gps_time), return_index=True)[1] for way in ways]
-    position = np.concatenate([w.position[some] for w, some in zip(ways, rows, strict=True)])
+    trajectories = [drive.trajectory for drive in drives]
+    rows = [np.unique(np.floor(each.gps_time), return_index=True)[1] for each in trajectories]
+    positions = [each.position[some] for each, some in zip(trajectories, rows, strict=True)]
+    position = np.concatenate(positions)
     number = np.arange(len(position), dtype=float)
     return Trajectory(number, position, Rotation.identity(len(position)))

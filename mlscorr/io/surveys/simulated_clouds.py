@@ -89,8 +89,8 @@ def _check_trajectory(simulated, survey):
             f"{simulated.path} is a simulation of another survey: its trajectory covers "
             f"{start:.1f} to {end:.1f} s, that of {survey.path} {first:.1f} to {last:.1f} s."
         )
-    apart = other.at(inside).position - recorded.at(inside).position
-    distance = float(np.median(np.linalg.norm(apart, axis=1)))
+    offset = other.at(inside).position - recorded.at(inside).position
+    distance = float(np.median(np.linalg.norm(offset, axis=1)))
     if distance > NEAREST:
         raise ValueError(
             f"{simulated.path} is a simulation of another survey, or in another CRS: the median "

@@ -52,7 +52,7 @@ def write_survey_copy(
     """
     source = as_path(source)
     document = tomlkit.parse(read_bytes(source).decode(ENCODING))
-    there = _way(source.absolute().parent, Path(folder).absolute())
+    there = _relative_folder(source.absolute().parent, Path(folder).absolute())
     for section, key in PATHS:
         if key in document.get(section, {}):
             document[section][key] = _moved(there, document[section][key])
@@ -162,7 +162,7 @@ def mounting_values(mounting: Mounting) -> dict[str, list[float]]:
     return dict(zip(("lever_arm", "boresight"), map(np.ndarray.tolist, rounded), strict=True))
 
 
-def _way(old, new):
+def _relative_folder(old, new):
     """Relative path from the new folder to the old one, links resolved; absolute if there is
     none.
     """

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from mlscorr.io.clouds import find_copies, written_name
 from mlscorr.io.settings import SETTINGS
-from mlscorr.io.store import beside, files_like, is_folder, is_remote, is_there, nearest, resolved
+from mlscorr.io.store import files_like, is_folder, is_remote, is_there, nearest, resolved, sibling
 from mlscorr.io.surveys.folder_roles import RESULTS
 from mlscorr.io.surveys.survey_sections import PlannedSurveyFile
 from mlscorr.io.trajectories import SessionFile, TrajectorySection
@@ -134,7 +134,7 @@ def matching(path: Path, key: str, name: str) -> list[Path]:
     UserWarning
         If folders with results are omitted from a pattern for all folders.
     """
-    there = beside(path, name)
+    there = sibling(path, name)
     if not glob.has_magic(name) or is_there(there):
         return [existing(path, key, name)]
     matches = files_like(path.parent, name)
@@ -182,7 +182,7 @@ def existing(path: Path, key: str, name: str) -> Path:
     FileNotFoundError
         If there is none.
     """
-    there = beside(path, name)
+    there = sibling(path, name)
     if not is_there(there):
         raise FileNotFoundError(f"{key} of {path} names {there}, which {_lack(there)}.")
     return there

@@ -194,11 +194,11 @@ def _value(layout, name, cell, meanings):
     try:
         number = layout.number(cell) * layout.factors.get(name, 1.0)
     except ValueError:
-        way_out = ""
+        remedy = ""
         if _SEXAGESIMAL.match(cell):
-            way_out = " It looks like an angle: project it to m, in the crs of survey.toml."
+            remedy = " It looks like an angle: project it to m, in the crs of survey.toml."
         raise ValueError(
-            f"has the {name} '{shown(cell)}', which is not a number.{way_out}"
+            f"has the {name} '{shown(cell)}', which is not a number.{remedy}"
         ) from None
     if not np.isfinite(number) and name not in NORMAL:
         raise ValueError(f"has the {name} '{shown(cell)}', which is not a finite number.")

@@ -322,12 +322,12 @@ def _check_doubled(layout, meanings, rows, section):
         if len(set(doubled)) == len(doubled):
             key = (section, "columns", name)
             places.append(OpenPlace(key, tuple(doubled), f"column of the {name}"))
-            way_out = f'choose, as {name} = "{doubled[0]}"'
+            remedy = f'choose, as {name} = "{doubled[0]}"'
         else:
-            way_out = f"number all needed columns, as {name} = {positions[0] + 1},"
+            remedy = f"number all needed columns, as {name} = {positions[0] + 1},"
         raise OpenQuestion(
             f"{layout.path} has {len(doubled)} columns that may be the {name} "
-            f"({', '.join(doubled)}): {way_out} under [{section}.columns] in survey.toml.",
+            f"({', '.join(doubled)}): {remedy} under [{section}.columns] in survey.toml.",
             places,
         )
 
@@ -418,7 +418,7 @@ def _missing_columns(
         places = [place for _, of_hint in hinted for place in of_hint]
     else:
         places = _likely_places(header, missing, used, names)
-    return OpenQuestion(sentence + "".join(way_out for way_out, _ in hinted), places)
+    return OpenQuestion(sentence + "".join(remedy for remedy, _ in hinted), places)
 
 
 def missing_sentence(

@@ -76,10 +76,12 @@ def _heights_in_feet(path, position, trajectory):
     near = distance < SETTINGS.near
     up = position[near, 2]
     driven = trajectory.position[epoch[near], 2]
-    if not near.any() or (apart := abs(np.median(up - driven))) < SEARCH_RADIUS:
+    if not near.any() or (height_difference := abs(np.median(up - driven))) < SEARCH_RADIUS:
         return ""
     feet = {path: up * FOOT - driven, "the trajectory": up - driven * FOOT}
-    owners = (owner for owner, high in feet.items() if abs(np.median(high)) < FOOT * apart)
+    owners = (
+        owner for owner, high in feet.items() if abs(np.median(high)) < FOOT * height_difference
+    )
     return next(owners, "")
 
 
@@ -118,10 +120,10 @@ def far_cloud(name: str, box: np.ndarray, trajectory: Trajectory) -> tuple[str, 
         Empty if the cloud is near.
     is_explained : bool
     """
-    apart = _box_distance(box, trajectory)
-    if apart < SETTINGS.near:
+    separation = _box_distance(box, trajectory)
+    if separation < SETTINGS.near:
         return "", False
-    sentence = f"{name} is {apart / 1e3:.1f} km from the trajectory, by its header"
+    sentence = f"{name} is {separation / 1e3:.1f} km from the trajectory, by its header"
     for change, other in (
         ("its coordinates taken as feet", box * FOOT),
         ("easting and northing exchanged", box[:, ::-1]),
@@ -134,8 +136,8 @@ def far_cloud(name: str, box: np.ndarray, trajectory: Trajectory) -> tuple[str, 
 def _box_distance(box, trajectory):
     """Smallest horizontal distance of a box from the trajectory's epochs. Units: m."""
     place = trajectory.position[:, :2]
-    beside = np.maximum(np.maximum(box[0] - place, place - box[1]), 0.0)
-    return float(np.hypot(*beside.T).min())
+    outside = np.maximum(np.maximum(box[0] - place, place - box[1]), 0.0)
+    return float(np.hypot(*outside.T).min())
 
 
 def distance_of(position: np.ndarray, trajectory: Trajectory) -> float:

@@ -107,8 +107,9 @@ def check_units(path: Path, gps_time: np.ndarray, position: np.ndarray, angles: 
             "survey.toml.",
             [OpenPlace(("trajectory", "angles"), ("rad", "deg"), "unit of the angles")],
         )
-    beside = _folded(np.radians(heading) - course)  # for a rotated POS it scatters like any other
-    scatter = np.degrees(np.median(np.abs(_folded(beside - _middle(beside)))))
+    # the deviation of a rotated POS scatters like any other
+    deviation = _folded(np.radians(heading) - course)
+    scatter = np.degrees(np.median(np.abs(_folded(deviation - _middle(deviation)))))
     gon = np.degrees(median_difference(np.radians(GON * heading), course))
     # a rotated POS scatters like a car
     if degrees > SETTINGS.course_offset and gon < scatter / 2:
@@ -142,20 +143,20 @@ def check_heading(path: Path, trajectory: Trajectory) -> None:
     heading, course = heading_and_course(trajectory.gps_time, trajectory.position, angles[2])
     if len(course) < SETTINGS.course_epochs:
         return
-    beside = np.mod(heading - course + np.pi, 2 * np.pi) - np.pi
-    misfit, folded = np.degrees([np.median(np.abs(x)) for x in (beside, _folded(beside))])
-    forward = np.mean(np.cos(beside) > 0)
+    deviation = np.mod(heading - course + np.pi, 2 * np.pi) - np.pi
+    usual, folded = np.degrees([np.median(np.abs(x)) for x in (deviation, _folded(deviation))])
+    forward = np.mean(np.cos(deviation) > 0)
     reverses = folded < SETTINGS.course_tolerance and forward > SETTINGS.forward_share
-    if misfit >= SETTINGS.course_tolerance and not reverses:
+    if usual >= SETTINGS.course_tolerance and not reverses:
         warnings.warn(
-            f"The heading of {path} differs from the course over ground by {misfit:.0f} deg "
+            f"The heading of {path} differs from the course over ground by {usual:.0f} deg "
             f"(median of {len(course)} epochs). Unless the vehicle drifts or reverses, the "
             "heading may not be clockwise from grid north, or easting and northing may be "
             "swapped.",
             stacklevel=5,
         )
         return
-    offset, is_paired = _offset(_folded(beside), course)
+    offset, is_paired = _offset(_folded(deviation), course)
     limit = SETTINGS.course_offset if is_paired else SETTINGS.crab
     if np.abs(np.degrees(offset)) <= limit:
         return
@@ -196,7 +197,7 @@ def _middle(folded):
     return mean + np.median(_folded(folded - mean))
 
 
-def _offset(beside, course):
+def _offset(deviation, course):
     """Deviation of heading from course (rad), and flag if it comes from opposite courses.
 
     A wind or current moves the vehicle by the same amount to opposite sides of the heading on
@@ -208,12 +209,12 @@ def _offset(beside, course):
         for towards in (direction, direction + np.pi):
             rows = np.cos(course - towards) > np.cos(SECTOR)
             if rows.sum() >= SETTINGS.course_epochs:
-                ends.append(_middle(beside[rows]))
+                ends.append(_middle(deviation[rows]))
         if len(ends) == 2:
             means.append(ends[0] + _folded(ends[1] - ends[0]) / 2)
     if means:
         return _middle(np.array(means)), True
-    return _middle(beside), False
+    return _middle(deviation), False
 
 
 def heading_and_course(

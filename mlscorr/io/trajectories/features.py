@@ -275,10 +275,10 @@ LINE: dict[str, type] = {
 def _line(number, trajectory, sigma, change, rows):
     """Positions of a line, and its attributes; sigma and correction are 3D, in m."""
     place = trajectory.position[rows]
-    way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(place, axis=0), axis=1)))
-    kept = np.flatnonzero(np.diff(np.floor(way / VERTEX), prepend=-1) > 0)
+    chainage = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(place, axis=0), axis=1)))
+    kept = np.flatnonzero(np.diff(np.floor(chainage / VERTEX), prepend=-1) > 0)
     kept = np.union1d(kept, [0, len(place) - 1])
-    numbers = [number, *trajectory.gps_time[rows[[0, -1]]].tolist(), float(way[-1])]
+    numbers = [number, *trajectory.gps_time[rows[[0, -1]]].tolist(), float(chainage[-1])]
     for vectors in (sigma, change):
         size = np.linalg.norm(vectors[rows], axis=1)
         numbers += [_finite(float(size.mean())), _finite(float(size.max()))]

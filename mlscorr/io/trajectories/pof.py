@@ -38,7 +38,7 @@ QUALITY_HEADER = np.dtype(
     [("signature", "V35"), ("major", "<u2"), ("minor", "<u2"), ("interval", "<f8", 3)]
 )
 QUALITIES = ("gps_time", "north", "east", "down", "roll", "pitch", "heading", "pdop")  # s, m, deg
-WAY_OUT = "Export it as SBET, or as text."
+REMEDY = "Export it as SBET, or as text."
 
 
 def read_pof(path: str | Path) -> tuple[dict[str, np.ndarray], float, str]:
@@ -82,7 +82,7 @@ def read_pof(path: str | Path) -> tuple[dict[str, np.ndarray], float, str]:
             cause = "its version may have another layout"
         raise ValueError(
             f"{path} has {len(data)} bytes where its header states {count} records of {width} "
-            f"bytes, {whole} in all: {cause}. {WAY_OUT}"
+            f"bytes, {whole} in all: {cause}. {REMEDY}"
         )
     table = np.frombuffer(data, "<f8", count * len(names), header["offset"]).reshape(count, -1)
     check_finite(path, table, "POF record")
@@ -91,7 +91,7 @@ def read_pof(path: str | Path) -> tuple[dict[str, np.ndarray], float, str]:
         if not (np.isclose(ends, (low, high)) | (ends[0] >= low, ends[1] <= high)).all():
             raise ValueError(
                 f"{path} has {name}s of {ends[0]:.6f} to {ends[1]:.6f} where its header states "
-                f"{low:.6f} to {high:.6f}: it is damaged, or not a POF of RIEGL. {WAY_OUT}"
+                f"{low:.6f} to {high:.6f}: it is damaged, or not a POF of RIEGL. {REMEDY}"
             )
     constant, layout = _constant(path, header, day)
     record = dict(zip(FIELDS, table.T.astype(float), strict=False))
@@ -154,7 +154,7 @@ def _header(path, data):
             f"{header['major']}.{header['minor']}, date "
             f"{header['year']}-{header['month']:02}-{header['day']:02}, {header['entries']} "
             f"records, from byte {header['offset']} on): it is truncated, or of another format. "
-            f"{WAY_OUT}"
+            f"{REMEDY}"
         )
     return header, day
 

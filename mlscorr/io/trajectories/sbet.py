@@ -194,11 +194,14 @@ def _check_radians(path, record):
 
 def _cause(accuracy, gps_time):
     """Likely cause of different times in an accuracy file and its trajectory."""
-    apart = float(np.mean(gps_time[[0, -1]]) - np.mean(accuracy[[0, -1]]))
-    if weeks := round(apart / WEEK):
+    difference = float(np.mean(gps_time[[0, -1]]) - np.mean(accuracy[[0, -1]]))
+    if weeks := round(difference / WEEK):
         return f"they are {weeks:+d} weeks apart, so one of the two has the wrong GPS week"
-    if 10 <= abs(apart) <= 40:
-        return f"they are {apart:+.1f} s apart, so one may be in UTC, which differs by leap seconds"
+    if 10 <= abs(difference) <= 40:
+        return (
+            f"they are {difference:+.1f} s apart, so one may be in UTC, which differs by leap "
+            "seconds"
+        )
     return "it belongs to another trajectory"
 
 
@@ -207,8 +210,8 @@ def _counted_on(accuracy, gps_time):
     for period in (WEEK, DAY):  # seconds of day only if a POF has them
         times, periods = count_on(accuracy, period)
         if periods is not None:
-            apart = np.mean(times[[0, -1]]) - np.mean(gps_time[[0, -1]])
-            return times - period * np.round(apart / period)
+            difference = np.mean(times[[0, -1]]) - np.mean(gps_time[[0, -1]])
+            return times - period * np.round(difference / period)
     return accuracy
 
 

@@ -25,7 +25,7 @@ from mlscorr.survey import AXES, Trajectory
 
 SUFFIXES = (".sbet", ".out", ".tum", *FEATURE_SUFFIXES)
 TUM = ".tum"
-WEAK_STRETCHES = "weak.geojson"  # is always written
+WEAK_INTERVALS = "weak.geojson"  # is always written
 
 
 def check_exports(names: Sequence[str], crs: str | None = None, is_read: bool = False) -> None:
@@ -94,11 +94,11 @@ def check_distinct(names: Sequence[str]) -> None:
 def _suffix(name, option, known, others=""):
     """Suffix of an export's name, if it can be written."""
     suffix = Path(name).suffix.lower()
-    if Path(name).name != name or suffix not in known or name.lower() == WEAK_STRETCHES:
+    if Path(name).name != name or suffix not in known or name.lower() == WEAK_INTERVALS:
         kinds = ", ".join(filter(None, [others, "or .gpkg (GeoPackage)"]))
         raise ValueError(
             f"{option} {name}: give a file name without a folder that ends with "
-            f"{kinds.removeprefix('or ')} or {GEOJSON} (GeoJSON), other than {WEAK_STRETCHES}."
+            f"{kinds.removeprefix('or ')} or {GEOJSON} (GeoJSON), other than {WEAK_INTERVALS}."
         )
     return suffix
 
@@ -205,14 +205,14 @@ def _write_records(path, fields, columns):
 
 
 def write_weak(
-    folder: Path, stretches: Sequence[dict[str, Any]], trajectory: Trajectory, crs: str | None
+    folder: Path, intervals: Sequence[dict[str, Any]], trajectory: Trajectory, crs: str | None
 ) -> list[str]:
     """Write weak.csv into a folder, and weak.geojson if the CRS is known.
 
     Parameters
     ----------
     folder : Path
-    stretches : sequence of dict
+    intervals : sequence of dict
         ``weak[]`` of report.json.
     trajectory : Trajectory
         Corrected trajectory, which contains all intervals.
@@ -225,7 +225,7 @@ def write_weak(
     """
     names = [f"{axis}_{end}" for end in ("from", "to") for axis in AXES]
     rows = [("from", "to", "chainage_from", "chainage_to", "length_m", "sigma", *names, "why")]
-    for row in stretches:
+    for row in intervals:
         times = [row["from"], row["to"]]
         lengths = row["chainage"], row["chainage"] + row["length_m"], row["length_m"]
         cells = [f"{value:.3f}" for value in times] + [f"{value:.1f}" for value in lengths]
@@ -234,15 +234,15 @@ def write_weak(
     write_csv(folder / "weak.csv", rows)
     if crs is None:
         return ["weak.csv"]
-    text = json.dumps(_features(stretches, trajectory, crs), allow_nan=False)
+    text = json.dumps(_features(intervals, trajectory, crs), allow_nan=False)
     (folder / "weak.geojson").write_text(text + "\n", encoding="utf-8")
     return ["weak.csv", "weak.geojson"]
 
 
-def _features(stretches, trajectory, crs):
+def _features(intervals, trajectory, crs):
     """Line features of all intervals, in longitude and latitude in WGS 84 (RFC 7946)."""
     features = []
-    for row in stretches:
+    for row in intervals:
         count = 2 + int(row["length_m"])  # a vertex per meter
         position = trajectory.at(np.linspace(row["from"], row["to"], count)).position
         line = to_lonlat(check_crs(crs), position)

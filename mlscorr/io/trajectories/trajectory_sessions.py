@@ -302,7 +302,7 @@ def _numbers(part):
 def _are_one(names, first, second, is_common, pos):
     """True if two trajectories are the same; raises ValueError if their positions differ."""
     there = Trajectory.at(first, second.gps_time[is_common])
-    apart = np.linalg.norm(there.position - second.position[is_common], axis=1)
+    distance = np.linalg.norm(there.position - second.position[is_common], axis=1)
     turned = (there.attitude * second.attitude[is_common].inv()).magnitude()
     limits = []
     for kind in KINDS:
@@ -313,18 +313,18 @@ def _are_one(names, first, second, is_common, pos):
         else:
             both = np.hstack([getattr(there, key), stated[is_common]])
             limits.append(_rms(np.linalg.norm(both, axis=1)))
-    way = _rms(apart)
+    difference = _rms(distance)
     turn = _rms(turned)
-    if way > limits[0] or turn > limits[1]:
+    if difference > limits[0] or turn > limits[1]:
         common = second.gps_time[is_common]
         raise ValueError(
             f"{names[0]} and {names[1]} overlap by {np.ptp(common):.1f} s (from {common[0]:.3f} "
-            f"s) and differ by {way:.3f} m and {np.degrees(turn):.4f} deg (RMS); their sigmas "
-            f"are {limits[0]:.3f} m and {np.degrees(limits[1]):.4f} deg. For two vehicles, make "
-            "two surveys. For one vehicle, give only the final trajectory, and times of "
+            f"s) and differ by {difference:.3f} m and {np.degrees(turn):.4f} deg (RMS); their "
+            f"sigmas are {limits[0]:.3f} m and {np.degrees(limits[1]):.4f} deg. For two vehicles, "
+            "make two surveys. For one vehicle, give only the final trajectory, and times of "
             "different weeks as continuous GPS seconds."
         )
-    return bool(apart.max() <= SETTINGS.same_export)
+    return bool(distance.max() <= SETTINGS.same_export)
 
 
 def _rms(values):

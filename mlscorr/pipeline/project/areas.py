@@ -81,9 +81,9 @@ def margin_of(drives: Sequence[FoundDrive]) -> float:
     drives : sequence of FoundDrive
     """
     recorded = [drive.survey.trajectory for drive in drives]
-    way = sum(np.linalg.norm(np.diff(t.position, axis=0), axis=1).sum() for t in recorded)
+    length = sum(np.linalg.norm(np.diff(t.position, axis=0), axis=1).sum() for t in recorded)
     seconds = sum(float(np.ptp(t.gps_time)) for t in recorded)
-    return max(TIES.pause * float(way) / seconds, drives[0].survey.search_radius)
+    return max(TIES.pause * float(length) / seconds, drives[0].survey.search_radius)
 
 
 def places_each_second(drives: Sequence[FoundDrive]) -> np.ndarray:
@@ -177,10 +177,10 @@ def _epochs_in(drive, area):
     times = trajectory.gps_time[there]
     for gap in np.flatnonzero(np.diff(times) <= TIES.pause):
         inside[there[gap] : there[gap + 1]] = True
-    beside = inside.copy()
-    beside[1:] |= inside[:-1]
-    beside[:-1] |= inside[1:]
-    return beside
+    widened = inside.copy()
+    widened[1:] |= inside[:-1]
+    widened[:-1] |= inside[1:]
+    return widened
 
 
 def _piece(drive, rows):

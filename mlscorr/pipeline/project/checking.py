@@ -96,10 +96,10 @@ def _check_control(project, checked, faults):
             faults.warn(NO_CONTROL.format(survey.name))
     near = {name for survey, _ in checked for name in survey.surveyed.name}
     names = [*project.control.name, *project.check.name, *project.excluded.name]
-    held = near.intersection(project.control.name)
-    faults.warn(*sentences_of(few_targets(len(held))))
+    control_near = near.intersection(project.control.name)
+    faults.warn(*sentences_of(few_targets(len(control_near))))
     faults.of("data", stages.check_control_near, project, [survey for survey, _ in checked])
-    if held and (far := [name for name in names if name not in near]):
+    if control_near and (far := [name for name in names if name not in near]):
         faults.warn(
             f"{len(far)} of the {len(names)} surveyed points of {project.path} are not near any "
             f"cloud, by the headers (first: {far[0]})."

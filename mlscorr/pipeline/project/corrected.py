@@ -8,7 +8,7 @@ import numpy as np
 
 from mlscorr.correction import Correction
 from mlscorr.estimate import Estimate, place_control
-from mlscorr.evaluate import misfit, misfit_section, tie_section
+from mlscorr.evaluate import misclosure_statistics, tie_residual_section, tie_section
 from mlscorr.pipeline.clouds import MovedClouds
 from mlscorr.pipeline.corrected_survey import CorrectedSurvey
 from mlscorr.pipeline.correction import corrected_fields
@@ -87,8 +87,8 @@ def corrected_drives(
         first, last = drive.survey.trajectory.gps_time[[0, -1]]
         near = [replace(place, gps_time=place.gps_time - shift) for place in places]
         shared = {key: section[key] for key in ("share", "sufficient_control") if key in section}
-        misfits = misfit_section(own.ties) or {"n": 0, "used": 0, "reason": own.untied}
-        ties = misfits | (shared if own.ties else {})
+        statistics = tie_residual_section(own.ties) or {"n": 0, "used": 0, "reason": own.untied}
+        ties = statistics | (shared if own.ties else {})
         survey = replace(drive.survey, notes=(*drive.survey.notes, *joint.survey.notes))
         corrected = CorrectedDrive(
             **drive_fields(replace(drive, survey=survey), own),
@@ -144,8 +144,8 @@ def _ties(part, number, area):
         rows = own[others == other]
         shared[part.joint.drives[other].survey.name] = {
             "n": len(rows),
-            "before": misfit(residuals.ties.misclosure[rows])["rms"],
-            "after": misfit(residuals.after[rows])["rms"],
+            "before": misclosure_statistics(residuals.ties.misclosure[rows])["rms"],
+            "after": misclosure_statistics(residuals.after[rows])["rms"],
         }
     return shared
 

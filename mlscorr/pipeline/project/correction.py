@@ -85,7 +85,7 @@ def correct_project(
     path: str | Path | ProjectParts,
     out: str | Path,
     options: Options | None = None,
-    tell: Callable[[Statement], object] = lambda _: None,
+    notify: Callable[[Statement], object] = lambda _: None,
 ) -> ProjectResult:
     """Correct all drives of a project together, and write the results of each.
 
@@ -97,7 +97,7 @@ def correct_project(
         Folder for the results: a folder of each drive, project.json, project.html, log.txt, and
         the results of tasks.
     options : Options, optional
-    tell : function of a Statement
+    notify : function of a Statement
         Receives the progress; ``progress_sentence`` words it.
 
     Returns
@@ -124,7 +124,7 @@ def correct_project(
     check_distinct([*options.trajectories, *options.targets])
     check_project_output(project, out, options)
     store = TaskStore(out / STORE)
-    with store.locked(), logged(out / "log.txt", store.plan, tell) as progress:
+    with store.locked(), logged(out / "log.txt", store.plan, notify) as progress:
         if options.overwrite and not options.resume:
             store.clear()
         with engine(options.workers, options.scheduler, progress.say) as chosen:
@@ -238,7 +238,7 @@ class _Work:
         return keys
 
     def _estimate(self, planned, tasks, findings, keys, origin):
-        """Store each drive's results."""
+        """Store the results of each drive."""
         self.progress.say(Statement("drives estimated", values={"drives": len(planned)}))
         drives = []
         for drive in planned:
@@ -301,7 +301,7 @@ def _path(task):
 
 
 def _points(survey):
-    """Surveyed points by their use; those that are excluded or included where there are any."""
+    """Surveyed points by their use, with excluded or included ones if there are any."""
     points = survey.control, survey.check
     chosen = survey.excluded, survey.included
     if any(map(len, chosen)):

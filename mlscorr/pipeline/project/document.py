@@ -192,13 +192,13 @@ def _rmse(points, key):
 def _statements(project, rows, drives, faults):
     """First rows of the page: drives, control, files."""
     count = {state: [row["name"] for row in rows if row["state"] == state] for state in STATES}
-    held = len(count["controlled"]) + len(count["tied"])
+    constrained = len(count["controlled"]) + len(count["tied"])
     others = [(s, names) for s, names in count.items() if names and s != "controlled"]
     yield StatementRow(
         "Drives",
-        "green" if held == len(project.drives) else "red",
-        f"{held} of {counted(len(project.drives), 'drive')} are constrained by control points, "
-        f"{len(count['tied'])} of them through ties with other drives.",
+        "green" if constrained == len(project.drives) else "red",
+        f"{constrained} of {counted(len(project.drives), 'drive')} are constrained by control "
+        f"points, {len(count['tied'])} of them through ties with other drives.",
         tuple((", ".join(names), STATES[state]) for state, names in others),
     )
     used = {

@@ -76,7 +76,7 @@ def drive_estimate(joint: JointDrives, estimate: Estimate, number: int, note: st
         log_likelihood=estimate.log_likelihood,
         sigma0=estimate.sigma0,
         guards=guards,
-        support=_held(estimate.support, trajectory, shift, chainage),
+        support=_support(estimate.support, trajectory, shift, chainage),
         notes=estimate.notes,
         ties=_ties(joint, estimate.ties, number),
         untied=note or estimate.untied,
@@ -88,8 +88,8 @@ def _cut(correction, trajectory, shift):
     whole = correction.corrected
     first, last = np.searchsorted(whole.gps_time, trajectory.gps_time[[0, -1]] + shift)
     rows = slice(first, last + 1)
-    way = np.diff(whole.position[: first + 1], axis=0)
-    chainage = float(np.linalg.norm(way, axis=1).sum())
+    increments = np.diff(whole.position[: first + 1], axis=0)
+    chainage = float(np.linalg.norm(increments, axis=1).sum())
     times = {"gps_time": trajectory.gps_time, "session": trajectory.session}
     corrected = replace(whole.select(rows), **times)
     return Correction(trajectory, corrected, covariance=correction.covariance[rows]), chainage
@@ -122,7 +122,7 @@ def _ties(joint, residuals, number):
     return TieResiduals(own, residuals.used[rows], residuals.after[rows])
 
 
-def _held(support, trajectory, shift, chainage):
+def _support(support, trajectory, shift, chainage):
     """Support of a drive, in its own times and along its own path."""
     first, last = trajectory.gps_time[[0, -1]]
 
@@ -132,13 +132,13 @@ def _held(support, trajectory, shift, chainage):
     return Support(
         tuple(
             replace(
-                stretch,
-                start=stretch.start - shift,
-                end=stretch.end - shift,
-                chainage=stretch.chainage - chainage,
+                interval,
+                start=interval.start - shift,
+                end=interval.end - shift,
+                chainage=interval.chainage - chainage,
             )
-            for stretch in support.weak
-            if inside(stretch.start, stretch.end)
+            for interval in support.weak
+            if inside(interval.start, interval.end)
         ),
         tuple((start - shift, end - shift) for start, end in support.outages if inside(start, end)),
         tuple(step - shift for step in support.steps if inside(step, step)),

@@ -113,7 +113,7 @@ class Cluster:
     ----------
     scheduler : str
         Address of the scheduler.
-    tell : function of a Statement
+    notify : function of a Statement
         Receives statements on waiting.
 
     Raises
@@ -124,14 +124,14 @@ class Cluster:
         If the extra ``cluster`` is missing.
     """
 
-    def __init__(self, scheduler: str, tell: Callable[[Statement], object]) -> None:
+    def __init__(self, scheduler: str, notify: Callable[[Statement], object]) -> None:
         try:
             from dask import config
             from distributed import Client, KilledWorker
         except ImportError:
             raise ImportError("A cluster needs dask: pip install 'mlscorr[cluster]'") from None
         patience = config.get("distributed.comm.timeouts.connect")  # with its unit, as "30s"
-        self._tell = tell
+        self._notify = notify
         self._waiting = {"scheduler": scheduler, "patience": patience}
         try:
             self._client = Client(scheduler)
@@ -142,7 +142,7 @@ class Cluster:
             ) from None
         try:  # a batch system may start the first worker later than the scheduler
             if not self._client.nthreads():
-                tell(Statement("no worker yet", values=self._waiting))
+                notify(Statement("no worker yet", values=self._waiting))
             self._client.wait_for_workers(1, patience)
         except OSError as error:
             self.close()
@@ -172,7 +172,7 @@ class Cluster:
         while self._client.status in ("running", "connecting"):
             if not is_lost and self._client.status == "connecting":
                 is_lost = True
-                self._tell(Statement("scheduler lost", values=self._waiting))
+                self._notify(Statement("scheduler lost", values=self._waiting))
             # Its end may not be known yet, and then this waits for it; or dask just gives up
             with suppress(OSError, AttributeError, RuntimeError):
                 threads = sum(self._client.nthreads().values())
@@ -192,7 +192,7 @@ class Cluster:
             self._connection = self._client.scheduler_comm
             self._client.subscribe_topic("all", self._count)
             self.lost += 1
-            self._tell(Statement("scheduler back"))
+            self._notify(Statement("scheduler back"))
 
     def submit(self, function: Callable, *arguments: object) -> Future:
         """Return the Future of a call; canceled if the connection to the scheduler ends before
@@ -218,7 +218,7 @@ Engine = Loop | Processes | Cluster
 
 @contextmanager
 def engine(
-    workers: int = 1, scheduler: str | None = None, tell: Callable[[Statement], object] = str
+    workers: int = 1, scheduler: str | None = None, notify: Callable[[Statement], object] = str
 ) -> Iterator[Engine]:
     """Open the requested engine.
 
@@ -228,7 +228,7 @@ def engine(
         Number of local processes; one is this process itself.
     scheduler : str, optional
         Address of a cluster's scheduler.
-    tell : function of a Statement
+    notify : function of a Statement
         See Cluster.
 
     Raises
@@ -245,7 +245,7 @@ def engine(
     if scheduler is None:
         chosen = Processes(workers)
     else:
-        chosen = Cluster(scheduler, tell)
+        chosen = Cluster(scheduler, notify)
     before = {name: value for name, value in os.environ.items() if name in THREADS}
     os.environ.update(dict.fromkeys(THREADS, "1"))  # of processes started from here
     try:

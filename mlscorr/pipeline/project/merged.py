@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from mlscorr.correction import Correction
 from mlscorr.estimate import (
-    HELD,
+    CONSTRAINED,
     REASONS,
     Support,
     TieResiduals,
@@ -22,9 +22,9 @@ from mlscorr.estimate import (
     guards_of,
     position_adjustment,
     position_prior,
-    weak_stretches,
+    weak_intervals,
 )
-from mlscorr.evaluate import misfit_section
+from mlscorr.evaluate import tie_residual_section
 from mlscorr.pipeline.project.areas import Area, Piece
 from mlscorr.pipeline.project.corrected import STATES, DriveState, drive_fields, tied_sentence
 from mlscorr.pipeline.project.drive_estimate import CorrectedDrive, DriveEstimate
@@ -85,10 +85,14 @@ def merged_drive(
     state = _state(parts, home, estimate.used)
     estimate = replace(estimate, untied=tied_sentence(state) or main.estimate.untied)
     notes = _distinct([part.corrected.survey.notes for part in parts])
-    misfits = misfit_section(estimate.ties) or {"n": 0, "used": 0, "reason": estimate.untied}
+    statistics = tie_residual_section(estimate.ties) or {
+        "n": 0,
+        "used": 0,
+        "reason": estimate.untied,
+    }
     whole = replace(drive, survey=replace(drive.survey, notes=notes))
     fields = drive_fields(whole, estimate) | {"next_control": _places(drive, parts, home)}
-    return CorrectedDrive(**fields, tie_section=misfits), state
+    return CorrectedDrive(**fields, tie_section=statistics), state
 
 
 def _estimate(drive, parts, home, main):
@@ -186,17 +190,17 @@ def _ties(parts, correction):
 def _support(parts, home, corrected):
     """Support of a drive."""
     time = corrected.gps_time
-    codes = np.full(len(corrected), HELD)
+    codes = np.full(len(corrected), CONSTRAINED)
     for part, is_home in zip(parts, home, strict=True):
-        for stretch in part.estimate.support.weak:
-            inside = is_home & (time >= stretch.start) & (time <= stretch.end)
-            codes[inside] = REASONS.index(stretch.why)
+        for interval in part.estimate.support.weak:
+            inside = is_home & (time >= interval.start) & (time <= interval.end)
+            codes[inside] = REASONS.index(interval.why)
     outages: list[tuple[float, float]] = []
     for each in sorted(span for part in parts for span in part.estimate.support.outages):
         first, last = outages.pop() if outages and each[0] <= outages[-1][1] else each
         outages.append((first, max(last, each[1])))
     steps = {step for part in parts for step in part.estimate.support.steps}
-    return Support(tuple(weak_stretches(codes, corrected)), tuple(outages), tuple(sorted(steps)))
+    return Support(tuple(weak_intervals(codes, corrected)), tuple(outages), tuple(sorted(steps)))
 
 
 def _places(drive, parts, home):

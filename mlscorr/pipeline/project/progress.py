@@ -25,12 +25,12 @@ class Progress:
     log : text stream
     plan : Path
         List of the tasks of each stage, for status.
-    tell : function of a Statement
+    notify : function of a Statement
     """
 
     log: TextIO
     plan: Path
-    tell: Callable[[Statement], object]
+    notify: Callable[[Statement], object]
     stages: dict[str, list[dict]] = field(default_factory=dict)
     counts: dict[str, float] = field(default_factory=lambda: {"faults": 0})  # of all stages
     due: float = 0.0
@@ -54,7 +54,7 @@ class Progress:
             With a key of PROGRESS.
         """
         self.note(progress_sentence(statement))
-        self.tell(statement)
+        self.notify(statement)
 
     def begin(self, kind: str, tasks: Sequence[Task]) -> None:
         """Begin a stage.
@@ -122,7 +122,7 @@ class Progress:
 
 
 @contextmanager
-def logged(log: Path, plan: Path, tell: Callable[[Statement], object]) -> Iterator[Progress]:
+def logged(log: Path, plan: Path, notify: Callable[[Statement], object]) -> Iterator[Progress]:
     """Open Progress with its log, which also records an early end of the run.
 
     Parameters
@@ -132,7 +132,7 @@ def logged(log: Path, plan: Path, tell: Callable[[Statement], object]) -> Iterat
         See Progress.
     """
     with telling_space(log.parent), appended(log) as stream:
-        progress = Progress(stream, plan, tell)
+        progress = Progress(stream, plan, notify)
         try:
             yield progress
         except BaseException as error:

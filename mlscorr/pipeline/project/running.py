@@ -47,7 +47,7 @@ class Run:
     engine : Engine
     watch : function of an Outcome
         Receives each finished task.
-    tell : function of a Statement
+    notify : function of a Statement
         Receives statements on tasks that lost their worker.
     faults : list of Outcome
         Outcomes of tasks without a result.
@@ -56,7 +56,7 @@ class Run:
     store: TaskStore
     engine: Engine
     watch: Callable[[Outcome], object]
-    tell: Callable[[Statement], object] = str
+    notify: Callable[[Statement], object] = str
     faults: list[Outcome] = field(default_factory=list)
 
     def results(self, tasks: Sequence[Task]) -> dict[str, Any]:
@@ -124,10 +124,10 @@ class Run:
                 try:
                     yield Outcome(task, *future.result())
                 except CancelledError:  # with the connection to a scheduler: not caused by a task
-                    self.tell(Statement("task lost with scheduler", values={"task": task.name}))
+                    self.notify(Statement("task lost with scheduler", values={"task": task.name}))
                     (suspects if was_single else waiting).appendleft(task)
                 except self.engine.losses:
-                    self.tell(Statement("task lost with worker", values={"task": task.name}))
+                    self.notify(Statement("task lost with worker", values={"task": task.name}))
                     losses[task.name, was_single] += 1
                     is_first = losses[task.name, False] == 1 and not was_single
                     if losses[task.name, True] >= SETTINGS.losses:

@@ -45,7 +45,7 @@ def ladder_figure(document: dict) -> Figure:
     for place, rung in enumerate(rungs):
         value = rung["log_evidence_ratio"] / np.log(10.0)
         kind = family(rung["label"])
-        is_held = rung["label"] in document["verdict"]["set"]
+        is_in_set = rung["label"] in document["verdict"]["set"]
         color, hatch, _ = FAMILIES[kind]
         panel.barh(
             place,
@@ -54,12 +54,12 @@ def ladder_figure(document: dict) -> Figure:
             color=color,
             hatch=hatch,
             zorder=2,
-            edgecolor="black" if is_held else "white",
-            linewidth=1.4 if is_held else 0.4,
+            edgecolor="black" if is_in_set else "white",
+            linewidth=1.4 if is_in_set else 0.4,
         )
         panel.plot(value, place, "|", color="black", markersize=8, zorder=3)
         name = label(title(rung["label"]), SETTINGS.ladder_letters)
-        names.append("● " * is_held + name + " [noise]" * (kind == "noise"))
+        names.append("● " * is_in_set + name + " [noise]" * (kind == "noise"))
         _write_probability(panel, place, value, rung["probability"])
     panel.axvline(0.0, color="black", linewidth=0.9, zorder=3)
     panel.set_yticks(range(len(rungs)), names, parse_math=False)

@@ -48,10 +48,10 @@ def gap_screen(document: dict) -> dict[str, object]:
     ]
     answer = StatementRow("Unmodeled", RATINGS[box.tone], f"{box.kicker}. {first}", tuple(items))
     warnings = warning_statements(document["warnings"])
-    beside = (*channel_statements(document), *unjudged(document))
+    further = (*channel_statements(document), *unjudged(document))
     judged = ", and the accuracy is not tested against it"
     assumed = assumed_statement(document["assumed"], judged, "amber", USES)
-    return statements_section([*accuracy(document), answer, *assumed, *beside, *warnings])
+    return statements_section([*accuracy(document), answer, *assumed, *further, *warnings])
 
 
 def accuracy(document: dict) -> Iterator[StatementRow]:

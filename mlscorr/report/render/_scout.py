@@ -50,8 +50,8 @@ def scout(
         sample.add(cloud)
         low = np.array([column.min(initial=np.inf) for column in cloud.xyz.T])
         high = np.array([column.max(initial=-np.inf) for column in cloud.xyz.T])
-        apart = np.maximum(low - centres, centres - high).max(axis=1)
-        for k in np.flatnonzero(apart <= radii):  # not every target in every chunk
+        distance = np.maximum(low - centres, centres - high).max(axis=1)
+        for k in np.flatnonzero(distance <= radii):  # not every target in every chunk
             near[k].append(_around(cloud, centres[k], radii[k]))
     if not sample.count:
         raise ValueError("The cloud has no points to draw.")

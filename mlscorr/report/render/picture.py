@@ -45,7 +45,7 @@ class Picture:
         return "".join(c if c.isalnum() or c in "-_." else "_" for c in self.view.name)
 
     def panels(self, decorated: bool = True) -> tuple[bytes, ...]:
-        """The bytes of two PNGs, before and after, for one to be laid over the other.
+        """Bytes of two PNGs, before and after, to be laid over each other.
 
         Parameters
         ----------
@@ -135,7 +135,7 @@ def _drawn(figure):
 
 
 def _panel(view, k, pixels, corner, height):
-    """The points of one side, pixel by pixel, under its marks, with scale and compass."""
+    """Points of one side, pixel by pixel, under its marks, with scale and compass."""
     pen = Pen(pixels)
     for mark in view.marks[k]:
         _mark(pen, mark, view.camera)

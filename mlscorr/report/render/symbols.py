@@ -104,7 +104,7 @@ def scale_bar(pen: Pen, camera: Camera, size: float) -> None:
 
 
 def _paper(pen, left, top, right, bottom):
-    """A white patch, on which symbols can be read before any points."""
+    """White patch on which symbols are readable over any points."""
     corners = np.array([[left, top], [right, top], [right, bottom], [left, bottom]])
     pen.tint(corners, "white", 0.92)
 
@@ -164,15 +164,15 @@ def compass(pen: Pen, camera: Camera, corner: tuple[int, int], size: float) -> N
     arrows = {name: 1.35 * arm * d * [1, -1] for name, d in directions(camera).items()}
     tips = np.array([[0, 0], *arrows.values()]) + middle
     _paper(pen, *(tips.min(axis=0) - 0.4 * arm), *(tips.max(axis=0) + 0.4 * arm))
-    for name, way in arrows.items():
+    for name, arrow in arrows.items():
         is_second = name in ("E", "up")
         color = "#777777" if is_second else "black"
-        length = float(np.hypot(*way))
+        length = float(np.hypot(*arrow))
         if length > 0.9 * size:  # else it points to the eye
-            shaft = way * (1 - 0.75 * size / length)  # ends before its letter
+            shaft = arrow * (1 - 0.75 * size / length)  # ends before its letter
             ends = np.stack([middle, middle + shaft])
             pen.arrow(ends, color, 1.4 * PT, (0.4 * size, 0.25 * size))
-        pen.text(tuple(middle + way), name, size, color, "mm", bold=not is_second)
+        pen.text(tuple(middle + arrow), name, size, color, "mm", bold=not is_second)
 
 
 def legend(figure: Figure, view: Any, scale: ColourScale, margins: tuple[float, float]) -> None:

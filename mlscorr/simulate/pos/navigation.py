@@ -320,12 +320,12 @@ def aligned_poses(trajectory: Trajectory, gps_time: np.ndarray) -> tuple[np.ndar
         if outside.any():
             elapsed = gps_time[outside] - edge
             nose = attitude[np.argmax(outside)].apply([0.0, 1.0, 0.0])
-            position[outside] += _way(elapsed, spline(edge, 1), nose)
+            position[outside] += _driven(elapsed, spline(edge, 1), nose)
             attitude[outside] = _turned(elapsed) * attitude[outside]
     return position, attitude
 
 
-def _way(elapsed, velocity, nose):
+def _driven(elapsed, velocity, nose):
     """Displacement (n, 3) from the edge of a pass, given the velocity (3,) there. Units: m."""
     speed = np.linalg.norm(velocity)
     course = nose
@@ -337,10 +337,10 @@ def _way(elapsed, velocity, nose):
     )
     moving = faster[:, None] * _turned(fine).apply(course)
     steps = (moving[1:] + moving[:-1]) / 2 * np.diff(fine)[:, None]
-    way = np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
+    driven = np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
     if fine[-1] > 0:
-        return CubicSpline(fine, way)(elapsed)
-    return CubicSpline(fine[::-1], way[::-1])(elapsed)
+        return CubicSpline(fine, driven)(elapsed)
+    return CubicSpline(fine[::-1], driven[::-1])(elapsed)
 
 
 def _turned(elapsed):

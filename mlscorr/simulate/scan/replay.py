@@ -99,10 +99,10 @@ def recorded_pulses(
         Unit normals of the surfaces of the points.
     """
     time = cloud.gps_time
-    level = np.zeros(len(cloud))
+    zeros = np.zeros(len(cloud))
     quarter = np.full(len(cloud), np.pi / 2)
-    start, x = aim(platform, time, level, level)
-    ends = _towards(platform, time, quarter, level), _towards(platform, time, level, quarter)
+    start, x = aim(platform, time, zeros, zeros)
+    ends = _towards(platform, time, quarter, zeros), _towards(platform, time, zeros, quarter)
     axes = x, *(end - start for end in ends)
     sight = cloud.xyz - origin - start
     x, y, z = (np.einsum("ni,ni->n", sight, axis) for axis in axes)

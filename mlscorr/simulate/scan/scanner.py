@@ -132,7 +132,7 @@ def turns_of_a_pass(trajectory: Trajectory, scanner: ScannerScenario) -> int:
     trajectory : Trajectory
     scanner : ScannerScenario
     """
-    duration = trajectory.gps_time[-1] - trajectory.gps_time[0] - 2 * SETTINGS.lead
+    duration = trajectory.gps_time[-1] - trajectory.gps_time[0] - 2 * SETTINGS.trajectory_margin
     return int(duration * scanner.lines_per_second + 1e-6)  # times are accurate to 1e-10 s
 
 
@@ -295,7 +295,7 @@ def shoot(
     platform = Platform.of(trajectory, mounting, origin)
     turn = turn_of(scanner)
     total = turns_of_a_pass(trajectory, scanner) * len(turn)
-    start = trajectory.gps_time[0] + SETTINGS.lead
+    start = trajectory.gps_time[0] + SETTINGS.trajectory_margin
     step = block if divergence == 0 else max(1, block // len(POWER))
     sizes = [min(step, total - first) for first in range(0, total, step)]
     room = Workspace()

@@ -224,7 +224,7 @@ class TargetHeight:
     below: float
     span: float
 
-    def draw(self, half: float, rng: Generator, raised: float = 0.0) -> float:
+    def draw(self, half: float, rng: Generator, extra_height: float = 0.0) -> float:
         """Draw the height of a target's center above its foot. Units: m.
 
         Parameters
@@ -232,10 +232,10 @@ class TargetHeight:
         half : float
             From the center to the edge of the target. Units: m.
         rng : Generator
-        raised : float
+        extra_height : float
             Additional height. Units: m.
         """
-        low = max(self.least, half + self.below) + raised
+        low = max(self.least, half + self.below) + extra_height
         return rng.uniform(low, low + self.span)
 
 

@@ -146,7 +146,7 @@ TARGET_ENDS = 0.6  # m, between a target and the end of its reach
 
 
 @dataclass(frozen=True)
-class _Stretch:
+class _Section:
     """Interval of the shore of one kind, from start to end (m along the boat's line)."""
 
     kind: str
@@ -198,9 +198,9 @@ class River:
         return self.line.place(s, self.shore(s) + inland, height)
 
     @cached_property
-    def stretches(self) -> list:
+    def sections(self) -> list:
         """Alternating quay walls and slopes, with steps between some of them."""
-        stretches = []
+        sections = []
         s = -SETTINGS.margin
         i = int(self._phase > np.pi)
         while s < self.length + SETTINGS.margin:
@@ -209,12 +209,12 @@ class River:
                 length = self._shore_rng.uniform(*lengths)
                 end = min(s + length, self.length + SETTINGS.margin)
                 if end - s > 1.0:
-                    stretches.append(_Stretch(kind, s, end))
+                    sections.append(_Section(kind, s, end))
                     s = end
                 else:
                     s = self.length + SETTINGS.margin
             i += 1
-        return stretches
+        return sections
 
     @cached_property
     def houses(self) -> np.ndarray:
@@ -240,8 +240,8 @@ class River:
     @cached_property
     def mesh(self) -> Mesh:
         """Banks, walls between them, and houses."""
-        pieces = [self._bank(stretch) for stretch in self.stretches]
-        pieces += [self._cross_wall(stretch.start) for stretch in self.stretches[1:]]
+        pieces = [self._bank(section) for section in self.sections]
+        pieces += [self._cross_wall(section.start) for section in self.sections[1:]]
         for row in self.houses:
             near, far = self._front(row)
             inward = unit(np.cross(far - near, UP))
@@ -249,11 +249,11 @@ class River:
             pieces.append(house(near, far, inward, row[3], reflectance))
         return Mesh.concatenate(pieces)
 
-    def _bank(self, stretch):
+    def _bank(self, section):
         """Profile of an interval along the shore, in strips of at most 2 m."""
-        s = np.linspace(stretch.start, stretch.end, 2 + int((stretch.end - stretch.start) / 2.0))
+        s = np.linspace(section.start, section.end, 2 + int((section.end - section.start) / 2.0))
         strips = []
-        for (x, z, reflectance), (next_x, next_z, _) in pairwise(self.bank.profile(stretch.kind)):
+        for (x, z, reflectance), (next_x, next_z, _) in pairwise(self.bank.profile(section.kind)):
             near = self.place(s, x, z)
             far = self.place(s, next_x, next_z)
             strips.append(four_corners(near[:-1], near[1:], far[1:], far[:-1], reflectance))
@@ -271,7 +271,7 @@ class River:
 
     def _kind_at(self, s, margin):
         """Kind of the interval that contains s with a margin (m) on both sides, or None."""
-        holding = (r.kind for r in self.stretches if r.start + margin < s < r.end - margin)
+        holding = (r.kind for r in self.sections if r.start + margin < s < r.end - margin)
         return next(holding, None)
 
     def spot(
@@ -339,8 +339,8 @@ class River:
         """Find a position on a post behind the quay's edge, on the slope, or above the steps."""
         inland = rng.uniform(*POSTS[kind])
         foot = self.place(s, inland, self.bank.height(kind, inland))
-        raised = STEPS_RAISE if kind == "steps" else 0.0
-        centre = foot + ON_POSTS.draw(half, rng, raised) * UP
+        extra_height = STEPS_RAISE if kind == "steps" else 0.0
+        centre = foot + ON_POSTS.draw(half, rng, extra_height) * UP
         lateral = float(self.shore(s) + inland)
         return TargetSpot("post", s, lateral, centre, -self._facing(s), UP, foot[2])
 
@@ -382,7 +382,7 @@ class River:
                 else:
                     right_place = kind is not None
                 on_steps = kind == "steps" and thing.across < ABOVE_STEPS
-                hides = placed.in_the_way(s, float(self.shore(s)) + thing.across, thing.extent)
+                hides = placed.obstructs(s, float(self.shore(s)) + thing.across, thing.extent)
                 return right_place and not on_steps and not hides
 
             start = -SETTINGS.margin + FREE_ENDS

@@ -221,8 +221,8 @@ class Street:
         inward = unit(front.side * np.cross(front.far - front.near, UP))
         middle = points + HOUSE.depth / 2 * inward
         points = np.concatenate([points, middle, points + HOUSE.depth * inward])
-        way = self.section.road + self.section.pavement - self.section.clearance
-        return (self.line.distance(points) > way).all()
+        clear_width = self.section.road + self.section.pavement - self.section.clearance
+        return (self.line.distance(points) > clear_width).all()
 
     @cached_property
     def mesh(self) -> Mesh:
@@ -409,9 +409,9 @@ class Street:
         a U-turn.
         """
         place = self.line.place(s, lateral, 0.0)
-        in_a_way = self.line.distance(place) < abs(lateral) - self.section.clearance
+        on_roadway = self.line.distance(place) < abs(lateral) - self.section.clearance
         in_a_turn = extent > 1.0 and self.section.half_width(s) > self.section.road
-        return not (in_a_way or in_a_turn or placed.in_the_way(s, lateral, extent))
+        return not (on_roadway or in_a_turn or placed.obstructs(s, lateral, extent))
 
     def _lamp(self, s, side, lateral, rng):
         _, _, right = self.line.frame(s)

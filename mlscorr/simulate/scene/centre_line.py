@@ -91,7 +91,7 @@ class CentreLine:
         return self._samples[1].query(np.asarray(points)[..., :2])[0]
 
     def distance_to_other_parts(
-        self, points: np.ndarray, s: np.ndarray, earlier: bool = False, apart: float = 30.0
+        self, points: np.ndarray, s: np.ndarray, earlier: bool = False, separation: float = 30.0
     ) -> np.ndarray:
         """Return the horizontal distance (n,) of points (n, 3) at s (n,) from other parts.
 
@@ -106,14 +106,14 @@ class CentreLine:
             Length at their own part. Units: m.
         earlier : bool
             True if only parts before s count.
-        apart : float
+        separation : float
             Distance along the line beyond which a position belongs to another part. Units: m.
         """
         lengths, tree = self._samples
         # three parts within
         near, number = tree.query(points[:, :2], 64, distance_upper_bound=10.0)
         ahead = np.append(lengths, np.inf)[number] - s[:, None]
-        other = ahead < -apart if earlier else np.abs(ahead) > apart
+        other = ahead < -separation if earlier else np.abs(ahead) > separation
         return np.where(other & np.isfinite(near), near, np.inf).min(axis=1)
 
 

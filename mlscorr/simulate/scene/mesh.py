@@ -174,9 +174,9 @@ def line_on_mesh(scenario: Scenario, line: CentreLine, length: float) -> CentreL
     levels = Ground(mesh).levels(place)
     height = np.full(len(s), np.nan)
     start = int(np.argmin(np.abs(s)))
-    for way in (range(start, len(s)), range(start, -1, -1)):
+    for order in (range(start, len(s)), range(start, -1, -1)):
         last = 0.0
-        for i in way:  # the surface that continues the previous one, not a roof or a cellar
+        for i in order:  # the surface that continues the previous one, not a roof or a cellar
             height[i] = _nearest(levels[i], last)
             last = height[i] if len(levels[i]) else last
     _check_ground(scenario, mesh, s, place, height, length)
@@ -207,7 +207,7 @@ def _check_ground(scenario, mesh, s, place, height, length, hole=5.0):
 class MeshSite:
     """User's mesh; `spot` finds positions for targets on posts, `furniture` makes these posts."""
 
-    beside = (2.5, 6.0)  # m from the drive to a target's post
+    post_distance = (2.5, 6.0)  # m from the drive to a target's post
 
     def __init__(self, scenario: Scenario, line: CentreLine, length, rng):
         self.line = line
@@ -234,7 +234,7 @@ class MeshSite:
         """
         _, forward, _ = self.line.frame(s)
         u = -side * (forward - forward[2] * UP) / np.linalg.norm(forward[:2])
-        for lateral in side * rng.uniform(*self.beside, 8):
+        for lateral in side * rng.uniform(*self.post_distance, 8):
             foot = self.line.place(s, lateral, 0.0)
             ground = self._ground.nearest(foot[None])[0]
             if not np.isfinite(ground) or abs(ground - foot[2]) > STEEPEST:
@@ -242,7 +242,7 @@ class MeshSite:
             centre = np.array([*foot[:2], ground + ON_POSTS.draw(half, rng)])
             if (
                 self._is_free(centre, s, half, u)
-                and self.line.distance(centre) > self.beside[0] - 0.5
+                and self.line.distance(centre) > self.post_distance[0] - 0.5
             ):
                 return TargetSpot("post", s, lateral, centre, u, UP, ground)
         return None

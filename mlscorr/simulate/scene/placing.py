@@ -62,7 +62,7 @@ class Placed:
     posts: Mesh
     spots: tuple[TargetSpot, ...]
 
-    def in_the_way(self, s: float, lateral: float, extent: float, wedge: float = 1.2) -> bool:
+    def obstructs(self, s: float, lateral: float, extent: float, wedge: float = 1.2) -> bool:
         """True if an object at s, of a half extent along the way (m), would hide a target.
 
         This holds within the wedge of 50 deg to each side (its tangent) from which a target on the
@@ -125,7 +125,7 @@ def place_targets(
             continue
         spots.append(spot)
         kinds.append(kind)
-    _tell_unplaced(unplaced, count)
+    _report_unplaced(unplaced, count)
     spots = [_faced(spot, yaw, rng) if spot.support == "post" else spot for spot in spots]
     hidden = _choose_hidden(spots, scenario.hidden, rng)
     posts = [_own_post(spot, scenario.size) for spot in spots if spot.support == "post"]
@@ -165,38 +165,38 @@ def _along(scenario, count, length, rng):
             "times as large, must fit a lane and the ground floor of a wall. Give a size of up "
             f"to {SETTINGS.largest_target} m."
         )
-    lead = min(SETTINGS.run_in, length / 4)
+    run_in = min(SETTINGS.run_in, length / 4)
     nearest = 2 - 2 * SETTINGS.jitter
     jitter = SETTINGS.jitter
-    spacing = (length - 2 * lead) / count
+    spacing = (length - 2 * run_in) / count
     half = max(_half(kind, scenario.size) for kind in scenario.kinds)
     across = 2 * np.sqrt(2) * half + SETTINGS.target_clearance
     if nearest * spacing < across:
-        room = int((length - 2 * lead) * nearest / across)
+        room = int((length - 2 * run_in) * nearest / across)
         raise ValueError(
             f"{count} targets of {scenario.size} m do not fit along {length:.0f} m without "
             f"touching; there is room for {room}. Use fewer targets or a longer drive."
         )
-    return lead + spacing * (np.arange(count) + 0.5 + rng.uniform(-jitter, jitter, count))
+    return run_in + spacing * (np.arange(count) + 0.5 + rng.uniform(-jitter, jitter, count))
 
 
 def _find_spot(site, near, side, support, half, others, rng):
     """First TargetSpot near lengths (k,) in m with room, at a distance from others; or a post;
     or None.
     """
-    apart = 2 * np.sqrt(2) * half + SETTINGS.target_clearance
+    distance = 2 * np.sqrt(2) * half + SETTINGS.target_clearance
     for kind in dict.fromkeys([support, "post"]):
         for s in near:
             for on_side in (side, -side):
                 spot = site.spot(float(s), on_side, kind, half, rng)
                 if spot is not None and all(
-                    np.linalg.norm(spot.centre - other.centre) > apart for other in others
+                    np.linalg.norm(spot.centre - other.centre) > distance for other in others
                 ):
                     return spot
     return None
 
 
-def _tell_unplaced(places, count):
+def _report_unplaced(places, count):
     """Warn of targets without a position, by their intended lengths (m); refuse if all are."""
     if not places:
         return
@@ -282,10 +282,10 @@ def scatter(
         Attempts at a random position for each object.
     """
     count = round(density * (end - start) / 100.0)
-    stretch = (end - start) / max(count, 1)
+    spacing = (end - start) / max(count, 1)
     things = []
     for i in range(count):
-        lengths = start + stretch * (i + rng.uniform(0.0, 1.0, places))
+        lengths = start + spacing * (i + rng.uniform(0.0, 1.0, places))
         for s, side in zip(lengths, rng.choice([-1, 1], places), strict=True):
             if is_free(s, side):
                 things.append((s, side))

@@ -1,4 +1,4 @@
-"""How far a gap shrinks on rows that were not used to find the size of its cause."""
+"""Shrinking of a gap on rows that were not used to estimate the size of its cause."""
 
 import numpy as np
 import pytest

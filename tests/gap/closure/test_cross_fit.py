@@ -35,7 +35,7 @@ def test_sizes_are_found_to_what_the_noise_lets(case):
 
 
 def test_without_folds_all_tell(case):
-    "Where nothing is held out the only fold's size is that of all"
+    "Without held-out rows the size of the only fold is that of all rows"
     cross, residual = case
     sizes = CrossFit(cross.columns, np.zeros(300, int), 1).sizes(residual[:, None])
     np.testing.assert_array_equal(sizes[0], sizes[1])

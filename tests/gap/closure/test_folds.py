@@ -83,7 +83,7 @@ def test_the_folds_are_counted(late):
 
 
 def inference(late, label, probability, is_hidden=False):
-    "What an inference says of the bed, in the parts on which the simulator's cause depends"
+    "Inference on the bed, in the parts on which the simulator's cause depends"
     verdict = GapVerdict(label, probability[label], (label,), 0.01, "", is_hidden)
     causes = tuple(late.cause(name) for name in probability if name != "unknown")
     return Inference(verdict, causes, (), None, None, probability, late.evidence, None)
@@ -106,7 +106,7 @@ def test_the_simulator_takes_a_known_cause(late, label, is_hidden, expected):
 
 
 def test_without_a_known_cause_nothing_is_added(late):
-    "Where none and unknown are all labels, the simulator stays as it is"
+    "With labels none and unknown the simulator does not change"
     share = {"unknown": 0.8, "none": 0.2}
     cause = cause_for_simulator(late.rows, late.signs, inference(late, "unknown", share))
     assert cause.effect == "none"

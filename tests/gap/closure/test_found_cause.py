@@ -1,4 +1,4 @@
-"""Which rows can judge a cause."""
+"""Rows that can judge a cause."""
 
 from dataclasses import replace
 

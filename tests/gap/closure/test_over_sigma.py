@@ -41,7 +41,7 @@ def test_twice_the_sigma_may_be_chance(after, beyond):
 
 @pytest.mark.long
 def test_planes_of_two_passes_tell_nothing_of_sigma(case):
-    "Where they are is free to a metre: they take no part, and targets and surfaces count in full"
+    "Planes without a surveyed position take no part; targets and surfaces count in full"
     survey, _, rows, _ = case
     both = Observations.of(rows, background(rows, survey))
     kept = rows.select(~rows.two_times)

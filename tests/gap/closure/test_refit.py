@@ -79,7 +79,7 @@ def test_a_wall_without_paint_is_no_target(drive):
 
 
 def simulated_points(case):
-    "What refit_targets takes of a run without effects"
+    "Points that refit_targets takes from a run without effects"
     survey, _, rows, beams = case
     run, dither, speckle, _ = _drawn(rows, survey, beams, (), np.random.default_rng(9))
     boards = _boards(rows, beams, ())
@@ -117,7 +117,7 @@ def test_residuals_are_found_less_surveyed(case, simulated):
 
 
 def test_targets_without_points_are_left_open(case, simulated):
-    "Where no return of a view is kept its three rows stay as they were, the others are filled"
+    "Rows of a view without returns do not change, the others are filled"
     _, _, rows, beams = case
     xyz, kept, *others = simulated
     view = np.flatnonzero(beams.target == 0)[0]

@@ -141,7 +141,7 @@ def test_what_stands_before_a_target_stays_there():
 
 
 def test_before_the_sky_there_is_nothing_behind():
-    "Where all pulses but those on the target are lost, those on it meet nothing without it"
+    "Pulses on a target hit nothing without it if all other pulses are lost"
     sighting, [(pulses, distance, slant, place)], _ = look("square")
     inside = np.abs(place).max(axis=1) < 0.25
     parts = [(pulses[inside], distance[inside], slant[inside], place[inside])]

@@ -1,4 +1,4 @@
-"""What lies about targets is kept while the cloud is read once, and nothing else."""
+"""Points around targets are kept while the cloud is read once, and no others."""
 
 import numpy as np
 import pytest

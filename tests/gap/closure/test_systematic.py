@@ -1,4 +1,4 @@
-"""What sizes take of the squares of innovations, and what stays."""
+"""Squares of innovations that sizes explain, and the remaining ones."""
 
 import numpy as np
 import pytest

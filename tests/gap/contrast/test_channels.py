@@ -69,7 +69,7 @@ def test_returns_that_are_lost_far_away_are_measured_and_named(pair):
 
 
 def test_a_simulation_of_half_of_the_drive_says_nothing_of_the_rest(pair):
-    "Where the simulated cloud ends after half of the time, the other half is no missing density"
+    "A simulated cloud that ends after half of the time shows no missing density in the other half"
     survey, real, simulated = pair
     half = np.median(simulated.cells.begin)
     cells = simulated.cells[simulated.cells.begin < half]
@@ -106,9 +106,9 @@ def test_a_channel_of_which_nothing_is_known_is_silent(pair):
     contrasts = contrasted(survey, real, replace(simulated, points=level))
     assert "simulated cloud has no intensity" in contrasts["intensity"].silent
     assert not contrasts["intensity"].tables and not contrasts["density"].silent
-    believed = against_belief(survey, real.patches, None)
-    assert all(contrast.silent for contrast in believed.values())
-    assert "no effect dropout" in believed["dropout"].silent
+    assumed = against_belief(survey, real.patches, None)
+    assert all(contrast.silent for contrast in assumed.values())
+    assert "no effect dropout" in assumed["dropout"].silent
 
 
 def test_lost_returns_are_compared_with_a_simulator_that_has_them(pair):

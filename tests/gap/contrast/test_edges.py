@@ -58,7 +58,7 @@ def test_what_is_no_edge_between_two_surfaces_is_none(ranges):
 
 
 def test_a_missing_pulse_is_no_edge():
-    "Where a pulse is missing nobody knows what it would have measured"
+    "A missing pulse has no known range, so it is no edge"
     numbers = np.delete(np.arange(21), 10)
     assert len(edges_of(*line([10.0] * 10 + [14.0] * 10, numbers), ROUGH)) == 0
 

@@ -1,4 +1,4 @@
-"""What is kept of a cloud."""
+"""Sample that is kept of a cloud."""
 
 from dataclasses import replace
 

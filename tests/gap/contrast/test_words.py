@@ -12,7 +12,7 @@ EDGES = (0, 10, 20, 40, 80)
 
 
 def said(channel, factors):
-    "What is said of a channel whose four bins of range differ by factors, in 30 blocks"
+    "Statement on a channel whose four bins of range differ by factors, in 30 blocks"
     rng = np.random.default_rng(0)
     n = 120
     away = np.repeat([5.0, 15.0, 30.0, 60.0], 30)

@@ -41,7 +41,7 @@ def test_a_vector_acts_along_all_axes_or_one_of_them(table):
 
 
 def test_an_error_of_a_single_target_is_its_outliers_to_tell(with_surface):
-    "What moves all views of a target and nothing else; not what moves two targets"
+    "An outlier moves all views of one target and nothing else; an effect moves two targets"
     rows = with_surface[0].rows
     first, second = np.unique(rows.survey_item[rows.metric & (rows.survey_item >= 0)])[:2]
     alone = (rows.survey_item == first)[:, None].astype(float)

@@ -60,7 +60,7 @@ def test_evidence_moves_the_verdict():
 
 
 def test_the_label_is_the_one_that_costs_least():
-    "What is as likely as not is named only where a false alarm costs no more than a miss"
+    "A doubtful effect is named only if a false alarm costs no more than a miss"
     probability = {"range_bias": 0.55, "none": 0.45}
     assert cheapest(probability, NOISY, Costs(1.0, 1.0, 1.0)) == "range_bias"
     assert cheapest(probability, NOISY, Costs(5.0, 1.0, 1.0)) == "none"

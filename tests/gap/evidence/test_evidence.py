@@ -71,7 +71,7 @@ def test_an_unknown_error_that_a_known_effect_makes_is_not_unknown(with_surface)
     for library in (signs, tuple(s for s in signs if s.name != "range_scale")):
         kept = without_known(observed, column_table(g.rows, library, unknown, observed.sigma))
         members = {block.member for block in kept.blocks if block.label == "unknown"}
-        leads.append({unknown[i].lead for i in members})
+        leads.append({unknown[i].hint for i in members})
     assert leads[1] - leads[0] == {"range error in proportion to the range"}
 
 

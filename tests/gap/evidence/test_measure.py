@@ -1,4 +1,4 @@
-"""How large a gap is, in the unit in which its kind of cause shows."""
+"""Size of a gap, in the unit of its kind of cause."""
 
 import numpy as np
 import pytest
@@ -52,7 +52,7 @@ def test_scatter_that_is_predicted_is_no_gap(with_surface):
     predicted = Predicted(nothing.shift, growth, nothing.extra)
     before, after = (scatter_terms(rows, each, residual) for each in (nothing, predicted))
     rough = growth > 0
-    assert before[rough, 0] == pytest.approx(0.7 * rows.believed[rough])
+    assert before[rough, 0] == pytest.approx(0.7 * rows.assumed[rough])
     assert np.abs(after).max() < 1e-12
     assert not before[~rough].any()
 

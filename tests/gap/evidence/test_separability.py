@@ -1,4 +1,4 @@
-"""What a geometry can tell apart."""
+"""Effects that a geometry can separate."""
 
 import numpy as np
 import pytest

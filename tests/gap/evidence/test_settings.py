@@ -22,7 +22,7 @@ def test_priors_are_shares():
         dict(SETTINGS.noise_scales).values(),
         dict(SETTINGS.roughness).values(),
         dict(SETTINGS.roughness_common).values(),
-        dict(POS.raised_scales).values(),
+        dict(POS.increased_scales).values(),
         [shape[2] for shape in POS.process_shapes],
     )
     assert [sum(share) for share in shares] == pytest.approx([1.0] * len(shares))

@@ -12,7 +12,7 @@ def test_the_unknown_leaves_out_what_a_survey_does_not_vary(study):
     "A survey of one pass has no block of passes; every block shows in some row"
     g = study.geometry(8, targets=12, patches=20, passes=1)
     blocks = unknown_blocks(g.rows, g.survey)
-    assert not any("passes" in block.lead for block in blocks)
+    assert not any("passes" in block.hint for block in blocks)
     assert all(np.abs(block.columns).max() > 0 for block in blocks)
 
 
@@ -25,6 +25,6 @@ def test_what_goes_up_and_down_with_a_covariate_is_in_a_fine_block(with_surface)
     for block in unknown_blocks(g.rows, g.survey):
         columns = block.columns[g.rows.metric]
         left = shift - columns @ np.linalg.lstsq(columns, shift, rcond=None)[0]
-        held[block.lead] = 1 - (left @ left) / (shift @ shift)
+        held[block.hint] = 1 - (left @ left) / (shift @ shift)
     assert held["range error that varies with acceleration"] > 0.9
     assert held["range error that depends on acceleration"] < 0.5

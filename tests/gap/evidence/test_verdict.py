@@ -25,7 +25,7 @@ def test_a_withheld_effect_is_unknown_and_the_lead_points_at_it(with_surface):
     assert named(rows, g, signs).label == "range_scale"
     answer = named(rows, g, tuple(s for s in signs if s.name != "range_scale"))
     assert answer.label == "unknown"
-    assert "range" in answer.lead
+    assert "range" in answer.hint
 
 
 @pytest.mark.long
@@ -37,7 +37,7 @@ def test_an_effect_of_no_library_is_unknown(name, word, study, with_surface):
     shift *= 6.0 / study.metric(g)(shift)
     answer = named(surveyed(g, 34, outside=shift), g, signs)
     assert answer.label == "unknown"
-    assert word in answer.lead
+    assert word in answer.hint
 
 
 @pytest.mark.long
@@ -47,7 +47,7 @@ def test_without_the_time_offset_another_error_of_the_clock_does_not_take_its_na
     rows = surveyed(g, 41, make_effect("time_offset", magnitude=0.004))
     answer = named(rows, g, tuple(s for s in signs if s.name != "time_offset"))
     assert answer.label == "unknown"
-    assert "time error" in answer.lead
+    assert "time error" in answer.hint
 
 
 @pytest.mark.long

@@ -122,7 +122,7 @@ def test_growth_has_its_largest_value_where_the_shape_says(shape):
 
 
 def diagnosed(g, residual):
-    "What is inferred of a survey with such residuals"
+    "Inference on a survey with such residuals"
     rows = replace(g.rows, residual=residual)
     signs, _ = signatures(rows, g.survey)
     rng = np.random.default_rng(8)

@@ -1,4 +1,4 @@
-"""What acts in a made-up survey: effects that are unlike each other, and mechanisms unlike all."""
+"""Effects of a synthetic survey that differ from each other, and mechanisms unlike all."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What the targets tell that have no residual."""
+"""Evidence from targets that have no residual."""
 
 from pathlib import Path
 
@@ -98,5 +98,5 @@ def test_a_target_hidden_in_two_passes_is_missed_once():
     "Two neighbours that both passes miss are a run of two, not of four: no less by chance"
     twice = AbsentRun(("T04", "T05", "T05", "T04"), (25.0, 30.0, 65.0, 70.0), ("",) * 4)
     once = AbsentRun(("T04", "T05"), (25.0, 30.0), ("",) * 2)
-    assert "the 2 surveyed targets T04, T05 were" in twice.lead
+    assert "the 2 surveyed targets T04, T05 were" in twice.hint
     assert Absence((twice,), 30, 4).chance == pytest.approx(Absence((once,), 30, 2).chance, rel=0.2)

@@ -55,7 +55,7 @@ def rows_at(survey, looks, **more):
 
 
 def moved_by(survey, time, place, direction, shift, turn):
-    "How places move along directions when every pose is shifted (m) and turned (rad, map axes)"
+    "Shift of places along directions when every pose is shifted (m) and turned (rad, map axes)"
     trajectory = survey.trajectory
     wrong = replace(
         trajectory,
@@ -96,7 +96,7 @@ def test_what_is_not_given_is_nothing(survey, looks):
     "No second time, no survey error, no belief"
     rows = rows_at(survey, looks)
     assert not rows.two_times.any() and (rows.survey_item == -1).all()
-    assert not rows.survey.any() and np.isnan(rows.believed).all()
+    assert not rows.survey.any() and np.isnan(rows.assumed).all()
     assert rows.channel.dtype.kind == "U" and (rows.channel == "surface").all()
 
 

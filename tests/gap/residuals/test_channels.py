@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mlscorr.gap.residuals import beside_seen_noise, build_rows, find_patches
+from mlscorr.gap.residuals import build_rows, find_patches, limited_noise
 from mlscorr.gap.residuals.channels import loss_variance, return_rate, roughness
 from mlscorr.io.clouds import read_chunks
 
@@ -24,7 +24,7 @@ def test_roughness_is_what_the_scanner_is_believed_to_make(survey, targets, patc
 
 
 def test_no_roughness_is_compared_with_a_default(survey, targets, patches):
-    "Where nobody stated the scanner's noise no surface is rough beside it"
+    "With a default scanner noise no surface counts as rough"
     scanner = replace(survey.scanner, assumed=("range_noise",))
     bare = replace(survey, scanner=scanner, reference=None)
     assert "roughness" not in build_rows(bare, *no_targets(targets), patches).rows.channel
@@ -108,9 +108,9 @@ def test_a_scanner_believed_too_noisy_is_told_and_noise_is_compared_with_the_clo
     case_rows = pairing.rows
     rough = case_rows.channel == "roughness"
     quiet = replace(case_rows, residual=case_rows.residual - 2 * np.log(3.0) * rough)
-    rows, (sentence,) = beside_seen_noise(quiet)
+    rows, (sentence,) = limited_noise(quiet)
     assert "scatter 3.0 times less" in sentence
     assert np.median(rows.residual[rough]) == pytest.approx(0.0, abs=1e-9)
-    ratio = rows.believed[rough] / quiet.believed[rough]
+    ratio = rows.assumed[rough] / quiet.assumed[rough]
     assert ratio == pytest.approx(np.full(rough.sum(), 1 / 9), rel=0.1)
-    assert beside_seen_noise(case_rows) == (case_rows, ())
+    assert limited_noise(case_rows) == (case_rows, ())

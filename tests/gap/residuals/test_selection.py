@@ -1,4 +1,4 @@
-"""What counts: what agrees with its moment, and a choice of all kinds."""
+"""Selection of rows that agree with others of their time, of all kinds."""
 
 import numpy as np
 

@@ -47,7 +47,7 @@ def test_a_pass_metres_off_finds_its_planes_by_a_correction(survey, patches):
 
 
 def test_a_correction_that_tears_passes_apart_is_not_followed(survey, patches):
-    "Where control of one pass is 2 m off, planes are shared as if there were none"
+    "If control of one pass is 2 m off, planes are shared as if there were none"
     before = every_pair(survey, patches)
     rows = every_pair(survey, patches, correction_of(survey, (0.0, 0.0, 2.0)))
     np.testing.assert_array_equal(rows.residual, before.residual)

@@ -38,7 +38,7 @@ def test_pulses_of_the_same_times_are_paired_in_any_order(patches):
     higher = cloud(every.xyz + np.array([0.0, 0.0, 0.02]), every.gps_time + 1e-9)
     for part in (slice(0, 25), slice(25, 60)):
         beams.add(higher[part])
-    np.testing.assert_allclose(beams.apart, np.tile([0.0, 0.0, -0.02], (60, 1)), atol=1e-9)
+    np.testing.assert_allclose(beams.offset, np.tile([0.0, 0.0, -0.02], (60, 1)), atol=1e-9)
     assert beams.patch.tolist() == [0] * 30 + [1] * 30
 
 
@@ -51,7 +51,7 @@ def test_of_several_echoes_the_nearest_counts(patches):
         beams = SimulatedBeams(patches)
         for part in order:
             beams.add(part)
-        assert np.abs(beams.apart[:, 0] + 0.01).max() < 1e-9
+        assert np.abs(beams.offset[:, 0] + 0.01).max() < 1e-9
 
 
 def test_other_times_and_places_are_no_pair(patches):
@@ -60,7 +60,7 @@ def test_other_times_and_places_are_no_pair(patches):
     beams = SimulatedBeams(patches)
     beams.add(cloud(every.xyz, every.gps_time + 5e-6))
     beams.add(cloud(every.xyz + np.array([0.0, 1.5, 0.0]), every.gps_time))
-    assert np.isnan(beams.apart).all()
+    assert np.isnan(beams.offset).all()
 
 
 @pytest.mark.parametrize("has_error", [False, True])
@@ -74,4 +74,4 @@ def test_beams_metres_off_are_paired_with_a_simulator_that_has_the_error_or_not(
     beams = SimulatedBeams(patches, correction_of(survey, shift))
     beams.add(cloud(every.xyz - (not has_error) * shift, every.gps_time))
     expected = np.tile((not has_error) * shift, (60, 1))
-    np.testing.assert_allclose(beams.apart, expected, atol=1e-9)
+    np.testing.assert_allclose(beams.offset, expected, atol=1e-9)

@@ -1,4 +1,4 @@
-"""What a simulator has already is taken from the rows."""
+"""Effects that a simulator already has are removed from the rows."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from tests.beds.short_drive import EXACT, in_simulation
 
 
 def test_known_effects_can_be_taken_from_the_rows(clean):
-    "What a simulator has already is the sum of its effects' changes"
+    "Effects of a simulator change the rows by the sum of their changes"
     survey, rows, _, _ = clean
     effects = [make_effect(name, **EXACT[name]) for name in ("time_offset", "lever_arm")]
     truth = sum(in_simulation(clean, effect.name) for effect in effects)

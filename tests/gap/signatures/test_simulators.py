@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from mlscorr.effects import make_effect
-from mlscorr.gap.signatures import as_believed, joined
+from mlscorr.gap.signatures import as_assumed, joined
 from mlscorr.simulate import beliefs_of
 
 
 def test_what_survey_toml_says_changes_nothing(clean):
     "The simulator of a survey's own beliefs has no effects and leaves sigmas as they are"
     survey = clean[0]
-    believed, effects = as_believed(survey, beliefs_of(survey))
+    assumed, effects = as_assumed(survey, beliefs_of(survey))
     assert not effects
-    assert (believed.scanner == survey.scanner and believed.trajectory.position_sigma is None) or (
-        believed.trajectory.position_sigma == pytest.approx(survey.trajectory.position_sigma)
+    assert (assumed.scanner == survey.scanner and assumed.trajectory.position_sigma is None) or (
+        assumed.trajectory.position_sigma == pytest.approx(survey.trajectory.position_sigma)
     )
 
 
@@ -27,15 +27,15 @@ def test_a_pos_believed_twice_as_bad_has_twice_the_sigmas_of_its_file(clean):
     survey = replace(survey, trajectory=replace(survey.trajectory, position_sigma=sigma))
     simulator = beliefs_of(survey)
     pos = replace(simulator.pos, position_sigma=2 * simulator.pos.position_sigma)
-    believed, _ = as_believed(survey, replace(simulator, pos=pos))
-    np.testing.assert_allclose(believed.trajectory.position_sigma, 0.04)
+    assumed, _ = as_assumed(survey, replace(simulator, pos=pos))
+    np.testing.assert_allclose(assumed.trajectory.position_sigma, 0.04)
 
 
 def test_a_mounting_that_the_survey_lacks_is_refused(clean):
     "A simulator with a mounting and a survey without: the sentence says where to give it"
     survey = clean[0]
     with pytest.raises(ValueError, match="Add it there"):
-        as_believed(replace(survey, mounting=None), beliefs_of(survey))
+        as_assumed(replace(survey, mounting=None), beliefs_of(survey))
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""What a corrected copy can have beside new places: displacement of each point, and provenance."""
+"""Additions to a corrected copy: displacement of each point, and provenance."""
 
 import json
 

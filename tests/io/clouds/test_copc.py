@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 import mlscorr
 from mlscorr.cli import app
-from mlscorr.io.clouds import read_chunks, read_layout, read_windows
+from mlscorr.io.clouds import read_chunks, read_intervals, read_layout
 from mlscorr.io.clouds._time_order import in_time_order
 from mlscorr.io.clouds.las import read_records, records_at
 from mlscorr.io.settings import Settings
@@ -118,7 +118,7 @@ def test_a_copc_over_the_end_of_a_week_counts_on(tmp_path):
     first, second = (PointCloud.concatenate(list(read_chunks(file))) for file in files)
     assert np.array_equal(first.xyz, second.xyz)
     assert np.abs(second.gps_time - counted).max() < 1e-9
-    windows = read_windows(files[1], np.array([[604_799.0, 604_801.0]]), limit=500)
+    windows = read_intervals(files[1], np.array([[604_799.0, 604_801.0]]), limit=500)
     assert PointCloud.concatenate(list(windows)).gps_time == pytest.approx(604_800.0, abs=1.3)
 
 
@@ -136,7 +136,7 @@ def test_windows_of_a_copc_are_those_of_the_laz(pair):
     "Spans of time hold the same points; at a glance a long file is not put in order, and says so"
     spans = START + np.array([[3.0, 3.2], [11.0, 12.5]])
     laz, copc = (
-        PointCloud.concatenate(list(read_windows(cloud_of(path), spans, limit=2_000)))
+        PointCloud.concatenate(list(read_intervals(cloud_of(path), spans, limit=2_000)))
         for path in pair
     )
     assert np.array_equal(laz.xyz, copc.xyz) and len(copc) < POINTS
@@ -146,7 +146,7 @@ def test_a_glance_leaves_a_long_copc_as_it_is(pair):
     "Seconds do not do for sorting: windows are refused, chunks come as they stand"
     with glance(1_000):
         with pytest.raises(ValueError, match=r"in\.copc\.laz are not in time order"):
-            list(read_windows(cloud_of(pair[1]), np.array([[START, START + 1.0]]), limit=2_000))
+            list(read_intervals(cloud_of(pair[1]), np.array([[START, START + 1.0]]), limit=2_000))
         assert (np.diff(next(read_chunks(cloud_of(pair[1]))).gps_time) < 0).any()
 
 
@@ -218,7 +218,7 @@ def test_levels_are_samples_of_the_cloud(pair, tmp_path, monkeypatch):
 
 
 def test_a_box_and_a_level_are_read_by_others(pair, tmp_path, monkeypatch):
-    "What laspy finds in a box by the hierarchy is all that lies there"
+    "laspy finds by the hierarchy exactly the points inside a box"
     monkeypatch.setattr("mlscorr.io.clouds._copc_writer.SETTINGS", SMALL)
     with CopcReader.open(str(moved(pair[1], tmp_path / "out.copc.laz"))) as reader:
         whole = xyz_of(reader.query())
@@ -245,14 +245,14 @@ def test_points_at_one_place_end_in_one_node(pair, tmp_path, monkeypatch):
 
 
 def test_a_copc_becomes_a_plain_las(pair, tmp_path):
-    "Where the output is no LAZ, nothing in it claims to be an octree"
+    "An output other than LAZ has no octree records"
     plain = moved(pair[1], tmp_path / "out.las")
     assert np.array_equal(rows_of(laspy.read(plain).points), rows_of(laspy.read(pair[0]).points))
     assert read_layout(plain).owner(read_layout(plain).vlrs[0][0])[0] != b"copc"
 
 
 def test_an_interrupted_copc_leaves_nothing(pair, tmp_path):
-    "What stops a correction half way leaves neither a file nor a temporary one beside it"
+    "An interrupted correction leaves neither a file nor a temporary one next to it"
 
     class Stopped:
         def apply(self, cloud):

@@ -85,7 +85,7 @@ def fine(street, tmp_path_factory):
 
 
 def corrected(folder, out):
-    "What correct writes of a survey"
+    "Output of correct for a survey"
     mlscorr.correct(mlscorr.read_survey(folder)).write(out, page=False)
     las = laspy.read(out / "pass-1.laz")
     return np.asarray(las.xyz), np.asarray(las.gps_time), np.asarray(las.intensity)

@@ -80,7 +80,7 @@ def write_street(path, point_format=6, points=12_345, nan=0, evlrs=True):
 
 
 def is_flagged(las):
-    "Which points of a file are withheld or of a class of noise"
+    "Flags of points of a file that are withheld or of a noise class"
     return np.array(las.withheld, bool) | np.isin(las.classification, [7, 18])
 
 

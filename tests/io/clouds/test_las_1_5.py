@@ -101,7 +101,7 @@ def test_week_time_and_wkt_2_of_las_1_5(street, tmp_path):
     ],
 )
 def test_a_wrong_las_1_5_is_refused(name, form, position, value, words, tmp_path):
-    "What the standard rules out is named, not guessed at"
+    "Violations of the standard are reported, not guessed at"
     old = write_street(tmp_path / "old.las", 6, points=POINTS)
     path = as_las_1_5(old, tmp_path / "new.las", [START], offset=1250)
     data = bytearray(path.read_bytes())

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mlscorr.io import SETTINGS
-from mlscorr.io.clouds import read_chunks, read_layout, read_windows, spread_records
+from mlscorr.io.clouds import read_chunks, read_intervals, read_layout, spread_records
 from mlscorr.io.clouds.las import records_at
 from mlscorr.survey import CloudFile, PointCloud
 
@@ -29,7 +29,7 @@ def file(tmp_path_factory):
 
 
 def times(file, spans, limit=100_000):
-    chunks = [chunk.gps_time for chunk in read_windows(file, np.array(spans), limit)]
+    chunks = [chunk.gps_time for chunk in read_intervals(file, np.array(spans), limit)]
     return np.concatenate([np.empty(0), *chunks])
 
 
@@ -86,7 +86,7 @@ def test_a_file_of_more_than_2_to_the_32_points(tmp_path):
     )
     assert spread_records(layout)[0][-1] == points - 1
     spans = np.array([[357_900.4, 357_900.5]])
-    windows = list(read_windows(CloudFile(layout.path, points, 0.0, "week"), spans))
+    windows = list(read_intervals(CloudFile(layout.path, points, 0.0, "week"), spans))
     read = PointCloud.concatenate(windows)
     assert {400, 499} <= set(np.rint((read.xyz[:, 0] - 532_000.0) * 1e3).astype(int).tolist())
     assert len(read) <= 2 * SETTINGS.close_places

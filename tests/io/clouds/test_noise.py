@@ -49,7 +49,7 @@ def test_withheld_points_and_some_classes_are_not_read(point_format, chosen, tmp
 
 
 def test_a_cloud_without_flags_is_read_whole(tmp_path):
-    "Where nothing is flagged all points are read, and there is nothing to say"
+    "Without flags all points are read, and nothing is reported"
     path = tmp_path / "cloud.las"
     header = laspy.LasHeader(point_format=6)
     header.offsets = CORNER

@@ -1,4 +1,4 @@
-"""What is written into a store: whole objects or none, one run at a time."""
+"""Writing into a store: whole objects or none, one run at a time."""
 
 import subprocess
 import sys
@@ -76,7 +76,7 @@ def test_an_exception_publishes_nothing(store):
 
 
 def test_results_of_tasks_are_kept_in_a_store(store):
-    "What is put is got, by its key; what is damaged or missing is as if it was never there"
+    "A stored result is found by its key; a damaged or missing one counts as never stored"
     results = TaskStore(as_path("s3://results/tasks"))
     results.put("tiles", "key", {"points": 5})
     assert results.get("tiles", "key") == {"points": 5}
@@ -162,7 +162,7 @@ def test_a_folder_with_other_things_is_refused(store):
         check_store_output(out, [], overwrite=False)
     with pytest.raises(ValueError, match=r"the input a\.laz, which must"):
         check_store_output(out, [out / "a.laz"], overwrite=True)
-    with pytest.raises(ValueError, match=r"holds the input first/a\.laz, which must stay"):
+    with pytest.raises(ValueError, match=r"contains the input first/a\.laz, which must not"):
         check_store_output(out, [out / "first" / "a.laz"], True, ["first"])
     with pytest.raises(ValueError, match="on a web server, which can't store results"):
         check_store_output(as_path("https://example.org/out"), [], overwrite=True)

@@ -10,12 +10,17 @@ import numpy as np
 import pytest
 import s3fs
 
-from mlscorr.io.clouds import cloud_writer, read_chunks, read_layout, read_windows, sample_gps_times
+from mlscorr.io.clouds import (
+    cloud_writer,
+    read_chunks,
+    read_intervals,
+    read_layout,
+    sample_gps_times,
+)
 from mlscorr.io.store import (
     FileIdentity,
     TaskStore,
     as_path,
-    beside,
     check_unchanged,
     digest,
     files_like,
@@ -23,6 +28,7 @@ from mlscorr.io.store import (
     is_remote,
     is_there,
     open_file,
+    sibling,
 )
 from mlscorr.io.surveys import read_survey, write_survey_copy
 from mlscorr.survey import CloudFile, PointCloud
@@ -138,8 +144,8 @@ def test_spans_of_time_are_those_of_a_disk(store):
     here = CloudFile(path, points, 0.0, "week")
     store.requests.clear()
     pairs = zip(
-        read_windows(there, spans, limit=100_000),
-        read_windows(here, spans, limit=100_000),
+        read_intervals(there, spans, limit=100_000),
+        read_intervals(here, spans, limit=100_000),
         strict=True,
     )
     assert all(np.array_equal(a.xyz, b.xyz) for a, b in pairs)
@@ -179,7 +185,7 @@ def test_other_stores_have_the_same_interface():
     path = as_path("memory://street/a.txt")
     path.write_bytes(b"1\n2\n")
     assert is_there(path)
-    assert not is_there(beside(path, "b.txt"))
+    assert not is_there(sibling(path, "b.txt"))
     assert files_like(path.parent, "*.txt") == [path]
     assert FileIdentity.of(path).size == 4
     with open_file(path, "utf-8") as file:
@@ -188,7 +194,7 @@ def test_other_stores_have_the_same_interface():
 
 
 def test_a_lost_connection_is_no_damaged_file(store):
-    "What the network did is said, and not that the file should be copied anew"
+    "A network error is reported as such, without advice to copy the file again"
     layout = read_layout(as_path("s3://streets/long.laz"))
     store.lost = "long.laz"
     store.lost_after = 3
@@ -236,7 +242,7 @@ def test_schemes_are_known_or_named():
 
 
 def test_a_dead_endpoint_is_named(store, monkeypatch):
-    "Where nothing answers, that is said, and not that the file does not exist"
+    "A dead endpoint is reported as such, not as a missing file"
     monkeypatch.setenv("AWS_ENDPOINT_URL", "http://127.0.0.1:1")
     s3fs.S3FileSystem.clear_instance_cache()
     try:
@@ -261,7 +267,7 @@ def test_a_command_without_credentials_ends_with_a_sentence(store, monkeypatch):
 
 
 def test_a_disk_needs_no_fsspec():
-    "Where all is on a disk neither fsspec nor what it needs is imported"
+    "With all files on a disk neither fsspec nor its dependencies are imported"
     code = (
         "import sys, mlscorr, mlscorr.cli\n"
         "from mlscorr.io.store.storage import as_path, is_there\n"

@@ -26,7 +26,7 @@ def test_a_digest_changes_with_every_value():
 
 
 def test_a_result_is_found_again_or_not_there(tmp_path):
-    "What was put is had back; a damaged, cut or lacking one is not there"
+    "A stored result is found again; a damaged, truncated or missing one is not"
     store = TaskStore(tmp_path)
     cloud = PointCloud(np.ones((2, 3)), np.zeros(2), np.zeros(2, np.uint16))
     store.put("findings", "k", (cloud, {"a": (1, None)}, MOUNTING))

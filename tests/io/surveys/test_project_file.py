@@ -94,7 +94,7 @@ WRONG = [
     (['[cloud]\nfiles = ["*/*.laz"]\n', DRIVE.format("a")], "belong to no drive"),
     ([DRIVE.format("a").replace("a/*.laz", "s4://bucket/a.laz")], "unknown scheme s4://"),
     (['[[drive]]\nname = "a"\n'], "a drive needs survey"),
-    (["name = 1", DRIVE.format("a")], "name = 1 can't be used"),
+    (["name = 1", DRIVE.format("a")], "name = 1 is invalid"),
     (['nmae = "x"\n', DRIVE.format("a")], "the nearest known one is name"),
 ]
 
@@ -107,7 +107,7 @@ def test_what_is_wrong_is_said(city, parts, words):
 
 
 def exit_codes(project):
-    "Those of `check` and `correct`, by a set: they are the same"
+    "Set of exit codes of `check` and `correct`, which are the same"
     commands = (["check", str(project)], ["correct", str(project), "-o", f"{project}.out"])
     return {CliRunner().invoke(app, command).exit_code for command in commands}
 

@@ -236,7 +236,7 @@ def test_the_search_radius_is_ten_metres_or_what_survey_toml_says(folder):
 
 
 def test_all_wrong_keys_come_in_one_error(folder):
-    "Who mistyped three keys hears of three"
+    "One error lists all three mistyped keys"
     toml(folder, "[cloud]", "nam = 1\n[cloud]\nfilez = 2\n[scaner]\nx = 1\n[scanner]")
     with pytest.raises(ValueError, match=r"cloud\.filez .*cloud\.files.*scaner .* is scanner") as e:
         read_survey_file(folder)
@@ -334,7 +334,7 @@ def test_clouds_of_the_same_name_are_refused(folder):
 
 @pytest.mark.parametrize("mark", ["out/report.json", "project.json"])
 def test_a_pattern_of_all_folders_takes_no_results_for_input(folder, mark):
-    "What a run or a project wrote below the survey is left out, and said; the input stays"
+    "Results of a run or project below the survey are excluded with a note; the input stays"
     (folder / "out").mkdir()
     shutil.copy(folder / "pass-1.las", folder / "out" / "pass-1.las")
     (folder / mark).write_text("{}")
@@ -637,7 +637,7 @@ def test_sigmas_in_millimetres_are_one_warning(tmp_path):
 
 
 def test_a_place_under_two_names_is_warned_of(tmp_path):
-    "Who lists control points as check points once more hears that neither of the two counts"
+    "Control points listed again as check points are reported: neither of the two counts"
     again = CONTROL.strip().splitlines()[1].replace("T01", "K01").replace("control", "check")
     with pytest.warns(
         UserWarning, match="two names for one position: T01 and K01. .* remove one of the two"
@@ -780,7 +780,7 @@ def test_scanners_that_do_not_part_the_files_are_refused(mounted, old, new, mess
 
 
 def test_keys_of_one_of_several_do_not_stand_in_a_single_section(folder):
-    "Who writes [scanner] with files hears of [[scanner]]"
+    "[scanner] with files is refused with advice to write [[scanner]]"
     (folder / "survey.toml").write_text(TOML + '[scanner]\nfiles = ["pass-1.las"]\n')
     with pytest.raises(
         ValueError, match=r"scanner.files .* write \[\[scanner\]\], not \[scanner\]"

@@ -437,7 +437,7 @@ PLACE = "532012.5;3373991;44.5"
 
 
 def office(**given):
-    "What survey.toml says of all points"
+    "Settings of survey.toml for all points"
     return ControlSection(file="", sigma=[0.003, 0.004], words=OFFICE, **given)
 
 

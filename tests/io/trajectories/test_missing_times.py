@@ -9,7 +9,7 @@ import pytest
 import mlscorr
 from mlscorr.correction import Correction
 from mlscorr.frames import attitude_from_angles
-from mlscorr.io.clouds import read_windows
+from mlscorr.io.clouds import read_intervals
 from mlscorr.survey import CloudFile, Trajectory
 from tests.beds.copies import write_corrected
 from tests.beds.missing_times import CORNER, POINTS, START, write_survey
@@ -57,7 +57,7 @@ def test_windows_pass_over_points_without_a_time(tmp_path):
     file = CloudFile(tmp_path / "pass.las", POINTS, 0.0, "week")
     span = START + np.array([[10.0, 11.0]])
     with warnings.catch_warnings(action="error"):
-        chunks = list(read_windows(file, span, limit=500))
+        chunks = list(read_intervals(file, span, limit=500))
     times = np.concatenate([chunk.gps_time for chunk in chunks])
     inside = (times >= span[0, 0]) & (times <= span[0, 1])
     assert inside.sum() >= 100

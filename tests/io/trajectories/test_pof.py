@@ -113,7 +113,7 @@ def test_every_cut_of_a_pof_and_a_poq_is_refused_or_whole(tmp_path):
 
 
 def test_a_pof_takes_no_conventions_and_needs_a_crs(tmp_path):
-    "What is known need not be said; a POFX has no public layout"
+    "Known conventions need no setting; a POFX has no public layout"
     path = put(tmp_path / "a.pof", pof_bytes(drive(100), CRS))
     section = TrajectorySection(file="", roll="right side up")
     with pytest.raises(ValueError, match=r"is a POF.*remove roll from \[trajectory\]"):

@@ -111,7 +111,7 @@ def test_both_sides_of_the_end_of_the_week_have_one_system():
 
 
 def test_an_explicit_system_is_obeyed():
-    "Who sets cloud.gps_time gets it, whatever the header says, and without a warning"
+    "cloud.gps_time overrides the header, without a warning"
     match = match_times("a.laz", OF_WEEK, True, trajectory(), "week")
     assert (match.constant, match.cloud_system) == (0.0, "week")
 
@@ -159,7 +159,7 @@ def test_a_cloud_of_both_ends_of_one_week_is_as_it_is():
 
 
 def test_a_trajectory_in_utc_that_starts_before_the_cloud_is_named():
-    "Where 18 s bring all times inside, the sentence says what to add, and what else it may be"
+    "If 18 s bring all times inside, the sentence gives the offset, and other possible causes"
     for early in (18.0, -18.0):
         covering = trajectory(OF_WEEK[0] - early - 0.5, OF_WEEK[25] - early + 0.5)
         sentence = (
@@ -180,7 +180,7 @@ def test_a_trajectory_in_utc_that_starts_before_the_cloud_is_named():
     ],
 )
 def test_seconds_of_the_day_and_unix_time_are_named(cloud, goal, system):
-    "What the sentence says to add to the trajectory's times brings both together"
+    "The offset in the sentence, added to the trajectory's times, makes both match"
     with pytest.raises(ValueError, match=f"all would be with .* may be in {system}") as refusal:
         match_times("a.laz", cloud, False, trajectory(goal[0] - 5, goal[-1] + 5))
     added = float(re.search(r"add (-?\d+) to trajectory.time_constant", str(refusal.value))[1])

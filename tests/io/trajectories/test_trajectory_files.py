@@ -183,7 +183,7 @@ def test_another_convention_is_named_in_survey_toml(tmp_path):
 
 
 def test_our_own_columns_may_be_in_radians(tmp_path):
-    "What is refused without angles = 'rad' is read with it, and said"
+    "Angles refused without angles = 'rad' are read with it, and reported"
     expected = drive(100, sigmas=False)
     path = csv_of(tmp_path / "t.csv", table_of(expected, degrees=False))
     with pytest.raises(ValueError, match=r"seem to be in radians"):
@@ -297,7 +297,7 @@ def test_an_sbet_is_known_under_any_name(tmp_path):
 
 
 def test_a_date_in_place_of_seconds_is_named(tmp_path):
-    "What stands there, and that it is a date"
+    "The error quotes the cell and states that it is a date"
     for cell in ("2026-05-01", "12:30:01.5", "01.05.2026"):
         text = "Time;Easting;Northing;Height;Roll;Pitch;Heading\n"
         (tmp_path / "t.txt").write_text(f"{text}{cell};532000;3374000;40;0;0;0\n")

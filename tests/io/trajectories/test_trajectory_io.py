@@ -216,7 +216,7 @@ def test_a_vehicle_at_rest_has_no_course(tmp_path):
 
 
 def test_unknown_kinds_and_needless_accuracy_are_refused(tmp_path):
-    "What can't be used is said, not ignored"
+    "Unusable input is reported, not ignored"
     (tmp_path / "t.nav").write_bytes(bytes(1000))
     with pytest.raises(ValueError, match=r"t\.nav has an unknown format: .* as text or SBET"):
         read_trajectory(tmp_path / "t.nav")

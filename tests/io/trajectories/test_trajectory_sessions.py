@@ -300,7 +300,7 @@ def test_wrong_keys_of_several_trajectories_are_named(folder, old, new, message)
 
 
 def test_keys_of_several_do_not_stand_in_a_single_trajectory(folder):
-    "Who writes [trajectory] with files hears of [[trajectory]]"
+    "[trajectory] with files is refused with advice to write [[trajectory]]"
     text = TOML.replace('"trajectory.csv"', '"run-1.csv"\nfiles = ["pass-1.las"]')
     (folder / "survey.toml").write_text(text)
     with pytest.raises(ValueError, match=r"write \[\[trajectory\]\], not \[trajectory\]"):

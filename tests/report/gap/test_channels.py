@@ -31,7 +31,7 @@ def test_each_bin_has_a_row():
 
 
 def test_a_distance_stands_beside_its_floor():
-    "What lies beyond 95 % of the floor stands out; a run that there was not is a dash"
+    "Distances beyond 95 % of the floor are highlighted; a missing run is a dash"
     first, second = distance_rows(gap_document())
     assert first.sample == "Places of points" and "innovations" in second.sample
     assert first.stands_out and first.after == "–"

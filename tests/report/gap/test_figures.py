@@ -8,7 +8,7 @@ from tests.beds.gap_documents import gap_document, plan_document
 
 
 def test_each_figure_has_a_name():
-    "Those of a page, and nothing where a document has nothing to show"
+    "Figures of a page, and none if a document has nothing to show"
     document = gap_document()
     names = ["where", "innovations", "evidence", "closure", "map", "channels", "separability"]
     assert list(diagnosis_figures(document)) == names

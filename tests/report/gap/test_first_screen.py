@@ -1,4 +1,4 @@
-"""What a diagnosis says first."""
+"""First screen of a diagnosis."""
 
 import pytest
 
@@ -13,7 +13,7 @@ def facts(document):
 
 
 def test_two_answers_stand_apart():
-    "Whether the cloud is accurate is one question, whether something is unmodelled another"
+    "Accuracy of the cloud is one question, unmodeled errors are another"
     rating, rows = facts(gap_document("time_offset"))
     assert list(rows)[:2] == ["Accuracy", "Unmodeled"] and rating == "red"
     assert "less accurate than stated" in rows["Accuracy"]["sentence"]

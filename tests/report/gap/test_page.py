@@ -24,7 +24,7 @@ def words(html):
 
 
 def first_screen(page):
-    "What stands above the links to the sections"
+    "Contents above the links to the sections"
     return words(page.partition("<nav")[0])
 
 
@@ -207,7 +207,7 @@ SEEN += [("bump", 1600), ("plan", 1600)]
 
 @pytest.fixture(scope="module")
 def opened(pages, tmp_path_factory):
-    "What Chromium found in the pages: (results by page and width, lines of its console)"
+    "Findings of Chromium in the pages: (results by page and width, lines of its console)"
     need_browser()
     folder = tmp_path_factory.mktemp("browser")
     for kind in {kind for kind, _ in SEEN}:

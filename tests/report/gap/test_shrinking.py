@@ -1,4 +1,4 @@
-"""How far the gap shrinks, in words."""
+"""Shrinking of the gap, in words."""
 
 import pytest
 
@@ -26,7 +26,7 @@ def test_a_gap_that_shrinks_or_grows_is_said_in_words(shrink, interval, said):
 
 
 def test_heights_of_eight_sigma_are_not_closed():
-    "Where an axis stays far beyond its simulated sigma, that is said before any share that is gone"
+    "An axis far beyond its simulated sigma is reported before any share of the gap that is gone"
     errors = {"axes": ["E", "N", "H"], "before": [30.0, 31.0, 9.0], "after": [1.1, 0.9, 8.0]}
     closure = gap_document()["closure"] | {"shrink": 0.92, "interval": [0.8, 0.97]}
     closed = closure | {"over_sigma": errors | {"beyond": []}}

@@ -7,7 +7,7 @@ from tests.beds.gap_documents import CAUSES, KINDS, START, gap_document
 
 
 def summary(document):
-    "What the first screen says, in one row of words"
+    "Statement of the first screen, in one row of words"
     told = [*verdict(document).sentences, *(text for one in facts(document) for text in one)]
     title, sentences = advice(document)
     return " ".join([verdict(document).kicker, *told, title, *sentences])
@@ -55,7 +55,7 @@ def test_the_first_screen_says_what_is_wrong(kind, expected):
 
 
 def test_a_jump_is_when_it_happens_not_as_long_as_it_lasts():
-    "That it stays to the end of its pass, 357 s later, says nothing of when it came"
+    "A jump has one time, although it stays to the end of its pass, 357 s later"
     window = {"effect": "position_step", "start": START + 15.0, "end": START + 372.0}
     document = gap_document("position_step", 0.9, windows=[window])
     parameters = CAUSES["position_bump"][:-1]  # but its width

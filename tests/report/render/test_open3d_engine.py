@@ -23,7 +23,7 @@ from tests.beds.street_of_points import SIZE
 def test_a_broken_driver_costs_a_warning_and_no_picture(
     survey, estimated, drawn, program, words, limit, tmp_path, monkeypatch
 ):
-    "Where the child aborts, hangs or lacks a library the z-buffer draws the same picture"
+    "If the child aborts, hangs or lacks a library, the z-buffer draws the same picture"
     child = tmp_path / "child.py"
     child.write_text(program)
     monkeypatch.setattr(sheet, "CHILD", child)

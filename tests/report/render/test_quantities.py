@@ -1,4 +1,4 @@
-"""What a picture shows by colour."""
+"""Quantities that a picture shows by color."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What stands beside the points."""
+"""Symbols of a picture next to the points."""
 
 import numpy as np
 from matplotlib.figure import Figure

@@ -1,4 +1,4 @@
-"""What each picture shows, and from where."""
+"""Contents and viewpoint of each picture."""
 
 from dataclasses import replace
 
@@ -59,7 +59,7 @@ def test_the_title_counts_check_points_alone_where_there_are_some():
 
 
 def test_the_title_does_not_boast_of_the_fit_of_control_points():
-    "What is left of those left out in turn, 0.05 m; of a single one only how far it was off"
+    "Leave-one-out residuals of control, 0.05 m; for a single point only its misclosure"
     rows = [replace(target(name, (0, 0, 0)), after=np.full(3, 1e-4)) for name in ("T1", "T2")]
     left_out = [replace(row, left_out=np.array([0.0, 0.03, 0.04])) for row in rows]
     titles = [

@@ -1,4 +1,4 @@
-"""How many threads do the work leaves no trace in it."""
+"""The number of threads does not change the result."""
 
 import numpy as np
 import pytest
