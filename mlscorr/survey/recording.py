@@ -591,7 +591,7 @@ def choosing(recording: Any, exclude: Collection[str], include: Collection[str])
         for name in names:
             _check_choice(key, name, points, recording.check)
     if both := sorted(set(exclude) & set(include)):
-        raise SurveyFileError(f"exclude and include both name {', '.join(both)}: choose one.")
+        raise SurveyFileError(f"exclude and include both list {', '.join(both)}. Choose one.")
     out = (set(recording.excluded.name) | set(exclude)) - set(include)
     is_out = np.isin(np.array(points.name, dtype=str), list(out))
     kept_in = (set(recording.included) | set(include)) - set(exclude)
@@ -605,11 +605,11 @@ def _check_choice(key, name, points, check):
         return
     if name in check.name:
         raise SurveyFileError(
-            f"{key} names {name}, which is a check point and takes no part in any estimate. "
-            "Give names of control points, or change its role in the control list."
+            f"{key} lists {name}, which is a check point and never used in an estimate. List "
+            "control points only, or change its role in the control list."
         )
     near = get_close_matches(name, points.name, n=1, cutoff=0.0)
     hint = f"; the nearest name is {near[0]}" if near else ""
     raise SurveyFileError(
-        f"{key} names {name}, which is none of the {counted(len(points), 'control point')}{hint}."
+        f"{key} lists {name}, which is not among the {counted(len(points), 'control point')}{hint}."
     )

@@ -537,7 +537,7 @@ def test_a_survey_without_mounting_is_refused(street, tmp_path):
     start = text.index("[mounting]")
     end = text.index("[control]")
     (folder / "survey.toml").write_text(text[:start] + text[end:])
-    with pytest.raises(ValueError, match=r"has no \[mounting\].*Add that section"):
+    with pytest.raises(ValueError, match=r"has no \[mounting\]"):
         mlscorr.calibrate(mlscorr.read_survey(folder))
 
 
@@ -550,7 +550,7 @@ def test_files_measured_at_the_same_time_are_warned_of(street, tmp_path):
     text = (folder / "survey.toml").read_text()
     text = text.replace('["pass-1.laz"', '["pass-1.laz", "pass-1-scanner-2.laz"')
     (folder / "survey.toml").write_text(text)
-    with pytest.warns(UserWarning, match=r"pass-1-scanner-2.laz and pass-1.laz were measured"):
+    with pytest.warns(UserWarning, match=r"pass-1-scanner-2.laz and pass-1.laz overlap in time by"):
         warn_of_scanners(mlscorr.read_survey(folder))
 
 

@@ -21,7 +21,7 @@ def slow_error(seed):
 
 @pytest.mark.parametrize(
     ("share", "words"),
-    [((0.035, 0.04), "4.0 % of it, instead of 3.5 %,"), ((0.01, 0.01), "as bef")],
+    [((0.035, 0.04), "4.0 % of the drive, up from 3.5 %"), ((0.01, 0.01), "as bef")],
 )
 def test_a_gain_of_half_a_percent_is_told(share, words):
     "From 3.5 to 4.0 % is no 4 % instead of 4 %, and what stays is said to"

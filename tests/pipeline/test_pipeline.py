@@ -429,7 +429,7 @@ def test_two_control_points_give_a_correction_of_order_zero(copy):
     (copy / "control.csv").write_text("\n".join(text) + "\n")
     with pytest.warns(UserWarning, match="2 control points") as told:
         result = mlscorr.correct(mlscorr.read_survey(copy), order=1)
-    assert any("order 0 is used" in str(warning.message) for warning in told)
+    assert any("Order 0 is used" in str(warning.message) for warning in told)
     assert result.estimate.order == 0
     assert result.check["n"] == 3
     after, before = (np.linalg.norm(result.check[when]["rmse"]) for when in ("after", "before"))

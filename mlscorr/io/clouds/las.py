@@ -9,8 +9,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
-from functools import lru_cache
 from pathlib import Path
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -283,15 +283,19 @@ def spread_records(layout: LasLayout) -> tuple[np.ndarray, np.ndarray]:
     places : (65 or fewer,) int array
     records : structured array of the same length
     """
-    places, records = _spread_records(layout, file_state(layout.path))
+    state = file_state(layout.path)
+    if layout not in _SPREAD or _SPREAD[layout][0] != state:
+        _SPREAD[layout] = (state, *_spread_records(layout))
+    _, places, records = _SPREAD[layout]
     return places.copy(), records.copy()
 
 
-@lru_cache(maxsize=64)
-def _spread_records(
-    layout: LasLayout, _state: tuple[int, int | str]
-) -> tuple[np.ndarray, np.ndarray]:
-    """As spread_records, of a file in a state: several stages look at the same points."""
+# Several stages look at the same points. The layout of a sorted copy must not outlive its use: the
+# copy is deleted with it
+_SPREAD: WeakKeyDictionary = WeakKeyDictionary()
+
+
+def _spread_records(layout):
     places = np.unique(np.linspace(0, layout.points - 1, SETTINGS.sampled_points).astype(np.int64))
     chunks = places[:-1] // layout.chunk_size
     is_first = np.append(True, np.diff(chunks) > 0)[: len(chunks)]

@@ -216,5 +216,5 @@ def test_control_of_a_project_is_excluded_and_included_by_name(city):
     assert project.control.name == ("P2",)
     assert project.excluded.name == ("P1",)
     assert project.included == ("P2",)
-    with pytest.raises(ValueError, match=r"project.toml: exclude names P3, .* nearest name is P"):
+    with pytest.raises(ValueError, match=r"project.toml: exclude lists P3, .* nearest name is P"):
         read_project(write(city, control.format("P3"), *drives))
