@@ -484,7 +484,7 @@ def test_a_crs_that_no_survey_can_have_is_refused():
 def test_a_drive_that_meets_nothing_is_refused(tmp_path, sight):
     "A scanner that sees nothing, or fires nothing, is told in one sentence, and no folder is made"
     blind = make(with_(SHORT, scanner=(with_(SCANNER, **sight),)))
-    with pytest.raises(ValueError, match=r"No pulse of pass-1.laz met anything.*field_of_view"):
+    with pytest.raises(ValueError, match=r"No pulse of pass-1.laz hit anything.*field_of_view"):
         blind.write(tmp_path / "out")
     assert not list(tmp_path.iterdir())
 
