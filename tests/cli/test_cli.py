@@ -511,13 +511,13 @@ def test_points_without_a_pose_are_counted_and_the_rest_is_done(in_part):
     report = json.loads((out / "report.json").read_text(encoding="utf-8"))
     outside = report["coverage"]["points_outside_trajectory"]
     assert outside > 0
-    assert f"{outside} of {report['files'][0]['points']} points lie outside" in process.stderr
+    assert f"{outside} of {report['files'][0]['points']} points" in process.stderr
     (warning,) = [text for text in report["model"]["warnings"] if "points sampled" in text]
     some, sampled = map(int, re.match(r"(\d+) of (\d+) points sampled", warning).groups())
     share = 100 * some / sampled
     assert share == pytest.approx(100 * outside / report["files"][0]["points"], abs=5)
     assert f"Warning: {warning}" in process.stderr
-    assert "    T02: " in process.stderr and "gap of the trajectory" in process.stderr
+    assert "    T02: " in process.stderr and "one of its gaps" in process.stderr
     assert process.stdout == ""
 
 
@@ -538,7 +538,7 @@ def test_few_control_points_lower_the_order_with_a_warning(kept, order, survey):
     assert len(warned) == 1
     assert warned[0].startswith(f"Warning: {kept} control point")
     model = json.loads((out / "report.json").read_text(encoding="utf-8"))["model"]
-    assert f"order {model['order']} is used" in warned[0]
+    assert f"Order {model['order']} is used" in warned[0]
     assert model["order"] < order
     assert warned[0].removeprefix("Warning: ") in model["warnings"]
 
