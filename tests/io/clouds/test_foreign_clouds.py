@@ -117,7 +117,7 @@ def test_a_survey_is_corrected_whatever_its_cloud_is_written_in(fine, suffix, tm
     else:
         checked = mlscorr.check(folder)
         assert not checked.faults and not checked.warnings, checked
-        assert any("5 of 5 targets" in note for note in checked.notes)
+        assert any("5 of 5 tested targets" in note for note in checked.notes)
         assert checked.read[0].number == len(fields["x"])
     run = CliRunner().invoke(
         app, ["correct", str(folder), "-o", str(tmp_path / "out"), "--no-report"]
