@@ -260,7 +260,7 @@ def test_a_scenario_becomes_a_survey_that_can_be_read(write, tmp_path):
 
     again = run("simulate", scenario, "-o", tmp_path / "a", "--seed", 3)
     assert again.returncode == 2
-    assert "holds 6 entries already" in again.stderr
+    assert "already contains 7 entries" in again.stderr
     run("simulate", scenario, "-o", tmp_path / "b", "--seed", 3)
     for file in sorted((tmp_path / "a").iterdir()):
         assert file.read_bytes() == (tmp_path / "b" / file.name).read_bytes(), file.name
