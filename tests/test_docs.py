@@ -193,11 +193,12 @@ def test_no_property_of_the_api_page_opens_with_a_colon():
 
 
 def test_every_effect_is_listed_with_its_unit_and_usual_size():
-    "docs/effects.md lists what the library has; its sentences are its own"
+    "docs/effects.md states what the library does"
     text = (ROOT / "docs" / "effects.md").read_text()
     for kind in known_effects():
         (row,) = re.findall(rf"(?m)^\| `{kind.name}` \| (.*) \|$", text)
         magnitude = kind.quantities()["magnitude"]
+        assert row.startswith(kind.meaning)
         assert f"`magnitude` ({magnitude.unit})" in row and row.endswith(f"{magnitude.typical:g}")
         assert all(f"`{name}`" in row for name in kind.circumstances())
 

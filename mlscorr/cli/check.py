@@ -44,7 +44,7 @@ def say_checked(checked: CheckedSurvey, with_amounts: bool = True) -> None:
     ----------
     checked : CheckedSurvey
     with_amounts : bool
-        Say what is read, written and needed, too, not warnings and faults alone.
+        True to print what is read, written and needed, too; else warnings and faults only.
 
     Raises
     ------
@@ -55,7 +55,7 @@ def say_checked(checked: CheckedSurvey, with_amounts: bool = True) -> None:
         amounts = {"Read": checked.read, "Written": checked.written, "Needed": checked.needed}
         for title, those in amounts.items():
             _list(title, [_amount(amount) for amount in those])
-        _list("Worked out", checked.notes)
+        _list("Determined", checked.notes)
         _list("Not checked", checked.unchecked)
     for sentence in checked.warnings:
         warn(f"Warning: {sentence}")

@@ -138,8 +138,8 @@ Exclude = Annotated[
     list[str],
     typer.Option(
         metavar="NAME",
-        help="A control point that takes no part. May be repeated. Do not choose it by the "
-        "residuals of check points: they would be control points then.",
+        help="A control point to leave out of the estimate. May be repeated. Do not choose it by "
+        "the residuals of check points: these would no longer be independent.",
     ),
 ]
 NoTies = Annotated[bool, typer.Option("--no-ties", help="Do not use tie features between passes.")]

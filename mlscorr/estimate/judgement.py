@@ -77,8 +77,6 @@ def with_drifts(trajectory: Trajectory, drifts: tuple[UnstatedDrift, ...]) -> Tr
         One without sigmas gets those of a POS with GNSS.
     drifts : tuple of UnstatedDrift
     """
-    if not drifts:
-        return trajectory
     sigma = trajectory.position_sigma
     if sigma is None:
         sigma = np.tile(POS_SETTINGS.gnss, (len(trajectory), 1))
@@ -119,34 +117,46 @@ def judge(adjustment: Adjustment, screening: Screening, known: int = 0) -> Judge
     known : int
         Number of unstated drifts already included in the sigmas.
     """
-    refused = {test.name: test for test in screening.outliers}
-    if not refused:
+    rejected = {test.name: test for test in screening.outliers}
+    if not rejected:
         return Judgement({}, ())
     parameters = screening.posterior.modes[0][0]
     groups = []
-    for names, bursts in _groups(adjustment, refused):
-        others = adjustment.without(refused.keys() - set(names))
+    for names, bursts in _groups(adjustment, rejected):
+        others = adjustment.without(rejected.keys() - set(names))
         solved = others.solve(parameters)
-        sized = [_sized(burst, adjustment, refused) for burst in bursts]
+        sized = [_sized(burst, adjustment, rejected) for burst in bursts]
         groups.append(_Group.of(others, names, sized, solved))
+    drifting, posterior = _in_order(adjustment, groups, known)
+    share = np.exp(posterior - posterior.max())
+    share /= share.sum()
+    probability = {}
+    drifts: list[UnstatedDrift] = []
+    is_likely = True
+    for number, group in enumerate(drifting, 1):
+        correct = share[number:].sum()
+        probability |= dict.fromkeys(group.names, float(correct))
+        # drift near the groups before it is known by now
+        is_likely = is_likely and correct > SETTINGS.strong_evidence * share[number - 1]
+        if is_likely:
+            drifts += group.drifts
+    return Judgement(probability, tuple(sorted(drifts, key=lambda drift: drift.first)))
+
+
+def _in_order(adjustment, groups, known):
+    """Groups (n,), the one with the most likely drift first, and the log posteriors (n + 1,) of
+    drift near the first k of them.
+    """
     drifting: list[_Group] = []
-    readings = [_log_posterior(adjustment, drifting, groups, known)]
+    posterior = [_log_posterior(adjustment, drifting, groups, known)]
     while groups:
-        nexts = [
+        candidates = [
             _log_posterior(adjustment, [*drifting, group], _others(groups, group), known)
             for group in groups
         ]
-        drifting.append(groups.pop(int(np.argmax(nexts))))
-        readings.append(max(nexts))
-    share = np.exp(np.array(readings) - max(readings))
-    right = np.cumsum(share[::-1])[::-1][1:] / share.sum()
-    probability = {}
-    drifts: list[UnstatedDrift] = []
-    for group, p in zip(drifting, right.tolist(), strict=True):
-        probability |= dict.fromkeys(group.names, p)
-        if p > SETTINGS.strong_evidence * (1.0 - p):
-            drifts += group.drifts
-    return Judgement(probability, tuple(sorted(drifts, key=lambda drift: drift.first)))
+        drifting.append(groups.pop(int(np.argmax(candidates))))
+        posterior.append(max(candidates))
+    return drifting, np.array(posterior)
 
 
 class _Group(NamedTuple):
@@ -205,22 +215,22 @@ def _log_posterior(adjustment, drifting, others, known):
     return evidence + prior + often
 
 
-def _groups(adjustment, refused):
+def _groups(adjustment, rejected):
     """Names of related rejected targets, with an UnstatedDrift of each run of them."""
     order = np.argsort(adjustment.observed, kind="stable")
     time = adjustment.observed[order]
     names = adjustment.names[order]
-    is_out = np.isin(names, list(refused))
+    is_out = np.isin(names, list(rejected))
     passes = np.flatnonzero(np.diff(adjustment.trajectory.segment(time))) + 1
     spans = runs(is_out, passes)
-    number = {name: k for k, name in enumerate(refused)}
+    number = {name: k for k, name in enumerate(rejected)}
     edges = [(number[name], k) for k, (i, j) in enumerate(spans) for name in set(names[i:j])]
     target, run = np.array(edges).T
     size = len(number) + len(spans)
     graph = coo_array((np.ones(len(edges)), (target, len(number) + run)), (size, size))
     label = connected_components(graph, directed=False)[1]
     for group in np.unique(label):
-        own = tuple(name for name in refused if label[number[name]] == group)
+        own = tuple(name for name in rejected if label[number[name]] == group)
         bursts = [
             _burst(adjustment.trajectory, time, names, *rows)
             for k, rows in enumerate(spans)
@@ -232,8 +242,9 @@ def _groups(adjustment, refused):
 def _burst(trajectory, time, names, start, end):
     """The UnstatedDrift of a run of observations, of unit size."""
     begin, finish = trajectory.passes[trajectory.segment(time[start])]
-    # a target observed in the first or last epoch of a pass is inside, too
-    begin, finish = np.nextafter(begin, -np.inf), np.nextafter(finish, np.inf)
+    # so that a target observed in the first or last epoch of a pass is inside
+    begin = np.nextafter(begin, -np.inf)
+    finish = np.nextafter(finish, np.inf)
     interval = POS_SETTINGS.sigma_interval  # observations within it share their drift
     first = time[time < time[start] - interval].max(initial=begin)
     last = time[time > time[end - 1] + interval].min(initial=finish)
@@ -276,12 +287,12 @@ def _courses_of(burst, time):
     return walk / walk.max(), inside, free
 
 
-def _sized(burst, adjustment, refused):
+def _sized(burst, adjustment, rejected):
     """The drift, scaled to the deviations of its rejected targets."""
     time = adjustment.observed
     inside = (time > burst.first) & (time < burst.last)
     deviations = [
-        refused[name].left_out[inside[adjustment.names == name]].mean(axis=0)
+        rejected[name].left_out[inside[adjustment.names == name]].mean(axis=0)
         for name in burst.names
     ]
     return replace(burst, size=float(np.sqrt(np.mean(np.square(deviations)))))

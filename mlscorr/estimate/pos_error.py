@@ -214,28 +214,32 @@ def estimate_correction(
 
 
 def _judged(trajectory, matched, pos, order, kept_in):
-    """Adjustment of all targets, their Screening, probabilities of rejected ones, and the
-    drifts.
+    """Adjustment of all targets, its Screening, the probability that each rejected target is
+    correct, and the unstated drifts near others.
     """
     drifts = ()
-    new = None
-    while new is None or new:
-        drifting = with_drifts(trajectory, drifts)
-        adjustment = position_adjustment(drifting, matched, pos, order, position_prior)
-        adjustment = replace(adjustment, order=affordable_order(order, adjustment))
-        adjustment = with_drift_history(adjustment)
+    adjustment = plain = _adjusted(trajectory, matched, pos, order)
+    while True:
         screening = screen(adjustment, kept_in)
         judgement = judge(adjustment, screening, len(drifts))
         known = {name for drift in drifts for name in drift.names}
         new = [drift for drift in judgement.drifts if not known.issuperset(drift.names)]
-        if not drifts:
-            plain = adjustment
+        if not new:
+            break
         drifts = (*drifts, *new)
+        adjustment = _adjusted(with_drifts(trajectory, drifts), matched, pos, order)
     if len(drifts) > 1 and not screening.outliers:  # it may drift unstated between the points, too
         adjustment = replace(plain, prior=drifting_prior)
         posterior = choose_parameters(adjustment)
         screening = Screening(posterior, (), tuple(all_tests(adjustment, posterior)), ())
     return adjustment, screening, judgement.probability, drifts
+
+
+def _adjusted(trajectory, matched, pos, order):
+    """Adjustment of all targets with the order that they allow, and the history of the drift."""
+    adjustment = position_adjustment(trajectory, matched, pos, order, position_prior)
+    adjustment = replace(adjustment, order=affordable_order(order, adjustment))
+    return with_drift_history(adjustment)
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")

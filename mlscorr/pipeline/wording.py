@@ -17,6 +17,6 @@ CHOICES: dict[str, Wording] = {
     "excluded": _excluded,
     "included, contradicted": "{name} is used because include names it, and the other control "
     "points contradict it: statistic {statistic:.1f}, critical value {critical:.1f}. It pulls the "
-    "cloud towards itself; check its coordinates.",
-    "included, refused": "{name} is used because include names it. Matching refused it: {reason}",
+    "correction toward its coordinates; check them.",
+    "included, refused": "{name} is used because include names it. Matching rejected it: {reason}",
 }

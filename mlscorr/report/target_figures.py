@@ -204,7 +204,7 @@ def _legend():
     return [
         *marks,
         Line2D([], [], color=BLUE, label="fitted outline"),
-        Line2D([], [], color=BLUE, linestyle="", marker="+", markersize=8, label="centre"),
+        Line2D([], [], color=BLUE, linestyle="", marker="+", markersize=8, label="center"),
         Patch(color=VERMILLION, alpha=0.35, label=ellipse),
     ]
 
@@ -228,7 +228,8 @@ def _axes(pen, frame):
         up = frame.place([[tick, edge], [tick, -edge]])
         for line in (across, up):
             pen.line(line, "#e4e4e4", 0.6 * PT)
-        left, foot = across[0], up[1]
+        left = across[0]
+        foot = up[1]
         pen.line(np.stack([left, left - [2 * PT, 0]]), "black", 0.8 * PT)
         pen.line(np.stack([foot, foot + down]), "black", 0.8 * PT)
         pen.text(tuple(left - [3.2 * PT, 0]), words, size, anchor="rm")

@@ -93,7 +93,7 @@ def test_the_report_words_it():
     document["verdict"] |= {"label": "squat", "set": ["squat"]}
     text = words(diagnosis_page(document, "street"))
     assert "At 1 m/s the body of the vehicle is 5.0 mm ± 0.4 mm too low." in text
-    assert "One error" in text
+    assert "One error Squatting vehicle" in text
     assert "Squatting vehicle The body of the vehicle rises when it is fast." in text
 
 

@@ -128,7 +128,9 @@ def test_one_axis_of_zero_is_filled_with_the_others(axis):
 )
 def test_negative_beliefs_are_refused(pos):
     "Both beliefs are named in m and deg"
-    with pytest.raises(ValueError, match="deg; none may be negative"):
+    with pytest.raises(
+        ValueError, match=r"under \[pos\] are .* m and .* deg; none may be negative"
+    ):
         checked(pos=pos)
 
 

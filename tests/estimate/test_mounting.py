@@ -305,7 +305,7 @@ def test_a_large_site_is_calibrated_with_parameters_from_a_part_of_it():
 
 def test_too_few_targets_are_refused():
     "Two control points cannot hold six components, however often they are seen"
-    with pytest.raises(ValueError, match="2 control points were found"):
+    with pytest.raises(ValueError, match=r"2 control points were found .* needs at least 3"):
         Site(8, targets=2).calibrate()
 
 
@@ -537,7 +537,7 @@ def test_a_survey_without_mounting_is_refused(street, tmp_path):
     start = text.index("[mounting]")
     end = text.index("[control]")
     (folder / "survey.toml").write_text(text[:start] + text[end:])
-    with pytest.raises(ValueError, match=r"has no \[mounting\]"):
+    with pytest.raises(ValueError, match=r"has no \[mounting\]\. Add the lever_arm"):
         mlscorr.calibrate(mlscorr.read_survey(folder))
 
 

@@ -54,7 +54,7 @@ def test_a_find_that_was_refused_says_why():
     assert "T05" not in found.matched.name and len(found.matched) == 9
     (refusal,) = found.refusals
     assert refusal.name == "T05"
-    assert "was found at 357745.0 s, 6.00 m away" in refusal.reason
+    assert "unmatched circle of 0.60 m was found at 357745.0 s, 6.00 m away" in refusal.reason
     assert refusal.reason.endswith(found.reasons[0])
     assert "The observation is another object (misclosure 6.00 m" in found.reasons[0]
 

@@ -271,7 +271,7 @@ def test_the_command_says_what_the_function_returns(survey):
     "A page without a fault ends with the next command; a fault with its code, warnings before"
     good = CliRunner().invoke(app, ["check", str(survey)])
     assert good.exit_code == 0, good.stderr
-    for title in ("Read", "Written", "Needed", "Worked out"):
+    for title in ("Read", "Written", "Needed", "Determined"):
         assert title in good.stderr.splitlines()
     assert good.stderr.splitlines()[-1].startswith("No fault, 0 warnings. Next: mlscorr correct")
     spaced = survey.rename(survey.parent / "second drive")

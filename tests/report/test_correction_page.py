@@ -92,7 +92,7 @@ def test_says_plainly_what_the_verdict_rests_on(changes, expected, tmp_path):
     "With or without check points or targets there is a page, and it does not overstate"
     html = page(tmp_path, *fabricate(drive(), **changes))
     assert re.search(expected, words(html))
-    assert "Band: its 1 sigma" in html
+    assert "Line: correction added to the recorded position. Band: its 1 sigma." in html
 
 
 @pytest.mark.parametrize(("rise", "worse"), [(0.0015, False), (0.012, True)])

@@ -142,7 +142,7 @@ def test_sessions_part_a_trajectory_where_steps_do_not():
     assert whole.passes == pytest.approx(START + np.array([[0.0, 9.9], [10.0, 58.0]]))
     assert len(drive(time).passes) == 25  # each step of 2 s is twenty median ones
     assert whole.at(START + np.array([9.85, 11.0])).session.tolist() == [3, 1]
-    with pytest.raises(ValueError, match="1 of 1 times"):
+    with pytest.raises(ValueError, match="1 of 1 times are outside the trajectory"):
         whole.at(START + 9.95)
 
 

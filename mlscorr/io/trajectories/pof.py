@@ -128,9 +128,9 @@ def read_poq(path: str | Path) -> dict[str, np.ndarray]:
     count, rest = divmod(len(data) - start, kind.itemsize)
     if header["major"] != 1 or count < 1 or rest:
         raise ValueError(
-            f"{path} has {len(data)} bytes, {max(rest, 0)} more than a header of {start} and "
-            f"{max(count, 0)} whole POQ records of {kind.itemsize} bytes of version "
-            f"{header['major']}.{header['minor']}: it is truncated, or not a POQ of RIEGL."
+            f"{path} has {len(data)} bytes, which are no header of {start} bytes and whole POQ "
+            f"records of {kind.itemsize} bytes (version {header['major']}.{header['minor']}): it "
+            f"is truncated, or not a POQ of RIEGL. {REMEDY}"
         )
     table = np.frombuffer(data, kind, count, start)["values"]
     check_finite(path, table, "POQ record")

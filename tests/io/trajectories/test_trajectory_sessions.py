@@ -105,7 +105,7 @@ def test_two_solutions_that_agree_are_used_once_and_part():
     "2 cm apart where each states 2 cm: the first counts where both are, and a gap follows"
     whole, notes = joined(drive(0.0, 10.0), drive(8.0, 10.0, aside=0.02))
     assert whole.gaps == pytest.approx(START + np.array([[9.95, 10.0]]))
-    assert "40 epochs of run-2.csv" in notes[0]
+    assert "40 epochs of run-2.csv overlap run-1.csv and are equal within their sigmas" in notes[0]
     aside = whole.position[:, 1] - CORNER[1]
     assert np.array_equal(aside > 0.01, whole.gps_time > START + 9.97)
 
