@@ -26,7 +26,7 @@ CATALOGUES = {  # room of the sentences: modules of the tests that list them
     "evaluate": ("tests.evaluate.test_wording",),
     "gap": ("tests.gap.test_wording",),
     "matching": ("tests.matching.test_wording",),
-    "pipeline": ("tests.pipeline.test_project_wording",),
+    "pipeline": ("tests.pipeline.test_choice_wording", "tests.pipeline.test_project_wording"),
     "report": ("tests.report.test_wording",),
 }
 CATALOGUED = (  # modules whose sentences the catalogues show with values
@@ -35,6 +35,7 @@ CATALOGUED = (  # modules whose sentences the catalogues show with values
     "gap/wording.py",
     "matching/_wording.py",
     "pipeline/project/wording.py",
+    "pipeline/wording.py",
     "report/wording.py",
 )
 WORDS = 3  # as many make a sentence; what is shorter is a key, a name or a unit
